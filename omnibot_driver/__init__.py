@@ -1,0 +1,1 @@
+"""ROS 2 driver for the Neuron OmniBot three-omni-wheel base."""

@@ -1,0 +1,109 @@
+"""What any motor board offers a driver: the seam at which further boards join.
+
+Readings are what a board measured, in SI units, with no trace of its bytes. A ``Board`` turns bytes
+into readings and wishes into bytes, and keeps the belief about the board's mode; it never decides
+when something is sent. It knows no ROS, no port and no clock.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Literal, Protocol
+
+from omnibot_driver.core.kinematics import BodyTwist
+
+Vector3 = tuple[float, float, float]
+
+
+class Mode(Enum):
+    """What we believe of the board, from nothing but what it sent; the value is its public name."""
+
+    UNKNOWN = "connecting"
+    PAUSED = "paused"
+    NOMINAL = "nominal"
+    IMU_ONLY = "imu_only"
+
+    @property
+    def running(self) -> bool:
+        """True in the modes in which the board sends data and obeys motion commands."""
+        return self in (Mode.NOMINAL, Mode.IMU_ONLY)
+
+
+@dataclass(frozen=True, slots=True)
+class ImuReading:
+    """Specific force in m/s² and angular velocity in rad/s, in the sensor's own axes."""
+
+    specific_force: Vector3
+    angular_velocity: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class DisplacementReading:
+    """Motion during the last ``duration_s``; ``lost`` frames of this kind are missing before it."""
+
+    dx_m: float
+    dy_m: float
+    dyaw_rad: float
+    frame: Literal["earth", "body"]
+    duration_s: float
+    lost: int
+
+
+@dataclass(frozen=True, slots=True)
+class PoseReading:
+    """The board's own dead reckoning, in the earth frame it has chosen for itself."""
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class PausedReading:
+    """The board said that it is paused (or still initialising)."""
+
+
+Reading = ImuReading | DisplacementReading | PoseReading | PausedReading
+
+
+class Board(Protocol):
+    """One kind of board. Request methods raise RequestRefused where the mode forbids them."""
+
+    @property
+    def mode(self) -> Mode:
+        """The present belief."""
+
+    def connect(self) -> None:
+        """The line is new: nothing that was held or believed is worth anything any more."""
+
+    def receive(self, data: bytes, now: float) -> list[Reading]:
+        """What these bytes complete, in the order of the line; ``mode`` follows."""
+
+    def flush(self, now: float) -> list[Reading]:
+        """The line is closed: what can still be told from what was held."""
+
+    def silence(self) -> None:
+        """Nothing was understood for so long that the mode is unknown again."""
+
+    def wake(self) -> bytes:
+        """What makes a board in any state listen, ends any half command, and stops the wheels."""
+
+    def start(self) -> bytes:
+        """Run, whatever it did before; harmless to repeat."""
+
+    def pause(self) -> bytes:
+        """Pause a running board. Refused when it is not known to run."""
+
+    def reset(self) -> bytes:
+        """Reboot; the mode is unknown until the board is heard again."""
+
+    def stop(self) -> bytes:
+        """Stand still."""
+
+    def emergency_stop(self) -> bytes:
+        """The board's own emergency stop."""
+
+    def velocity(self, twist: BodyTwist) -> bytes:
+        """Drive with this body velocity, already within the limits."""
+
+    def wheels(self, rates_radps: Vector3) -> bytes:
+        """Turn the wheels A, B, C at these rates, already within the limits."""

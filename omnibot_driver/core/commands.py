@@ -1,0 +1,108 @@
+"""Which frame goes out when: pacing, repeating, timing out, the e-stop latch.
+
+Nothing acknowledges a command and the board never stops by itself, so the current command is
+repeated, and when it grows old Stop is, for a while. This module is handed ready frames and does
+not know what is in them; time is an argument.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+PACE_S: Final = 0.01
+"""The board's control tick: commands closer together than this would only fill its buffer."""
+STOPPING_S: Final = 1.0
+"""How long Stop is repeated before the line goes quiet."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandSettings:
+    """``timeout_s``: age at which a command is worth nothing; ``rate_hz``: how often it repeats."""
+
+    timeout_s: float = 0.5
+    rate_hz: float = 20.0
+
+
+class CommandStream:
+    """The outbound line. ``settings`` may be replaced at any time."""
+
+    def __init__(self, settings: CommandSettings, *, stop: bytes, emergency_stop: bytes) -> None:
+        self.settings = settings
+        self.latched = False
+        self._stop, self._emergency_stop = stop, emergency_stop
+        self._current: bytes | None = None
+        self._expires_at = -math.inf
+        self._stopping_until = -math.inf
+        self._written_at = -math.inf
+        self._last_written = b""
+        self._urgent = False
+        self._fresh = False
+
+    def command(self, frame: bytes, now: float) -> None:
+        """The newest command; it replaces whatever was current."""
+        self._current = frame
+        self._expires_at = now + self.settings.timeout_s
+        self._fresh = True
+        self._urgent = frame == self._stop and (
+            self._last_written != self._stop or now - self._written_at >= PACE_S
+        )
+
+    def discard(self) -> None:
+        """No command is current and the line goes quiet; an e-stop stays."""
+        self._current = None
+        self._stopping_until = -math.inf
+        self._fresh = self._urgent = False
+
+    def halt(self, now: float) -> None:
+        """Discard the command, Stop at once, and repeat it for ``STOPPING_S``."""
+        self.discard()
+        self._stopping_until = now + STOPPING_S
+        self._urgent = True
+
+    def latch(self) -> None:
+        """E-stop: nothing but emergency-stop frames from now on, the first at once."""
+        self.discard()
+        self.latched = self._urgent = True
+
+    def release(self, now: float) -> None:
+        """End the e-stop; the robot stands until a new command comes."""
+        if self.latched:
+            self.latched = False
+            self.halt(now)
+
+    def wrote(self, data: bytes, now: float) -> None:
+        """Anything was written to the line, by whomever."""
+        self._last_written, self._written_at = data, now
+
+    def due(self, now: float) -> bytes:
+        """The bytes to write now, possibly none. They count as written."""
+        if self._current is not None and now >= self._expires_at:
+            self.halt(now)
+        next_write = self._next_write()
+        if now < next_write:
+            return b""
+        frame = self._frame(next_write)
+        self._urgent = self._fresh = False
+        if frame:
+            self.wrote(frame, now)
+        return frame
+
+    @property
+    def wake_at(self) -> float:
+        """When ``due`` has to be asked again; infinity while the line is quiet."""
+        next_write = self._next_write()
+        if self._current is not None and not self.latched:
+            return min(next_write, self._expires_at)
+        return next_write if self._frame(next_write) else math.inf
+
+    def _next_write(self) -> float:
+        if self._urgent:
+            return -math.inf
+        return self._written_at + (PACE_S if self._fresh else 1.0 / self.settings.rate_hz)
+
+    def _frame(self, at: float) -> bytes:
+        if self.latched:
+            return self._emergency_stop
+        if self._current is not None:
+            return self._current
+        return self._stop if self._urgent or at < self._stopping_until else b""

@@ -1,0 +1,36 @@
+"""From the counts of an MPU6050 to SI units; axes stay the sensor's own.
+
+Source: MPU-6050 product specification, sections 6.1 and 6.2 (sensitivity scale factors).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+STANDARD_GRAVITY: Final = 9.80665
+
+ACCEL_COUNTS_PER_G: Final = {2: 16384.0, 4: 8192.0, 8: 4096.0, 16: 2048.0}
+"""By full-scale range in g."""
+GYRO_COUNTS_PER_DPS: Final = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}
+"""By full-scale range in degrees per second."""
+
+Counts = tuple[int, int, int]
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImuScale:
+    """The ranges the sensor is set to; keys of the two tables above."""
+
+    accel_range_g: int = 2
+    gyro_range_dps: int = 250
+
+    def specific_force(self, counts: Counts) -> Vector3:
+        """Counts to m/s²."""
+        unit = STANDARD_GRAVITY / ACCEL_COUNTS_PER_G[self.accel_range_g]
+        return counts[0] * unit, counts[1] * unit, counts[2] * unit
+
+    def angular_velocity(self, counts: Counts) -> Vector3:
+        """Counts to rad/s."""
+        unit = math.radians(1.0 / GYRO_COUNTS_PER_DPS[self.gyro_range_dps])
+        return counts[0] * unit, counts[1] * unit, counts[2] * unit

@@ -1,0 +1,69 @@
+"""How fast is allowed, and what fits a word on the wire; every limit keeps the direction.
+
+Pure arithmetic on finite numbers; ``require_finite`` is where others are turned away.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.kinematics import BodyTwist
+
+MAX_WORD: Final = 32767
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedLimits:
+    """The fastest that is commanded: m/s as a vector, rad/s of yaw, rad/s of the fastest wheel."""
+
+    linear_mps: float = 0.5
+    angular_radps: float = 0.5
+    wheel_radps: float = 17.0
+
+    def twist(self, wanted: BodyTwist) -> BodyTwist:
+        """The linear velocity shortened in its own direction, the yaw rate clamped."""
+        vx, vy = shorten((wanted.vx_mps, wanted.vy_mps), self.linear_mps)
+        yaw_rate = max(-self.angular_radps, min(self.angular_radps, wanted.yaw_rate_radps))
+        return BodyTwist(vx, vy, yaw_rate)
+
+    def wheels(self, wanted_radps: Sequence[float]) -> tuple[float, float, float]:
+        """All three wheels slowed alike until the fastest is within its limit."""
+        a, b, c = slow(wanted_radps, self.wheel_radps)
+        return a, b, c
+
+
+def require_finite(what: str, values: Sequence[float]) -> None:
+    """Raises CommandRefused, naming ``what``, when a value is NaN or infinite."""
+    if not all(map(math.isfinite, values)):
+        numbers = ", ".join(f"{value:g}" for value in values)
+        raise CommandRefused(
+            f"{what} refused: ({numbers}) is not finite and counts as no command: mend the sender"
+        )
+
+
+def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
+    """The vector with a Euclidean length of at most ``limit``, however large it is."""
+    largest = max(map(abs, vector))
+    if largest == 0.0:
+        return tuple(vector)
+    unit_length = math.hypot(*(value / largest for value in vector))
+    return _scale(vector, limit / largest / unit_length)
+
+
+def slow(values: Sequence[float], limit: float) -> tuple[float, ...]:
+    """The values scaled together until the largest magnitude is at most ``limit``."""
+    largest = max(map(abs, values))
+    return _scale(values, limit / largest) if largest else tuple(values)
+
+
+def to_words(counts: Sequence[float]) -> tuple[int, ...]:
+    """Counts rounded to the nearest (halves away from zero), scaled together to fit 16 bits."""
+    return tuple(
+        int(math.copysign(math.floor(abs(count) + 0.5), count)) for count in slow(counts, MAX_WORD)
+    )
+
+
+def _scale(values: Sequence[float], factor: float) -> tuple[float, ...]:
+    return tuple(value * factor for value in values) if factor < 1.0 else tuple(values)

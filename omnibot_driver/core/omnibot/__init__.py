@@ -1,0 +1,27 @@
+"""The Neuron OmniBot's STM32 motor board, and nothing else."""
+
+from omnibot_driver.core.omnibot.board import OmniBot, OmniBotSettings
+from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
+from omnibot_driver.core.omnibot.frames import (
+    CommandFrame,
+    DeltaFrame,
+    ImuFrame,
+    PausedFrame,
+    PoseFrame,
+    decode,
+    encode,
+)
+
+__all__ = [
+    "CommandFrame",
+    "DecoderStatistics",
+    "DeltaFrame",
+    "FrameDecoder",
+    "ImuFrame",
+    "OmniBot",
+    "OmniBotSettings",
+    "PausedFrame",
+    "PoseFrame",
+    "decode",
+    "encode",
+]

@@ -1,0 +1,172 @@
+"""The OmniBot board as a ``core.board.Board``: its bytes as readings, wishes as its bytes.
+
+Source: the board's manual ver. 0.3. Units on the wire: deltas 0.1 mm and 0.1 mrad per 40 ms;
+poses mm and mrad; velocity and wheel commands in the firmware's own unit, which
+``linear_scale`` and ``angular_scale`` translate (70 and 500 are the vendor's, found by hand).
+"""
+
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+from omnibot_driver.core.board import (
+    DisplacementReading,
+    ImuReading,
+    Mode,
+    PausedReading,
+    PoseReading,
+    Reading,
+    Vector3,
+)
+from omnibot_driver.core.imu import ImuScale
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.limits import to_words
+from omnibot_driver.core.omnibot import frames
+from omnibot_driver.core.omnibot.decoder import FrameDecoder
+from omnibot_driver.core.omnibot.frames import (
+    ByteOrder,
+    CommandFrame,
+    DeltaFrame,
+    Frame,
+    ImuFrame,
+    PoseFrame,
+)
+from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
+
+DELTA_PERIOD_S: Final = 0.04
+DELTA_LSB_M: Final = 1e-4
+DELTA_LSB_RAD: Final = 1e-4
+POSE_LSB_M: Final = 1e-3
+POSE_LSB_RAD: Final = 1e-3
+
+STOP: Final = frames.encode(frames.STOP)
+EMERGENCY_STOP: Final = frames.encode(frames.EMERGENCY_STOP)
+WAKE: Final = bytes(8)
+"""More than the three bytes a booting board swallows, and enough to end any half command."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OmniBotSettings:
+    """What cannot be known from the wire.
+
+    ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per rad/s; ``axis_signs``: ±1 for x, y
+    and yaw, applied to what is commanded and to what is read; ``delta_frame``: whether deltas are
+    differences of positions in the board's earth frame or motion along its own axes.
+    """
+
+    linear_scale: float = 70.0
+    angular_scale: float = 500.0
+    wheel_radius_m: float = 0.029
+    axis_signs: tuple[int, int, int] = (1, 1, 1)
+    delta_frame: Literal["earth", "body"] = "earth"
+    pose_byte_order: ByteOrder = "big"
+    imu: ImuScale = field(default_factory=ImuScale)
+
+
+class OmniBot:
+    """One board on one line. ``settings`` may be replaced at any time."""
+
+    def __init__(self, settings: OmniBotSettings) -> None:
+        self.settings = settings
+        self.connect()
+
+    def connect(self) -> None:
+        """A new line: a new decoder, and no belief."""
+        self._decoder = FrameDecoder(self.settings.pose_byte_order)
+        self._modes = ModeTracker()
+        self._seq: int | None = None
+
+    @property
+    def mode(self) -> Mode:
+        """The present belief."""
+        return self._modes.mode
+
+    def receive(self, data: bytes, now: float) -> list[Reading]:
+        """The readings that these bytes complete, in the order of the line."""
+        return [self._read(frame) for frame in self._decoder.feed(data, now)]
+
+    def flush(self, now: float) -> list[Reading]:
+        """The line is closed: what was held is all there will be."""
+        return [self._read(frame) for frame in self._decoder.flush(now)]
+
+    def silence(self) -> None:
+        """Nothing was understood for so long that the mode is unknown again."""
+        self._modes.apply(Happening.HEARD_NOTHING)
+
+    def wake(self) -> bytes:
+        """Eight zero bytes and Stop."""
+        return WAKE + STOP
+
+    def start(self) -> bytes:
+        """S."""
+        self._modes.apply(Happening.SENT_START)
+        return frames.FORCE_START
+
+    def pause(self) -> bytes:
+        """Stop, then P: a toggle, so refused unless the board is known to run."""
+        self._modes.apply(Happening.SENT_PAUSE)
+        return STOP + frames.TOGGLE_PAUSE
+
+    def reset(self) -> bytes:
+        """Stop, then R; zeros first where the board may not be listening yet."""
+        wake = b"" if self.mode.running else WAKE
+        self._modes.apply(Happening.SENT_RESET)
+        return wake + STOP + frames.RESET
+
+    def stop(self) -> bytes:
+        """The manual's Stop, which stands still whatever the board's control switch says."""
+        return STOP
+
+    def emergency_stop(self) -> bytes:
+        """The manual's E-stop."""
+        return EMERGENCY_STOP
+
+    def velocity(self, twist: BodyTwist) -> bytes:
+        """Base vector control; Stop when it rounds to nothing."""
+        scale, (x, y, yaw) = self.settings, self.settings.axis_signs
+        return self._drive(
+            frames.VELOCITY_MODE,
+            (
+                x * twist.vx_mps * scale.linear_scale,
+                y * twist.vy_mps * scale.linear_scale,
+                yaw * twist.yaw_rate_radps * scale.angular_scale,
+            ),
+        )
+
+    def wheels(self, rates_radps: Vector3) -> bytes:
+        """Independent wheel drive in rad/s: the unit on the wire is that of a rim speed."""
+        unit = self.settings.linear_scale * self.settings.wheel_radius_m
+        a, b, c = rates_radps
+        return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
+
+    @staticmethod
+    def _drive(mode: int, counts: Vector3) -> bytes:
+        a, b, c = to_words(counts)
+        return frames.encode(CommandFrame(mode, (a, b, c))) if (a, b, c) != (0, 0, 0) else STOP
+
+    def _read(self, frame: Frame) -> Reading:
+        self._modes.hear(frame)
+        x, y, yaw = self.settings.axis_signs
+        match frame:
+            case ImuFrame(accel, gyro):
+                scale = self.settings.imu
+                return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro))
+            case DeltaFrame(dx, dy, dtheta, seq):
+                return DisplacementReading(
+                    dx_m=x * dx * DELTA_LSB_M,
+                    dy_m=y * dy * DELTA_LSB_M,
+                    dyaw_rad=yaw * dtheta * DELTA_LSB_RAD,
+                    frame=self.settings.delta_frame,
+                    duration_s=DELTA_PERIOD_S,
+                    lost=self._count_lost(seq),
+                )
+            case PoseFrame(px, py, theta, _):
+                return PoseReading(
+                    x * px * POSE_LSB_M, y * py * POSE_LSB_M, yaw * theta * POSE_LSB_RAD
+                )
+            case _:
+                self._seq = None
+                return PausedReading()
+
+    def _count_lost(self, seq: int) -> int:
+        before, self._seq = self._seq, seq
+        return 0 if before is None else (seq - before - 1) % 256

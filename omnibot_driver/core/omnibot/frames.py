@@ -1,0 +1,168 @@
+"""The wire format: every frame the board sends or obeys, as bytes and as values.
+
+Source: the board's manual ver. 0.3, sections "Serial Command (Rx)", "Serial Data Output (Tx)" and
+"Appendix". This module knows layouts only; what a value means in SI units is known in ``board``.
+All words are signed, 16 bit, most significant byte first.
+"""
+
+import re
+import struct
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from omnibot_driver.core.errors import FrameError
+
+ByteOrder = Literal["big", "little"]
+Words = tuple[int, int, int]
+
+IMU_HEADER: Final = b"\xff\xfa"
+DELTA_HEADER: Final = b"\xff\xfb"
+POSE_HEADER: Final = b"\xff\xfc"
+COMMAND_HEADER: Final = b"\xff\xfe"
+
+_IMU: Final = struct.Struct(">2s6h")
+_DELTA: Final = struct.Struct(">2s3hB")
+_POSE: Final[dict[str, struct.Struct]] = {
+    "big": struct.Struct(">2s3fB"),
+    "little": struct.Struct("<2s3fB"),
+}
+_COMMAND: Final = struct.Struct(">2sB3h")
+_PAUSED_WORD: Final = b"Paused: "
+_PAUSED_LENGTH: Final = len(b"Paused: 255 \r\n")
+_PAUSED: Final = re.compile(_PAUSED_WORD + rb"(\d{1,3}) ?\r?\n")
+_PAUSED_COUNT_BEGUN: Final = re.compile(rb"\d{0,3} ?\r?")
+
+_HEADER_BEGIN: Final = IMU_HEADER[0]
+_TEXT_BEGIN: Final = _PAUSED_WORD[0]
+_LENGTH_BY_TYPE: Final[dict[int, int]] = {
+    IMU_HEADER[1]: _IMU.size,
+    DELTA_HEADER[1]: _DELTA.size,
+    POSE_HEADER[1]: _POSE["big"].size,
+}
+
+INCOMPLETE: Final = 0
+NO_FRAME: Final = -1
+
+VELOCITY_MODE: Final = 0x01
+WHEEL_MODE: Final = 0x02
+EMERGENCY_STOP_MODE: Final = 0x10
+
+FORCE_START: Final = b"S"
+TOGGLE_PAUSE: Final = b"P"
+RESET: Final = b"R"
+
+
+@dataclass(frozen=True, slots=True)
+class ImuFrame:
+    """100 Hz: the MPU6050's registers as they are. Full scale is 32768 counts."""
+
+    accel: Words
+    gyro: Words
+
+
+@dataclass(frozen=True, slots=True)
+class DeltaFrame:
+    """25 Hz: motion since the last frame of this kind; 0.1 mm, 0.1 mm, 0.1 mrad, counter 0..255."""
+
+    dx: int
+    dy: int
+    dtheta: int
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
+class PoseFrame:
+    """5 Hz: the board's own pose in its earth frame; mm, mm, mrad, counter 0..255."""
+
+    x: float
+    y: float
+    theta: float
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
+class PausedFrame:
+    """1 Hz while the board is initialising or paused; a counter 0..255."""
+
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class CommandFrame:
+    """What the host sends: a mode byte and three words."""
+
+    mode: int
+    values: Words
+
+
+Frame = ImuFrame | DeltaFrame | PoseFrame | PausedFrame
+
+STOP: Final = CommandFrame(WHEEL_MODE, (0, 0, 0))
+EMERGENCY_STOP: Final = CommandFrame(EMERGENCY_STOP_MODE, (0, 0, 0))
+
+
+def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> bytes:
+    """The bytes of one frame. Raises FrameError when a value does not fit its field."""
+    try:
+        match frame:
+            case ImuFrame(accel, gyro):
+                return _IMU.pack(IMU_HEADER, *accel, *gyro)
+            case DeltaFrame(dx, dy, dtheta, seq):
+                return _DELTA.pack(DELTA_HEADER, dx, dy, dtheta, seq)
+            case PoseFrame(x, y, theta, seq):
+                return _POSE[pose_byte_order].pack(POSE_HEADER, x, y, theta, seq)
+            case CommandFrame(mode, values):
+                return _COMMAND.pack(COMMAND_HEADER, mode, *values)
+            case PausedFrame(count):
+                if not 0 <= count <= 255:
+                    raise FrameError(f"{frame} does not fit the wire: the count is 0..255")
+                return b"Paused: %d \n" % count
+    except (struct.error, OverflowError) as error:
+        raise FrameError(f"{frame} does not fit the wire: {error}") from error
+
+
+def measure(data: bytes | bytearray, at: int) -> int:
+    """Length in bytes of the frame the board may have sent here.
+
+    INCOMPLETE while it may still become a whole frame, NO_FRAME when no frame begins so.
+    """
+    if data[at] == _TEXT_BEGIN:
+        return _measure_paused(data, at)
+    if data[at] != _HEADER_BEGIN:
+        return NO_FRAME
+    if at + 1 == len(data):
+        return INCOMPLETE
+    length = _LENGTH_BY_TYPE.get(data[at + 1], NO_FRAME)
+    return length if at + length <= len(data) else INCOMPLETE
+
+
+def _measure_paused(data: bytes | bytearray, at: int) -> int:
+    whole = _PAUSED.match(data, at)
+    if whole is not None:
+        return len(whole[0]) if int(whole[1]) <= 255 else NO_FRAME
+    tail = bytes(data[at : at + _PAUSED_LENGTH])
+    word = len(_PAUSED_WORD)
+    begun = _PAUSED_WORD.startswith(tail[:word]) and _PAUSED_COUNT_BEGUN.fullmatch(tail, word)
+    return INCOMPLETE if begun else NO_FRAME
+
+
+def decode_measured(data: bytes | bytearray, pose_byte_order: ByteOrder = "big") -> Frame:
+    """The frame that these bytes are; their length must be what ``measure`` told."""
+    if data[0] == _TEXT_BEGIN:
+        return PausedFrame(int(data[len(_PAUSED_WORD) :]))
+    if data[1] == IMU_HEADER[1]:
+        _, ax, ay, az, gx, gy, gz = _IMU.unpack(data)
+        return ImuFrame((ax, ay, az), (gx, gy, gz))
+    if data[1] == DELTA_HEADER[1]:
+        return DeltaFrame(*_DELTA.unpack(data)[1:])
+    return PoseFrame(*_POSE[pose_byte_order].unpack(data)[1:])
+
+
+def decode(data: bytes, pose_byte_order: ByteOrder = "big") -> Frame | CommandFrame:
+    """The one frame that these bytes are. Raises FrameError when they are not exactly one."""
+    if data and measure(data, 0) == len(data):
+        return decode_measured(data, pose_byte_order)
+    if data[:2] == COMMAND_HEADER and len(data) == _COMMAND.size:
+        _, mode, a, b, c = _COMMAND.unpack(data)
+        return CommandFrame(mode, (a, b, c))
+    raise FrameError(f"not one whole frame of this board: {data.hex(' ') or 'no bytes'}")

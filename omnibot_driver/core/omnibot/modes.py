@@ -1,0 +1,72 @@
+"""The board's modes as a table: what S, P, R and what is heard do from each of them.
+
+Source: the manual's "Operation State Machine" and "System state command". The board never says
+which mode it is in, so the mode is a belief and only what is *heard* makes it a better one: a
+letter that was sent changes nothing, except that after R all belief is void. P toggles, so it is
+allowed only where the outcome is known.
+"""
+
+from enum import Enum
+from typing import Final
+
+from omnibot_driver.core.board import Mode
+from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.omnibot.frames import Frame, ImuFrame, PausedFrame
+
+IMU_FRAMES_ALONE: Final = 25
+"""IMU frames (100 Hz) without a delta (25 Hz) that make IMU-only mode: six deltas are missing."""
+
+
+class Happening(Enum):
+    """What the table knows: heard from the board, or sent to it."""
+
+    HEARD_PAUSED = "heard «Paused»"
+    HEARD_MOTION = "heard deltas or poses"
+    HEARD_IMU_ALONE = "heard IMU frames without deltas"
+    HEARD_NOTHING = "heard nothing"
+    SENT_START = "sent S"
+    SENT_PAUSE = "sent P"
+    SENT_RESET = "sent R"
+
+
+_U, _P, _N, _I = Mode.UNKNOWN, Mode.PAUSED, Mode.NOMINAL, Mode.IMU_ONLY
+
+TRANSITIONS: Final[dict[Happening, dict[Mode, Mode]]] = {
+    Happening.HEARD_PAUSED: {_U: _P, _P: _P, _N: _P, _I: _P},
+    Happening.HEARD_MOTION: {_U: _N, _P: _N, _N: _N, _I: _N},
+    Happening.HEARD_IMU_ALONE: {_U: _I, _P: _I, _N: _I, _I: _I},
+    Happening.HEARD_NOTHING: {_U: _U, _P: _U, _N: _U, _I: _U},
+    Happening.SENT_START: {_U: _U, _P: _P, _N: _N, _I: _I},
+    Happening.SENT_PAUSE: {_N: _N, _I: _I},
+    Happening.SENT_RESET: {_U: _U, _P: _U, _N: _U, _I: _U},
+}
+"""From what happened and the mode before to the mode after; what is missing is refused."""
+
+
+class ModeTracker:
+    """Walks the table. Illegal requests raise RequestRefused and change nothing."""
+
+    def __init__(self) -> None:
+        self.mode = Mode.UNKNOWN
+        self._imu_frames_alone = 0
+
+    def apply(self, happening: Happening) -> None:
+        """One step through the table."""
+        try:
+            self.mode = TRANSITIONS[happening][self.mode]
+        except KeyError:
+            raise RequestRefused(
+                f"the board is {self.mode.value}: {happening.value} would do nobody knows what"
+            ) from None
+        self._imu_frames_alone = 0
+
+    def hear(self, frame: Frame) -> None:
+        """What this frame tells of the mode."""
+        if isinstance(frame, ImuFrame):
+            self._imu_frames_alone += 1
+            if self._imu_frames_alone >= IMU_FRAMES_ALONE:
+                self.apply(Happening.HEARD_IMU_ALONE)
+        elif isinstance(frame, PausedFrame):
+            self.apply(Happening.HEARD_PAUSED)
+        else:
+            self.apply(Happening.HEARD_MOTION)

@@ -1,0 +1,190 @@
+"""Bringing the board into the wanted mode, and believing only what is heard afterwards.
+
+A letter may be lost, P toggles, and a board that boots swallows what it hears first. So a request
+is a small conversation: say it, wait for bytes that came in later and show it done, say it again
+after a while, give up by a deadline with a sentence. One request is under way at a time. This
+module knows no bytes and reads no clock.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from omnibot_driver.core.board import Board, Mode
+from omnibot_driver.core.errors import RequestRefused
+
+START_RETRY_S: Final = 0.5
+PAUSE_RETRY_S: Final = 1.5
+"""Longer than the second between two notices: data without a notice means that P was lost."""
+IN_FLIGHT_S: Final = 0.1
+"""A notice that comes sooner than this after a letter may have been sent before it was obeyed."""
+ANSWER_WITHIN_S: Final = 4.5
+RESET_WITHIN_S: Final = 9.5
+
+
+class Request(Enum):
+    """What can be asked of a board; the value reads well after "a"."""
+
+    START = "start"
+    PAUSE = "pause"
+    RESET = "reset"
+
+
+class Phase(Enum):
+    """What is being done to the board; motion commands are accepted only in SETTLED."""
+
+    CLOSED = "not connected"
+    SETTLED = "settled"
+    STARTING = "being started"
+    PAUSING = "being paused"
+    RESETTING = "being reset"
+
+
+@dataclass(frozen=True, slots=True)
+class RequestDone:
+    """The answer to a request; ``token`` is what the asker handed in."""
+
+    token: object
+    success: bool
+    message: str
+
+
+class Supervisor:
+    """``run``: whether the board is to run whenever it is there."""
+
+    def __init__(self, board: Board, *, run: bool) -> None:
+        self.phase = Phase.CLOSED
+        self.answers: list[RequestDone] = []
+        self._board = board
+        self._run = run
+        self._output = bytearray()
+        self._said_at = -math.inf
+        self._paused_with_p = False
+        self._request: Request | None = None
+        self._token: object = None
+        self._deadline = math.inf
+
+    def take_output(self) -> bytes:
+        """What to write now, before anything else."""
+        data = bytes(self._output)
+        self._output.clear()
+        return data
+
+    @property
+    def wake_at(self) -> float:
+        """When ``tick`` has something to do."""
+        retry_at = self._said_at + START_RETRY_S if self.phase is Phase.STARTING else math.inf
+        return min(retry_at, self._deadline)
+
+    def opened(self, now: float) -> None:
+        """The port is open; the board may be in any state, half-way through a command too."""
+        self._output.clear()
+        self._begin(now)
+
+    def closed(self) -> None:
+        """The port is gone, and every request with it."""
+        self.phase = Phase.CLOSED
+        self._output.clear()
+        self._answer(False, "the port was lost meanwhile; call again once it is back")
+
+    def request(self, request: Request, token: object, now: float) -> None:
+        """Ask for something; the answer comes in ``answers``. Raises RequestRefused at once."""
+        if self.phase is Phase.CLOSED:
+            raise RequestRefused("the port is not open; connect the board, then call again")
+        if self._request is not None:
+            raise RequestRefused(
+                f"a {self._request.value} is under way; wait for its answer, then call again"
+            )
+        self._request, self._token = request, token
+        self._deadline = now + ANSWER_WITHIN_S
+        if request is Request.START:
+            self._run = True
+            if self._board.mode.running:
+                self._say(self._board.start(), now)
+            else:
+                self._begin(now)
+        elif request is Request.PAUSE:
+            self._run = False
+            self.phase = Phase.PAUSING
+            self._paused_with_p = False
+            self._output += self._board.stop()
+        else:
+            self._run = self._run or self._board.mode.running
+            self.phase = Phase.RESETTING
+            self._deadline = now + RESET_WITHIN_S
+            self._say(self._board.reset(), now)
+
+    def heard_paused(self, now: float) -> None:
+        """The board said that it is paused."""
+        in_flight = now - self._said_at < IN_FLIGHT_S
+        if self.phase is Phase.PAUSING and (self._paused_with_p or not in_flight):
+            self._settle("paused")
+        elif self.phase is Phase.RESETTING and not in_flight:
+            self._begin(now)
+            if not self._run:
+                self._settle("the board has restarted and is paused, as it was before")
+        elif self.phase is Phase.SETTLED and self._run:
+            self._begin(now)
+
+    def heard_data(self, now: float) -> None:
+        """The board sent data, and its mode is a running one."""
+        unheard = now - self._said_at >= PAUSE_RETRY_S
+        if self.phase is Phase.STARTING:
+            self._settle(f"running ({self._board.mode.value})")
+        elif self.phase is Phase.SETTLED and self._request is Request.START:
+            self._answer(True, f"running ({self._board.mode.value})")
+        elif self.phase is Phase.PAUSING and (unheard or not self._paused_with_p):
+            self._paused_with_p = True
+            self._say(self._board.pause(), now)
+        elif self.phase is Phase.RESETTING and unheard:
+            self._say(self._board.reset(), now)
+
+    def heard_nothing(self, now: float) -> None:
+        """The board fell silent: it may be rebooting, or be gone."""
+        if self.phase is Phase.SETTLED and self._run:
+            self._begin(now)
+
+    def tick(self, now: float) -> None:
+        """Repeat what is due, give up what is overdue."""
+        if now >= self._deadline:
+            self._give_up(now)
+        elif self.phase is Phase.STARTING and now - self._said_at >= START_RETRY_S:
+            self._say(self._board.start(), now)
+
+    def _begin(self, now: float) -> None:
+        """The opening sequence; a board that is to stay as it is gets no S."""
+        self._output += self._board.wake()
+        self.phase = Phase.SETTLED
+        if self._run:
+            self.phase = Phase.STARTING
+            self._say(self._board.start(), now)
+
+    def _say(self, data: bytes, now: float) -> None:
+        self._output += data
+        self._said_at = now
+
+    def _settle(self, message: str) -> None:
+        self.phase = Phase.SETTLED
+        self._answer(True, message)
+
+    def _answer(self, success: bool, message: str) -> None:
+        if self._request is not None:
+            self.answers.append(RequestDone(self._token, success, message))
+        self._request, self._token, self._deadline = None, None, math.inf
+
+    def _give_up(self, now: float) -> None:
+        mode = self._board.mode
+        if mode is Mode.UNKNOWN:
+            reason = "nothing was understood from the board: check its power, cable and baudrate"
+        elif mode is Mode.PAUSED:
+            reason = "the board still says that it is paused: does the cable carry our bytes to it?"
+        else:
+            reason = "the board goes on sending data: does the cable carry our bytes to it?"
+        if self.phase is not Phase.STARTING:
+            self.phase = Phase.SETTLED
+            if self._run and not mode.running:
+                self._begin(now)
+        if self.phase is Phase.STARTING:
+            reason += " (S is repeated until data flows)"
+        self._answer(False, reason)

@@ -1,0 +1,173 @@
+"""The threads that serve a port and a session: the only module that knows threads and the clock.
+
+The *reader* opens the port, waits for bytes, hands them to the session and delivers what comes of
+them at once, on its own thread: no queue and no timer stand between the wire and the listener. The
+*pacer* sleeps until something is due (a repeated command, a timeout, a retry), so the watchdog
+depends on nobody's executor. They and every caller go through one lock.
+"""
+
+import math
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Final, TypeVar
+
+from omnibot_driver.core.errors import LinkError
+from omnibot_driver.core.session import Event, OnExit, Session
+from omnibot_driver.port import Port
+
+JOIN_TIMEOUT_S: Final = 1.0
+
+T = TypeVar("T")
+
+
+class Link:
+    """One session on one port, which is opened again whenever it is lost.
+
+    ``deliver`` gets the session's events on whichever thread they came up; ``report`` gets a
+    sentence about the port whenever it cannot be had or is lost, and None when it is open;
+    ``failed`` gets the exception that ended a thread, which nothing but a defect can do.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        url: str,
+        baudrate: int,
+        *,
+        reconnect_interval_s: float,
+        deliver: Callable[[Sequence[Event]], None],
+        report: Callable[[str | None], None],
+        failed: Callable[[BaseException], None],
+    ) -> None:
+        self._session = session
+        self._open = lambda: Port(url, baudrate)
+        self.reconnect_interval_s = reconnect_interval_s
+        self._deliver = deliver
+        self._report = report
+        self._failed = failed
+        self._changed = threading.Condition(threading.Lock())
+        self._closing = threading.Event()
+        self._port: Port | None = None
+        self._write_error: LinkError | None = None
+        self._pacing_until = -math.inf
+        self._threads = [
+            threading.Thread(target=self._guard, args=(work,), name=f"omnibot-{name}", daemon=True)
+            for name, work in (("reader", self._serve), ("pacer", self._pace))
+        ]
+
+    def start(self) -> None:
+        """Begin to open the port; goes on until ``close``."""
+        for thread in self._threads:
+            thread.start()
+
+    def call(self, action: Callable[[Session, float], T]) -> T:
+        """Do something with the session; what it has to say is on the wire before this returns."""
+        events: Sequence[Event] = ()
+        try:
+            with self._changed:
+                try:
+                    return action(self._session, time.monotonic())
+                finally:
+                    events = self._settle()
+        finally:
+            self._deliver(events)
+
+    def close(self, on_exit: OnExit) -> None:
+        """Stop the robot, then end the threads and close the port; harmless to repeat."""
+        with self._changed:
+            if self._port is not None and not self._closing.is_set():
+                self._write(self._session.farewell(on_exit))
+            self._closing.set()
+            self._interrupt()
+            self._changed.notify_all()
+        for thread in self._threads:
+            if thread.is_alive():
+                thread.join(JOIN_TIMEOUT_S)
+
+    def _guard(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except BaseException as error:
+            self._failed(error)
+
+    def _serve(self) -> None:
+        while not self._closing.is_set():
+            try:
+                port = self._open()
+                self._report(None)
+                try:
+                    self._attach(port)
+                    self._read(port)
+                finally:
+                    self._detach()
+                    port.close()
+            except LinkError as error:
+                self._report(str(error))
+                self._closing.wait(self.reconnect_interval_s)
+
+    def _attach(self, port: Port) -> None:
+        with self._changed:
+            self._port, self._write_error = port, None
+            self._session.opened(time.monotonic())
+            events = self._settle()
+        self._deliver(events)
+
+    def _read(self, port: Port) -> None:
+        while not self._closing.is_set():
+            data = port.read()
+            with self._changed:
+                if self._write_error is not None:
+                    raise self._write_error
+                if not data:
+                    continue
+                self._session.receive(data, time.monotonic())
+                events = self._settle()
+            self._deliver(events)
+
+    def _detach(self) -> None:
+        with self._changed:
+            self._port = None
+            self._session.closed(time.monotonic())
+            events = self._settle()
+        self._deliver(events)
+
+    def _pace(self) -> None:
+        while True:
+            with self._changed:
+                if self._closing.is_set():
+                    return
+                now = time.monotonic()
+                self._pacing_until = self._session.wake_at
+                if now < self._pacing_until:
+                    wait = self._pacing_until - now
+                    self._changed.wait(None if math.isinf(wait) else wait)
+                    continue
+                self._session.tick(now)
+                events = self._settle()
+            self._deliver(events)
+
+    def _settle(self) -> Sequence[Event]:
+        """With the lock held: write what is due, wake the pacer if it sleeps for too long."""
+        self._write(self._session.take_output(time.monotonic()))
+        if self._session.wake_at < self._pacing_until:
+            self._changed.notify_all()
+        return self._session.take_events()
+
+    def _write(self, data: bytes) -> None:
+        if (
+            not data
+            or self._port is None
+            or self._write_error is not None
+            or self._closing.is_set()
+        ):
+            return
+        try:
+            self._port.write(data)
+        except LinkError as error:
+            self._write_error = error
+            self._interrupt()
+
+    def _interrupt(self) -> None:
+        if self._port is not None:
+            self._port.interrupt()

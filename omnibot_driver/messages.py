@@ -1,0 +1,130 @@
+"""From what the session measured to ROS messages: pure functions, no node, no arithmetic of note.
+
+Conventions: REP-103 (axes, units), REP-105 (odom to base_link), REP-145 (an IMU without
+orientation).
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Point, Quaternion, Vector3
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Header
+
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.session import ImuEstimate
+
+UNMEASURED_VARIANCE: Final = 1e6
+"""For z, roll and pitch, which a planar odometry says nothing of."""
+NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MessageSettings:
+    """Frames, and standard deviations that the covariances are made of (SI units)."""
+
+    odom_frame: str
+    base_frame: str
+    imu_frame: str
+    acceleration_stddev: float
+    angular_velocity_stddev: float
+    twist_linear_stddev: float
+    twist_angular_stddev: float
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, Any]) -> "MessageSettings":
+        """From checked parameter values."""
+        return cls(
+            odom_frame=values["odom_frame"],
+            base_frame=values["base_frame"],
+            imu_frame=values["imu_frame"],
+            acceleration_stddev=values["linear_acceleration_stddev"],
+            angular_velocity_stddev=values["angular_velocity_stddev"],
+            twist_linear_stddev=values["twist_linear_stddev"],
+            twist_angular_stddev=values["twist_angular_stddev"],
+        )
+
+
+def imu_message(estimate: ImuEstimate, stamp: Time, settings: MessageSettings) -> Imu:
+    """``imu/data_raw``: specific force and angular velocity in the sensor's own axes."""
+    force, rate = estimate.specific_force, estimate.angular_velocity
+    return Imu(
+        header=Header(stamp=stamp, frame_id=settings.imu_frame),
+        orientation_covariance=NO_ORIENTATION,
+        angular_velocity=Vector3(x=rate[0], y=rate[1], z=rate[2]),
+        angular_velocity_covariance=_isotropic(settings.angular_velocity_stddev),
+        linear_acceleration=Vector3(x=force[0], y=force[1], z=force[2]),
+        linear_acceleration_covariance=_isotropic(settings.acceleration_stddev),
+    )
+
+
+def odometry_message(
+    estimate: OdometryEstimate, stamp: Time, settings: MessageSettings
+) -> Odometry:
+    """``odom``: pose of the base in the odometry frame, twist in the base's own axes."""
+    pose, twist, covariance = estimate.pose, estimate.twist, estimate.covariance
+    message = Odometry(
+        header=Header(stamp=stamp, frame_id=settings.odom_frame),
+        child_frame_id=settings.base_frame,
+    )
+    message.pose.pose.position = Point(x=pose.x_m, y=pose.y_m, z=0.0)
+    message.pose.pose.orientation = yaw_quaternion(pose.yaw_rad)
+    message.pose.covariance = _planar(
+        covariance.xx,
+        covariance.xy,
+        covariance.x_yaw,
+        covariance.yy,
+        covariance.y_yaw,
+        covariance.yaw_yaw,
+    )
+    message.twist.twist.linear = Vector3(x=twist.vx_mps, y=twist.vy_mps, z=0.0)
+    message.twist.twist.angular = Vector3(x=0.0, y=0.0, z=twist.yaw_rate_radps)
+    linear, angular = settings.twist_linear_stddev**2, settings.twist_angular_stddev**2
+    message.twist.covariance = _planar(linear, 0.0, 0.0, linear, 0.0, angular)
+    return message
+
+
+def body_twist(twist: Any) -> BodyTwist:
+    """The planar part of a geometry_msgs/Twist; NaN or infinity anywhere makes all of it NaN.
+
+    A publisher that says nonsense of one axis is not to be trusted with the others.
+    """
+    unused = (twist.linear.z, twist.angular.x, twist.angular.y)
+    if not all(map(math.isfinite, unused)):
+        return BodyTwist(math.nan, math.nan, math.nan)
+    return BodyTwist(twist.linear.x, twist.linear.y, twist.angular.z)
+
+
+def time_message(nanoseconds: int) -> Time:
+    """Nanoseconds since the clock's epoch as a stamp."""
+    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+
+
+def yaw_quaternion(yaw_rad: float) -> Quaternion:
+    """A rotation about z."""
+    return Quaternion(x=0.0, y=0.0, z=math.sin(yaw_rad / 2), w=math.cos(yaw_rad / 2))
+
+
+def _isotropic(stddev: float) -> list[float]:
+    variance = stddev * stddev
+    return [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
+
+
+def _planar(
+    xx: float, xy: float, x_yaw: float, yy: float, y_yaw: float, yaw_yaw: float
+) -> list[float]:
+    """Row-major 6x6 of (x, y, z, roll, pitch, yaw)."""
+    zero, big = 0.0, UNMEASURED_VARIANCE
+    return [
+        *(xx, xy, zero, zero, zero, x_yaw),
+        *(xy, yy, zero, zero, zero, y_yaw),
+        *(zero, zero, big, zero, zero, zero),
+        *(zero, zero, zero, big, zero, zero),
+        *(zero, zero, zero, zero, big, zero),
+        *(x_yaw, y_yaw, zero, zero, zero, yaw_yaw),
+    ]

@@ -1,0 +1,337 @@
+"""Every parameter of the driver: name, default, unit, range, meaning; and what they add up to.
+
+The one table from which the node declares, checks and documents. It knows no ROS; types are
+plain Python's. Wrong values are ParameterErrors that name the parameter and what it may be.
+"""
+
+import difflib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from omnibot_driver.core.commands import CommandSettings
+from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, GYRO_COUNTS_PER_DPS, ImuScale
+from omnibot_driver.core.limits import SpeedLimits
+from omnibot_driver.core.odometry import OdometryNoise
+from omnibot_driver.core.omnibot import OmniBotSettings
+from omnibot_driver.core.session import SessionSettings
+
+Value = bool | int | float | str | list[int]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One row of the table. The default's type is the parameter's type.
+
+    ``low`` and ``high`` are inclusive; ``fixed`` means: given at start, read-only afterwards.
+    """
+
+    name: str
+    default: Value
+    unit: str
+    description: str
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[int | str, ...] = ()
+    fixed: bool = False
+
+    @property
+    def allowed(self) -> str:
+        """The allowed values in words; empty when any value of the type will do."""
+        if self.choices:
+            return "one of " + ", ".join(map(str, self.choices))
+        if self.low is not None:
+            return f"{self.low:g} to {self.high:g} {self.unit}".rstrip()
+        return ""
+
+    def check(self, value: object) -> Value:
+        """The value in the parameter's own type. Raises ParameterError."""
+        if isinstance(self.default, float) and type(value) is int:
+            value = float(value)
+        elif type(self.default) is int and isinstance(value, float) and value.is_integer():
+            value = int(value)
+        elif isinstance(self.default, list) and not isinstance(value, str | bytes):
+            value = list(value) if isinstance(value, Iterable) else value
+        if type(value) is not type(self.default):
+            raise self._refusal(value, f"a value of type {type(self.default).__name__}")
+        if isinstance(value, list):
+            if len(value) != 3 or any(abs(item) != 1 for item in value):
+                raise self._refusal(value, "three numbers, each 1 or -1")
+            return [int(item) for item in value]
+        assert isinstance(value, bool | int | float | str)
+        if self.choices and value not in self.choices:
+            raise self._refusal(value, self.allowed)
+        if not self._in_range(value):
+            raise self._refusal(value, self.allowed)
+        if self.name.endswith("_frame") and (not value or str(value).startswith("/")):
+            raise self._refusal(value, "a frame name without a leading slash")
+        return value
+
+    def _in_range(self, value: bool | int | float | str) -> bool:
+        if self.low is None or self.high is None or isinstance(value, str):
+            return True
+        return self.low <= value <= self.high
+
+    def _refusal(self, value: object, wanted: str) -> ParameterError:
+        return ParameterError(f"parameter '{self.name}' must be {wanted}, not {value!r}")
+
+
+_SPEED: Final = 10.0
+
+PARAMETERS: Final = (
+    Parameter(
+        "port",
+        "/dev/ttyUSB0",
+        "",
+        "Serial device, or any pyserial URL such as socket://host:port.",
+        fixed=True,
+    ),
+    Parameter(
+        "baudrate",
+        115200,
+        "baud",
+        "Speed of the serial line.",
+        low=1200,
+        high=4_000_000,
+        fixed=True,
+    ),
+    Parameter(
+        "auto_start",
+        True,
+        "",
+        "Start the board (S) whenever it is there and not running.",
+        fixed=True,
+    ),
+    Parameter(
+        "on_exit",
+        "stop",
+        "",
+        "What the board is left in when the driver ends; the robot is stopped in any case.",
+        choices=("stop", "pause", "reset"),
+    ),
+    Parameter(
+        "reconnect_interval",
+        0.5,
+        "s",
+        "Time between two attempts to open the port.",
+        low=0.05,
+        high=60.0,
+    ),
+    Parameter(
+        "linear_scale",
+        70.0,
+        "LSB/(m/s)",
+        "Command unit of the board for linear speed (and for the rim speed of a wheel).",
+        low=1.0,
+        high=10_000.0,
+    ),
+    Parameter(
+        "angular_scale",
+        500.0,
+        "LSB/(rad/s)",
+        "Command unit of the board for the yaw rate.",
+        low=1.0,
+        high=100_000.0,
+    ),
+    Parameter(
+        "max_linear_speed",
+        0.5,
+        "m/s",
+        "Longest linear velocity that is commanded; longer ones keep their direction.",
+        low=0.0,
+        high=_SPEED,
+    ),
+    Parameter(
+        "max_angular_speed",
+        0.5,
+        "rad/s",
+        "Largest yaw rate that is commanded.",
+        low=0.0,
+        high=_SPEED,
+    ),
+    Parameter(
+        "max_wheel_speed",
+        17.0,
+        "rad/s",
+        "Rate of the fastest wheel that wheel_cmd may command; the others keep their ratio.",
+        low=0.0,
+        high=200.0,
+    ),
+    Parameter(
+        "cmd_vel_timeout",
+        0.5,
+        "s",
+        "Age at which cmd_vel and wheel_cmd are worth nothing and the robot is stopped.",
+        low=0.05,
+        high=10.0,
+    ),
+    Parameter(
+        "command_rate",
+        20.0,
+        "Hz",
+        "How often the current command, or the emergency stop, is repeated.",
+        low=1.0,
+        high=50.0,
+    ),
+    Parameter(
+        "enable_stamped_cmd_vel",
+        False,
+        "",
+        "Take geometry_msgs/TwistStamped on cmd_vel instead of geometry_msgs/Twist.",
+        fixed=True,
+    ),
+    Parameter(
+        "axis_signs",
+        [1, 1, 1],
+        "",
+        "1 or -1 for x, y and yaw, applied to commands and to odometry.",
+        fixed=True,
+    ),
+    Parameter(
+        "delta_frame",
+        "earth",
+        "",
+        "What the board's odometry deltas are: differences of two positions in its earth frame,"
+        " or motion along its own axes.",
+        choices=("earth", "body"),
+        fixed=True,
+    ),
+    Parameter(
+        "pose_byte_order",
+        "big",
+        "",
+        "Byte order of the floats in the board's pose.",
+        choices=("big", "little"),
+        fixed=True,
+    ),
+    Parameter("odom_frame", "odom", "", "Frame that the odometry is given in.", fixed=True),
+    Parameter("base_frame", "base_link", "", "Frame that the odometry moves.", fixed=True),
+    Parameter("imu_frame", "imu_link", "", "Frame of the IMU's axes.", fixed=True),
+    Parameter(
+        "wheel_radius",
+        0.029,
+        "m",
+        "Radius of a wheel, for wheel_cmd.",
+        low=0.001,
+        high=1.0,
+    ),
+    Parameter(
+        "accel_range",
+        2,
+        "g",
+        "Full scale that the accelerometer is set to.",
+        choices=tuple(ACCEL_COUNTS_PER_G),
+        fixed=True,
+    ),
+    Parameter(
+        "gyro_range",
+        250,
+        "°/s",
+        "Full scale that the gyro is set to.",
+        choices=tuple(GYRO_COUNTS_PER_DPS),
+        fixed=True,
+    ),
+    Parameter(
+        "linear_acceleration_stddev",
+        0.028,
+        "m/s²",
+        "Noise of one accelerometer sample (400 µg/√Hz over 50 Hz), for the covariance.",
+        low=1e-6,
+        high=100.0,
+    ),
+    Parameter(
+        "angular_velocity_stddev",
+        0.00087,
+        "rad/s",
+        "Noise of one gyro sample (0.05 °/s rms), for the covariance.",
+        low=1e-6,
+        high=100.0,
+    ),
+    Parameter(
+        "odom_linear_drift",
+        0.02,
+        "m/√m",
+        "Standard deviation of the position after 1 m; it grows with the root of the way.",
+        low=1e-6,
+        high=10.0,
+    ),
+    Parameter(
+        "odom_angular_drift",
+        0.02,
+        "rad/√m",
+        "Standard deviation of the yaw after 1 m; it grows with the root of the way.",
+        low=1e-6,
+        high=10.0,
+    ),
+    Parameter(
+        "odom_turning_drift",
+        0.02,
+        "rad/√rad",
+        "Standard deviation of the yaw after turning 1 rad; it grows with the root of the turn.",
+        low=1e-6,
+        high=10.0,
+    ),
+    Parameter(
+        "twist_linear_stddev",
+        0.02,
+        "m/s",
+        "Noise of the measured linear velocity, for the covariance.",
+        low=1e-6,
+        high=10.0,
+    ),
+    Parameter(
+        "twist_angular_stddev",
+        0.02,
+        "rad/s",
+        "Noise of the measured yaw rate, for the covariance.",
+        low=1e-6,
+        high=10.0,
+    ),
+)
+
+BY_NAME: Final = {parameter.name: parameter for parameter in PARAMETERS}
+
+
+def check_all(given: Mapping[str, object]) -> dict[str, Value]:
+    """Every parameter's value, from those given and the defaults. Raises ParameterError."""
+    for name in given:
+        if name not in BY_NAME:
+            nearest = difflib.get_close_matches(name, BY_NAME, n=1, cutoff=0.0)[0]
+            raise ParameterError(f"there is no parameter '{name}'; did you mean '{nearest}'?")
+    return {
+        parameter.name: parameter.check(given.get(parameter.name, parameter.default))
+        for parameter in PARAMETERS
+    }
+
+
+def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
+    """What the board's translator needs of checked values."""
+    return OmniBotSettings(
+        linear_scale=values["linear_scale"],
+        angular_scale=values["angular_scale"],
+        wheel_radius_m=values["wheel_radius"],
+        axis_signs=tuple(values["axis_signs"]),
+        delta_frame=values["delta_frame"],
+        pose_byte_order=values["pose_byte_order"],
+        imu=ImuScale(accel_range_g=values["accel_range"], gyro_range_dps=values["gyro_range"]),
+    )
+
+
+def session_settings(values: Mapping[str, Any]) -> SessionSettings:
+    """What the session needs of checked values."""
+    return SessionSettings(
+        limits=SpeedLimits(
+            linear_mps=values["max_linear_speed"],
+            angular_radps=values["max_angular_speed"],
+            wheel_radps=values["max_wheel_speed"],
+        ),
+        commands=CommandSettings(
+            timeout_s=values["cmd_vel_timeout"], rate_hz=values["command_rate"]
+        ),
+        noise=OdometryNoise(
+            m_per_sqrt_m=values["odom_linear_drift"],
+            rad_per_sqrt_m=values["odom_angular_drift"],
+            rad_per_sqrt_rad=values["odom_turning_drift"],
+        ),
+    )

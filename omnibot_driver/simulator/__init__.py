@@ -1,0 +1,26 @@
+"""The OmniBot board in software, written from its manual, to run the driver against.
+
+Shares no code with the driver: a misread manual must not cancel out. `SimulatedBoard` is pure,
+`PtyBoard` runs it in real time; `python -m omnibot_driver.simulator` does so from the command line.
+"""
+
+from omnibot_driver.simulator.firmware import (
+    BoardMode,
+    ReceivedCommand,
+    SentFrame,
+    SimulatedBoard,
+)
+from omnibot_driver.simulator.pty import PtyBoard
+from omnibot_driver.simulator.settings import BoardPose, BoardSettings
+from omnibot_driver.simulator.world import TruePose
+
+__all__ = [
+    "BoardMode",
+    "BoardPose",
+    "BoardSettings",
+    "PtyBoard",
+    "ReceivedCommand",
+    "SentFrame",
+    "SimulatedBoard",
+    "TruePose",
+]

@@ -1,0 +1,300 @@
+"""The board's firmware: modes, the 100 Hz control loop, odometry and what is sent when.
+
+Pure: bytes in, one tick at a time, bytes out; the same settings and input give the same output.
+Knows the manual's state machine, control and odometry equations. Must not know ports or real time.
+
+Where the manual is silent:
+- The control loop runs from the end of the boot on, also while paused (motors off), so motion while
+  paused is in the first 25 Hz difference afterwards. The rates count from the end of the boot.
+- A 25 Hz difference is that of the unrounded positions at two transmissions, rounded each time by
+  itself: rounding errors add up, as they do for anybody who sums what a board of this kind sends.
+- Pausing and emergency stop switch the motors off; friction stops the wheels within 0.3 s.
+- The number in the paused text starts from zero each time the board becomes paused.
+- Control frames with a mode that the manual does not name are taken off the line and ignored.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from enum import Enum
+from math import pi
+from typing import Literal
+
+from omnibot_driver.simulator.chassis import PlanarPose, Wheels, body_from_rims, rims_from_body
+from omnibot_driver.simulator.imu import Mpu6050
+from omnibot_driver.simulator.motors import TICK_S, WheelController
+from omnibot_driver.simulator.settings import BoardPose, BoardSettings
+from omnibot_driver.simulator.wire import (
+    CommandReceiver,
+    ControlFrame,
+    ControlMode,
+    StateLetter,
+    Triple,
+    delta_frame,
+    imu_frame,
+    paused_text,
+    pose_frame,
+)
+from omnibot_driver.simulator.world import TruePose, World
+
+TICKS_PER_DELTA = 4
+TICKS_PER_POSE = 20
+TICKS_PER_TEXT = 100
+
+COMMAND_LOG = 100_000
+SENT_LOG = 10_000
+RECEIVED_LOG_BYTES = 1_000_000
+
+_ALL_ZERO = (0.0, 0.0, 0.0)
+_IDEAL = BoardSettings()
+
+
+class BoardMode(Enum):
+    """The states of the manual's Operation State Machine, and the time before them."""
+
+    BOOTING = "booting"
+    PAUSED = "paused"
+    NOMINAL = "nominal"
+    IMU_ONLY = "imu_only"
+
+
+_RUNNING = (BoardMode.NOMINAL, BoardMode.IMU_ONLY)
+
+CommandKind = Literal["velocity", "wheels", "estop", "start", "pause", "reset"]
+
+_FRAME_KINDS: dict[int, CommandKind] = {
+    ControlMode.VELOCITY: "velocity",
+    ControlMode.WHEELS: "wheels",
+    ControlMode.ESTOP: "estop",
+}
+_LETTER_KINDS: dict[StateLetter, CommandKind] = {
+    StateLetter.START: "start",
+    StateLetter.PAUSE: "pause",
+    StateLetter.RESET: "reset",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ReceivedCommand:
+    """A command that the board obeyed after `tick` ticks; the values of a letter are zeros."""
+
+    tick: int
+    kind: CommandKind
+    values: Triple = (0, 0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class SentFrame:
+    """One frame or text that the board sent in tick number `tick`."""
+
+    tick: int
+    data: bytes
+
+
+class SimulatedBoard:
+    """An OmniBot board with its robot.
+
+    tick: control ticks of 10 ms since construction.
+    mode, estopped: what the board is in.
+    commands: what it obeyed, newest last; motion refused by a latched emergency stop is not there.
+    sent: the frames and texts it sent, newest last.
+    received: everything that reached its serial port, also while it was dead; the older half is
+        forgotten beyond a million bytes.
+    """
+
+    _targets: Wheels
+    _pwm: Wheels
+
+    def __init__(self, settings: BoardSettings = _IDEAL) -> None:
+        self.settings = settings
+        self.tick = 0
+        self.commands: deque[ReceivedCommand] = deque(maxlen=COMMAND_LOG)
+        self.sent: deque[SentFrame] = deque(maxlen=SENT_LOG)
+        self.received = bytearray()
+        self._world = World(settings)
+        self._imu = Mpu6050(settings)
+        self._rim_m_per_count = 2 * pi * settings.wheel_radius_m / settings.counts_per_revolution
+        self._power_up(settings.initial_pose)
+        if settings.running:
+            self._receiver = CommandReceiver(awake=True)
+            self._run()
+
+    def reboot(self) -> None:
+        """Do what a power cycle or R does; the robot stays where it truly is."""
+        self._power_up(BoardPose())
+
+    def _power_up(self, pose: BoardPose) -> None:
+        self.mode = BoardMode.BOOTING
+        self.estopped = False
+        self._boot_ticks_left = max(1, round(self.settings.boot_time_s / TICK_S))
+        self._ticks_since_boot = 0
+        self._receiver = CommandReceiver()
+        self._encoders = self._world.encoders
+        self._pose = PlanarPose(pose.x_mm / 1000, pose.y_mm / 1000, pose.theta_mrad / 1000)
+        self._pose_sent = self._pose
+        self._body_unsent = (0.0, 0.0, 0.0)
+        self._delta_seq = 0
+        self._pose_seq = 0
+        self._motors_off()
+
+    @property
+    def truth(self) -> TruePose:
+        """Where the robot truly is and how it truly moves."""
+        return self._world.truth
+
+    @property
+    def rim_speeds_mps(self) -> Wheels:
+        """True momentary rim speeds of wheels A, B, C."""
+        return self._world.rim_speeds_mps
+
+    @property
+    def odometry(self) -> BoardPose:
+        """The board's own pose, in the units of the 5 Hz frame."""
+        return BoardPose(*(1000 * value for value in self._pose))
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes off the line, in any chunking; each command acts at once."""
+        self.received += data
+        if len(self.received) > RECEIVED_LOG_BYTES:
+            del self.received[: len(self.received) // 2]
+        for byte in data:
+            if self.mode is not BoardMode.BOOTING:
+                item = self._receiver.feed(byte, control_frames=self.mode in _RUNNING)
+                if isinstance(item, ControlFrame):
+                    self._obey_frame(item)
+                elif item is not None:
+                    self._obey_letter(item)
+
+    def step(self) -> bytes:
+        """Let one tick of 10 ms pass; return the bytes sent in it."""
+        self.tick += 1
+        self._world.advance(self._pwm)
+        if self.mode is BoardMode.BOOTING:
+            self._encoders = self._world.encoders
+            self._boot_ticks_left -= 1
+            if self._boot_ticks_left:
+                return b""
+            self._pause()
+        else:
+            self._ticks_since_boot += 1
+            self._control()
+        sent = self._paused_output() if self.mode is BoardMode.PAUSED else self._running_output()
+        self.sent.extend(SentFrame(self.tick, data) for data in sent)
+        return b"".join(sent)
+
+    # Commands
+
+    def _obey_letter(self, letter: StateLetter) -> None:
+        self.commands.append(ReceivedCommand(self.tick, _LETTER_KINDS[letter]))
+        paused = self.mode is BoardMode.PAUSED
+        if letter is StateLetter.RESET:
+            self.reboot()
+        elif paused:
+            self._run()
+        elif letter is StateLetter.PAUSE:
+            self._pause()
+
+    def _obey_frame(self, frame: ControlFrame) -> None:
+        kind = _FRAME_KINDS.get(frame.mode)
+        if kind is None:
+            return
+        if kind == "estop":
+            self.estopped = True
+            self._motors_off()
+        elif self.estopped and self.settings.estop_latches:
+            return
+        else:
+            self.estopped = False
+            self._targets = self._wheel_targets(kind, frame.values)
+        self.commands.append(ReceivedCommand(self.tick, kind, frame.values))
+
+    def _wheel_targets(self, kind: CommandKind, values: Triple) -> Wheels:
+        """Counts per tick, by the scales of the settings and the kinematics of the manual."""
+        linear, angular = self.settings.linear_scale, self.settings.angular_scale
+        a, b, c = values
+        if kind == "wheels":
+            rims_mps = (a / linear, b / linear, c / linear)
+        else:
+            rims_mps = rims_from_body(
+                a / linear, b / linear, c / angular, self.settings.base_radius_m
+            )
+        target_a, target_b, target_c = (v * TICK_S / self._rim_m_per_count for v in rims_mps)
+        return target_a, target_b, target_c
+
+    def _run(self) -> None:
+        self.mode = BoardMode.IMU_ONLY if self.settings.imu_only else BoardMode.NOMINAL
+
+    def _pause(self) -> None:
+        self.mode = BoardMode.PAUSED
+        self._ticks_to_text = 0
+        self._paused_count = 0
+        self._motors_off()
+
+    def _motors_off(self) -> None:
+        self._targets = _ALL_ZERO
+        self._controllers = (WheelController(), WheelController(), WheelController())
+        self._pwm = _ALL_ZERO
+
+    # Control and odometry
+
+    def _control(self) -> None:
+        """One pass of the 100 Hz block (manual, Odometry equation and Wheel control)."""
+        encoders = self._world.encoders
+        a, b, c = (new - old for new, old in zip(encoders, self._encoders, strict=True))
+        self._encoders = encoders
+        self._integrate((a, b, c))
+        if self.mode in _RUNNING and not self.estopped:
+            pwm_a, pwm_b, pwm_c = (
+                controller.update(target, measured)
+                for controller, target, measured in zip(
+                    self._controllers, self._targets, (a, b, c), strict=True
+                )
+            )
+            self._pwm = (pwm_a, pwm_b, pwm_c)
+
+    def _integrate(self, counts: Triple) -> None:
+        a_m, b_m, c_m = (n * self._rim_m_per_count for n in counts)
+        dx, dy, dyaw = body_from_rims((a_m, b_m, c_m), self.settings.base_radius_m)
+        self._pose = self._pose.moved(dx, dy, dyaw)
+        x, y, yaw = self._body_unsent
+        self._body_unsent = (x + dx, y + dy, yaw + dyaw)
+
+    # Output
+
+    def _paused_output(self) -> list[bytes]:
+        due = self._ticks_to_text == 0
+        self._ticks_to_text = (self._ticks_to_text or TICKS_PER_TEXT) - 1
+        if not due:
+            return []
+        count = self._paused_count
+        self._paused_count = (count + 1) % 256
+        return [paused_text(count)]
+
+    def _running_output(self) -> list[bytes]:
+        frames = [imu_frame(*self._imu.read(self._world))]
+        if self.mode is BoardMode.NOMINAL:
+            if self._ticks_since_boot % TICKS_PER_DELTA == 0:
+                frames.append(self._delta())
+            if self._ticks_since_boot % TICKS_PER_POSE == 0:
+                frames.append(self._absolute())
+        return frames
+
+    def _delta(self) -> bytes:
+        if self.settings.frame == "body":
+            moved = self._body_unsent
+        else:
+            x, y, yaw = self._pose
+            sent_x, sent_y, sent_yaw = self._pose_sent
+            moved = (x - sent_x, y - sent_y, yaw - sent_yaw)
+        self._pose_sent = self._pose
+        self._body_unsent = (0.0, 0.0, 0.0)
+        dx, dy, dtheta = (max(-32768, min(32767, round(value * 10_000))) for value in moved)
+        seq = self._delta_seq
+        self._delta_seq = (seq + 1) % 256
+        return delta_frame((dx, dy, dtheta), seq)
+
+    def _absolute(self) -> bytes:
+        pose = self.odometry
+        seq = self._pose_seq
+        self._pose_seq = (seq + 1) % 256
+        order = self.settings.pose_byte_order
+        return pose_frame(pose.x_mm, pose.y_mm, pose.theta_mrad, seq, order)

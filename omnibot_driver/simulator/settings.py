@@ -1,0 +1,64 @@
+"""What can be chosen about a simulated board and its robot: values only, no behaviour."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from omnibot_driver.simulator.wire import ByteOrder, Triple
+
+DeltaFrameMeaning = Literal["earth", "body"]
+
+
+@dataclass(frozen=True, slots=True)
+class BoardPose:
+    """The board's own odometry in its earth frame, in the units of the 5 Hz frame; unwrapped."""
+
+    x_mm: float = 0.0
+    y_mm: float = 0.0
+    theta_mrad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardSettings:
+    """How a simulated board is built, and how its robot departs from the ideal.
+
+    seed: of every random number; two boards with equal settings and input send equal bytes.
+    frame: meaning of the 25 Hz frame: "earth", the difference of two positions in the board's
+        earth frame, or "body", the sum of each control tick's displacement in the robot's frame.
+    imu_only: running, the board is in IMU only mode instead of nominal mode.
+    linear_scale: LSB per m/s, of Vx and Vy and of the rim speeds in wheel mode.
+    angular_scale: LSB per rad/s, of Omega.
+    estop_latches: after an emergency stop frame every motion is refused until a reset;
+        otherwise the next motion command moves the robot again.
+    pose_byte_order: of the three floats of the 5 Hz frame.
+    wheel_radius_m, base_radius_m, counts_per_revolution: as the firmware believes them
+        (manual, Vehicle Parameters).
+    wheel_radius_scale: true radius of wheels A, B, C over `wheel_radius_m`.
+    slip: mean fraction of each wheel's rim motion that is lost on the floor; the momentary fraction
+        wanders about it for each wheel by itself.
+    gyro_bias_dps, gyro_noise_dps: degrees per second in the sensor's axes; noise rms per reading.
+    accel_noise_g: rms per reading.
+    gyro_stuck: raw counts that the gyro reads for ever, whatever the motion.
+    boot_time_s: from power-up or reset until the board is paused; dead meanwhile.
+    initial_pose: the board's own pose at construction, for a board that has already driven.
+    running: at construction the board is awake and in its running mode.
+    """
+
+    seed: int = 0
+    frame: DeltaFrameMeaning = "earth"
+    imu_only: bool = False
+    linear_scale: float = 70.0
+    angular_scale: float = 500.0
+    estop_latches: bool = False
+    pose_byte_order: ByteOrder = "big"
+    wheel_radius_m: float = 0.029
+    base_radius_m: float = 0.143
+    counts_per_revolution: int = 390 * 4
+    wheel_radius_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    slip: float = 0.0
+    gyro_bias_dps: tuple[float, float, float] = (-0.046, -0.038, -0.031)
+    gyro_noise_dps: float = 0.05
+    accel_noise_g: float = 0.0028
+    gyro_stuck: Triple | None = None
+    boot_time_s: float = 0.3
+    initial_pose: BoardPose = BoardPose()
+    running: bool = False

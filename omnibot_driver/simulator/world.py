@@ -1,0 +1,100 @@
+"""The robot on the floor: what truly moves when the motors turn.
+
+Knows motors, true wheel sizes, slip and the true pose. Must not know what the firmware believes,
+commands or sends; the firmware reads the encoders and the IMU here, nothing else.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import exp, pi, sqrt
+from random import Random
+
+from omnibot_driver.simulator.chassis import PlanarPose, Wheels, body_from_rims
+from omnibot_driver.simulator.motors import TICK_S, Motor
+from omnibot_driver.simulator.settings import BoardSettings
+
+SLIP_CORRELATION_M = 0.1
+"""Rim motion after which a wheel has forgotten how much it was slipping."""
+
+
+@dataclass(frozen=True, slots=True)
+class TruePose:
+    """The robot's true pose and its twist along its own axes.
+
+    Metres, radians (unwrapped), m/s and rad/s; the pose is zero at construction.
+    """
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    vx_mps: float
+    vy_mps: float
+    yaw_rate: float
+
+
+class World:
+    """Three motors and the floor under them."""
+
+    def __init__(self, settings: BoardSettings) -> None:
+        self._random = Random(f"slip {settings.seed}")
+        self._motors = (Motor(), Motor(), Motor())
+        rim_m_per_count = 2 * pi * settings.wheel_radius_m / settings.counts_per_revolution
+        self._rim_m_per_count = [rim_m_per_count * scale for scale in settings.wheel_radius_scale]
+        self._base_radius_m = settings.base_radius_m
+        self._mean_slip = settings.slip
+        self._slip = [settings.slip] * 3
+        self._pose = PlanarPose(0.0, 0.0, 0.0)
+        self._twist = (0.0, 0.0, 0.0)
+        self.acceleration = (0.0, 0.0)
+        """Acceleration of the body's origin over the last tick, along body x and y, in m/s²."""
+
+    @property
+    def truth(self) -> TruePose:
+        """Where the robot truly is and how it truly moves."""
+        return TruePose(*self._pose, *self._twist)
+
+    @property
+    def encoders(self) -> tuple[int, int, int]:
+        """Counts of wheels A, B, C since construction."""
+        a, b, c = self._motors
+        return a.encoder, b.encoder, c.encoder
+
+    @property
+    def rim_speeds_mps(self) -> Wheels:
+        """Momentary rim speeds."""
+        a, b, c = (
+            motor.speed / TICK_S * rim_m
+            for motor, rim_m in zip(self._motors, self._rim_m_per_count, strict=True)
+        )
+        return a, b, c
+
+    def advance(self, pwm: Wheels) -> None:
+        """Let one tick pass under the given efforts."""
+        rims_m = [
+            motor.advance(effort) * rim_m_per_count
+            for motor, effort, rim_m_per_count in zip(
+                self._motors, pwm, self._rim_m_per_count, strict=True
+            )
+        ]
+        if self._mean_slip:
+            self._slip = [self._wander(*now) for now in zip(self._slip, rims_m, strict=True)]
+        self._pose = self._pose.moved(*body_from_rims(self._on_floor(rims_m), self._base_radius_m))
+
+        old_vx, old_vy, _ = self._twist
+        on_floor_mps = self._on_floor(self.rim_speeds_mps)
+        self._twist = vx, vy, yaw_rate = body_from_rims(on_floor_mps, self._base_radius_m)
+        self.acceleration = (
+            (vx - old_vx) / TICK_S - yaw_rate * vy,
+            (vy - old_vy) / TICK_S + yaw_rate * vx,
+        )
+
+    def _on_floor(self, rims: Sequence[float]) -> Wheels:
+        a, b, c = (rim * (1 - slip) for rim, slip in zip(rims, self._slip, strict=True))
+        return a, b, c
+
+    def _wander(self, slip: float, rim_m: float) -> float:
+        """Let the slip of a wheel drift about its mean, with half the mean as deviation."""
+        kept = exp(-abs(rim_m) / SLIP_CORRELATION_M)
+        change = self._random.gauss(0.0, self._mean_slip / 2) * sqrt(1 - kept * kept)
+        drifted = self._mean_slip + kept * (slip - self._mean_slip) + change
+        return max(0.0, min(1.0, drifted))

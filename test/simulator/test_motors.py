@@ -1,0 +1,95 @@
+"""One wheel: step responses of motor and controller."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from omnibot_driver.simulator.motors import DEAD_ZONE_PWM, PWM_LIMIT, Motor, WheelController
+
+
+class Wheel:
+    """A motor under its controller, seen through its encoder as in the firmware."""
+
+    def __init__(self) -> None:
+        self.motor = Motor()
+        self.controller = WheelController()
+        self.pwm = 0.0
+        self.speeds: list[float] = []
+        self._encoder = self.motor.encoder
+
+    def hold(self, target: float, ticks: int) -> list[float]:
+        """Control for some ticks; return the true speed after each of them."""
+        speeds = []
+        for _ in range(ticks):
+            self.motor.advance(self.pwm)
+            encoder = self.motor.encoder
+            self.pwm = self.controller.update(target, encoder - self._encoder)
+            self._encoder = encoder
+            speeds.append(self.motor.speed)
+        return speeds
+
+
+@pytest.mark.parametrize("target", [12.2, 41.6, 73.4, -41.6])
+def test_a_step_rises_quickly_with_little_overshoot_and_no_lasting_error(target: float) -> None:
+    """Nine tenths within 0.2 s, at most 5 % over, within half a percent after two seconds."""
+    speeds = [speed / target for speed in Wheel().hold(target, 300)]
+    assert speeds[20] > 0.9
+    assert max(speeds) < 1.05
+    assert sum(speeds[200:]) / 100 == pytest.approx(1.0, abs=0.005)
+
+
+@pytest.mark.parametrize("target", [12.2, 41.6, 73.4, 300.0])
+def test_a_stopped_wheel_comes_to_rest_and_stays(target: float) -> None:
+    """Two seconds after the stop the wheel stands, and no limit cycle moves it again."""
+    wheel = Wheel()
+    wheel.hold(target, 200)
+    wheel.hold(0.0, 200)
+    assert set(wheel.hold(0.0, 500)) == {0.0}
+
+
+def test_saturation_does_not_wind_up_the_integrator() -> None:
+    """After ten seconds of an unreachable speed a slow one is reached as soon as after one."""
+    long, short = Wheel(), Wheel()
+    long.hold(300.0, 1000)
+    short.hold(300.0, 100)
+    assert long.hold(20.0, 100) == pytest.approx(short.hold(20.0, 100), abs=1.5)
+
+
+def test_the_effort_saturates() -> None:
+    """The PWM never exceeds its range in either direction."""
+    assert WheelController().update(1e6, 0) == PWM_LIMIT
+    assert WheelController().update(-1e6, 0) == -PWM_LIMIT
+
+
+def test_efforts_within_the_dead_zone_move_nothing() -> None:
+    """A resting wheel breaks away only beyond the dead zone."""
+    motor = Motor()
+    assert motor.advance(DEAD_ZONE_PWM) == 0.0
+    assert motor.advance(-DEAD_ZONE_PWM) == 0.0
+    assert motor.advance(DEAD_ZONE_PWM + 1) > 0.0
+
+
+@given(
+    st.lists(st.floats(-PWM_LIMIT, PWM_LIMIT), min_size=1, max_size=30).map(
+        lambda efforts: [effort for effort in efforts for _ in range(5)]
+    )
+)
+@settings(max_examples=50)
+def test_friction_never_drives_a_wheel(efforts: list[float]) -> None:
+    """A wheel never turns against both its own motion and its effort."""
+    motor = Motor()
+    for effort in efforts:
+        before = motor.speed
+        turned = motor.advance(effort)
+        assert turned * before >= 0 or turned * effort > 0
+
+
+@given(st.floats(-90, 90))
+@settings(max_examples=50)
+def test_a_motor_without_power_stops_within_a_third_of_a_second(speed: float) -> None:
+    """Friction ends every motion, without a step back."""
+    motor = Motor()
+    motor.speed = speed
+    turned = [motor.advance(0.0) for _ in range(33)]
+    assert motor.speed == 0.0
+    assert all(step * speed >= 0 for step in turned)

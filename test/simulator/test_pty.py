@@ -1,0 +1,223 @@
+"""The board in real time behind a real pseudo-terminal."""
+
+import os
+import select
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from omnibot_driver.simulator import BoardMode, BoardSettings, PtyBoard, SimulatedBoard
+from omnibot_driver.simulator.pty import UNREAD_LIMIT
+
+PATIENCE_S = 20.0
+RUNNING = BoardSettings(running=True)
+
+
+def read_until(descriptor: int, wanted: bytes) -> bytes:
+    """What comes out of a descriptor up to the first chunk that holds the wanted bytes."""
+    data = b""
+    deadline_s = time.monotonic() + PATIENCE_S
+    while wanted not in data:
+        ready, _, _ = select.select([descriptor], [], [], deadline_s - time.monotonic())
+        assert ready, f"{wanted!r} did not come, only {data[-100:]!r}"
+        data += os.read(descriptor, 4096)
+    return data
+
+
+def is_in(mode: BoardMode) -> Callable[[SimulatedBoard], bool]:
+    """A predicate: the board is in this mode."""
+    return lambda board: board.mode is mode
+
+
+def test_a_program_can_wake_start_and_stop_the_board_through_the_terminal() -> None:
+    """Bytes pass both ways unchanged, FF and line feeds included."""
+    with PtyBoard(SimulatedBoard()) as pty:
+        port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
+        try:
+            assert read_until(port, b"\n").startswith(b"Paused: 0 \n")
+            opening = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00") + b"S"
+            os.write(port, opening)
+            read_until(port, b"\xff\xfb")
+            assert pty.wait_for(is_in(BoardMode.NOMINAL), PATIENCE_S)
+            with pty.lock:
+                assert pty.board.received == opening
+        finally:
+            os.close(port)
+
+
+def test_the_stream_read_is_the_stream_sent() -> None:
+    """No byte is changed, added or lost while somebody reads."""
+    with PtyBoard(SimulatedBoard(RUNNING)) as pty:
+        port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
+        try:
+            data = b""
+            while len(data) < 1000:
+                data += os.read(port, 4096)
+        finally:
+            os.close(port)
+        with pty.lock:
+            sent = b"".join(frame.data for frame in pty.board.sent)
+            assert pty.dropped == 0
+    assert sent.startswith(data)
+
+
+def test_the_terminal_outlives_the_program_that_opened_it() -> None:
+    """A second program finds the board as the first one left it."""
+    with PtyBoard(SimulatedBoard(RUNNING)) as pty:
+        for letter, mode in ((b"P", BoardMode.PAUSED), (b"S", BoardMode.NOMINAL)):
+            port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
+            os.write(port, letter)
+            os.close(port)
+            assert pty.wait_for(is_in(mode), PATIENCE_S)
+
+
+def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
+    """The board runs on; what is left unread is what a terminal holds, and it is the oldest."""
+    with PtyBoard(SimulatedBoard(RUNNING)) as pty:
+        assert pty.wait_for(lambda board: pty.dropped > 100, PATIENCE_S)
+        port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            with pty.lock:
+                sent = b"".join(frame.data for frame in pty.board.sent)
+                held = len(sent) - pty.dropped
+                data = os.read(port, 8192)
+        finally:
+            os.close(port)
+    assert len(data) == held <= UNREAD_LIMIT
+    assert sent.startswith(data)
+
+
+class Clock:
+    """A clock that waiting and working move, in place of the machine's."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_s = 0.0
+        self.at_ticks: list[float] = []
+        time_of_clock = SimpleNamespace(monotonic=lambda: self.now_s)
+        monkeypatch.setattr("omnibot_driver.simulator.pty.time", time_of_clock)
+        monkeypatch.setattr(
+            "omnibot_driver.simulator.pty.select", SimpleNamespace(select=self.wait)
+        )
+
+    def wait(
+        self, _read: object, _write: object, _error: object, timeout_s: float
+    ) -> tuple[list[int], list[int], list[int]]:
+        """Let the time-out pass, with nothing to read at its end."""
+        self.now_s += timeout_s
+        return [], [], []
+
+    def board(self, cost_s: Callable[[int], float]) -> SimulatedBoard:
+        """A board that takes this long to make its n-th tick."""
+        clock = self
+
+        class SlowBoard(SimulatedBoard):
+            def step(self) -> bytes:
+                clock.at_ticks.append(clock.now_s)
+                data = super().step()
+                clock.now_s += cost_s(self.tick)
+                return data
+
+        return SlowBoard(RUNNING)
+
+
+def test_a_slow_machine_delays_ticks_but_does_not_make_the_time_drift(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A tick that takes 3 ms, or now and then 25 ms, leaves the thousandth at ten seconds."""
+    clock = Clock(monkeypatch)
+    board = clock.board(lambda tick: 0.025 if tick % 50 == 0 else 0.003)
+    with PtyBoard(board) as pty:
+        assert pty.wait_for(lambda board: board.tick >= 999, PATIENCE_S)
+    assert clock.at_ticks[998] == pytest.approx(9.99)
+
+
+def test_a_long_standstill_is_not_made_up_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After the machine has slept for an hour the board goes on at its pace."""
+    clock = Clock(monkeypatch)
+    with PtyBoard(clock.board(lambda tick: 3600.0 if tick == 10 else 0.0)) as pty:
+        assert pty.wait_for(lambda board: board.tick >= 30, PATIENCE_S)
+    assert clock.at_ticks[29] - clock.at_ticks[11] == pytest.approx(0.18)
+
+
+def test_waiting_for_what_does_not_come_ends_with_false() -> None:
+    """A predicate that never holds is given up."""
+    with PtyBoard(SimulatedBoard(RUNNING)) as pty:
+        assert not pty.wait_for(lambda board: False, 0.05)
+
+
+def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
+    """An exception in the thread is not swallowed; it is the cause of what is raised."""
+
+    class BrokenBoard(SimulatedBoard):
+        def step(self) -> bytes:
+            raise ZeroDivisionError
+
+    pty = PtyBoard(BrokenBoard())
+    pty.__enter__()
+    with pytest.raises(RuntimeError) as waiting:
+        pty.wait_for(lambda board: False, PATIENCE_S)
+    with pytest.raises(RuntimeError) as on_exit:
+        pty.__exit__(None, None, None)
+    assert isinstance(waiting.value.__cause__, ZeroDivisionError)
+    assert isinstance(on_exit.value.__cause__, ZeroDivisionError)
+
+
+def test_no_thread_and_no_descriptor_is_left_behind() -> None:
+    """After the exit the process holds what it held before."""
+    before = len(os.listdir("/proc/self/fd"))
+    threads = [thread.name for thread in threading.enumerate()]
+    with PtyBoard(SimulatedBoard(RUNNING)) as pty:
+        pty.wait_for(lambda board: board.tick > 2, PATIENCE_S)
+    assert [thread.name for thread in threading.enumerate()] == threads
+    assert len(os.listdir("/proc/self/fd")) == before
+
+
+def test_a_link_leads_to_the_terminal_and_goes_with_it(tmp_path: Path) -> None:
+    """The symbolic link exists exactly as long as the board runs."""
+    link = tmp_path / "omnibot"
+    with PtyBoard(SimulatedBoard(RUNNING), str(link)) as pty:
+        assert os.readlink(link) == pty.path
+    assert not link.is_symlink()
+
+
+def test_a_dead_link_is_replaced(tmp_path: Path) -> None:
+    """What a killed simulator left behind does not stand in the way."""
+    link = tmp_path / "omnibot"
+    link.symlink_to("/dev/pts/no-such-terminal")
+    with PtyBoard(SimulatedBoard(RUNNING), str(link)) as pty:
+        assert os.readlink(link) == pty.path
+
+
+def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
+    """A second simulator on the same link keeps it when the first one ends."""
+    link = tmp_path / "omnibot"
+    with PtyBoard(SimulatedBoard(RUNNING), str(link)):
+        second = PtyBoard(SimulatedBoard(RUNNING), str(link))
+        second.__enter__()
+    try:
+        assert os.readlink(link) == second.path
+    finally:
+        second.__exit__(None, None, None)
+
+
+@pytest.mark.parametrize("kind", ["file", "link to a file"])
+def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> None:
+    """The error names the path and what to do, and no descriptor is left open."""
+    precious = tmp_path / "precious"
+    precious.write_text("data")
+    link = precious
+    if kind == "link to a file":
+        link = tmp_path / "link"
+        link.symlink_to(precious)
+    before = len(os.listdir("/proc/self/fd"))
+    with (
+        pytest.raises(FileExistsError, match="choose another name"),
+        PtyBoard(SimulatedBoard(RUNNING), str(link)),
+    ):
+        pass
+    assert precious.read_text() == "data"
+    assert len(os.listdir("/proc/self/fd")) == before

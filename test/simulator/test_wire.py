@@ -1,0 +1,139 @@
+"""The simulator's codec against bytes typed by hand from the manual."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.simulator.wire import (
+    CommandReceiver,
+    ControlFrame,
+    StateLetter,
+    delta_frame,
+    imu_frame,
+    paused_text,
+    pose_frame,
+)
+
+APPENDIX = {
+    "Stop": ("FF FE 02 00 00 00 00 00 00", 0x02, (0, 0, 0)),
+    "E-stop": ("FF FE 10 00 00 00 00 00 00", 0x10, (0, 0, 0)),
+    "Rotate all": ("FF FE 02 00 20 00 20 00 20", 0x02, (32, 32, 32)),
+    "Rotate all reversed": ("FF FE 02 FF E0 FF E0 FF E0", 0x02, (-32, -32, -32)),
+    "Rotate A": ("FF FE 02 00 20 00 00 00 00", 0x02, (32, 0, 0)),
+    "Rotate B": ("FF FE 02 00 00 00 20 00 00", 0x02, (0, 32, 0)),
+    "Rotate C": ("FF FE 02 00 00 00 00 00 20", 0x02, (0, 0, 32)),
+    "Vx = 32": ("FF FE 01 00 20 00 00 00 00", 0x01, (32, 0, 0)),
+    "Vy = 32": ("FF FE 01 00 00 00 20 00 00", 0x01, (0, 32, 0)),
+    "Omega = 8": ("FF FE 01 00 00 00 00 00 08", 0x01, (0, 0, 8)),
+}
+
+
+def understood(
+    data: bytes, *, awake: bool = True, control_frames: bool = True
+) -> list[StateLetter | ControlFrame]:
+    """Everything that a fresh receiver makes of some bytes."""
+    receiver = CommandReceiver(awake=awake)
+    items = (receiver.feed(byte, control_frames=control_frames) for byte in data)
+    return [item for item in items if item is not None]
+
+
+@pytest.mark.parametrize(("typed", "mode", "values"), APPENDIX.values(), ids=APPENDIX.keys())
+def test_each_command_of_the_appendix_is_understood(
+    typed: str, mode: int, values: tuple[int, int, int]
+) -> None:
+    """The ten useful serial commands of the manual's appendix decode to their printed meaning."""
+    assert understood(bytes.fromhex(typed)) == [ControlFrame(mode, values)]
+
+
+def test_commands_reach_the_whole_range_of_a_short() -> None:
+    """The extremes +32,767 and -32,768 keep their sign and byte order."""
+    frame = bytes.fromhex("FF FE 01 7F FF 80 00 FF FF")
+    assert understood(frame) == [ControlFrame(0x01, (32767, -32768, -1))]
+
+
+def test_letters_count_between_control_frames_and_not_within() -> None:
+    """A frame full of P, R and S is one frame; the letters around it are letters."""
+    frame = bytes.fromhex("FF FE 01 00 50 00 52 00 53")
+    assert understood(b"S" + frame + b"P") == [
+        StateLetter.START,
+        ControlFrame(0x01, (0x50, 0x52, 0x53)),
+        StateLetter.PAUSE,
+    ]
+
+
+def test_letters_within_a_control_frame_count_where_frames_are_not_obeyed() -> None:
+    """Where only letters are obeyed, a motion frame acts by the letters it happens to contain."""
+    frame = bytes.fromhex("FF FE 01 00 50 00 52 00 53")
+    assert understood(frame, control_frames=False) == [
+        StateLetter.PAUSE,
+        StateLetter.RESET,
+        StateLetter.START,
+    ]
+
+
+def test_the_first_three_bytes_after_power_up_are_swallowed() -> None:
+    """The serial initialisation takes any three bytes, letters included."""
+    assert understood(b"RPSS", awake=False) == [StateLetter.START]
+
+
+def test_a_frame_that_wakes_the_board_loses_its_header() -> None:
+    """What is left of a motion frame after the wake-up is read as letters."""
+    frame = bytes.fromhex("FF FE 01 00 52 00 00 00 00")
+    assert understood(frame, awake=False) == [StateLetter.RESET]
+
+
+def test_a_doubled_header_byte_does_not_hide_the_frame() -> None:
+    """FF FF FE starts a frame with its second FF."""
+    frame = bytes.fromhex("FF FF FE 02 00 20 00 00 00 00")
+    assert understood(frame) == [ControlFrame(0x02, (32, 0, 0))]
+
+
+def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
+    """FF S is a stray byte and a start."""
+    assert understood(b"\xffS") == [StateLetter.START]
+
+
+@given(st.lists(st.sampled_from([typed for typed, _, _ in APPENDIX.values()]), max_size=20))
+def test_frames_back_to_back_are_all_understood(typed: list[str]) -> None:
+    """A run of commands yields as many frames, in order."""
+    meanings = {typed: ControlFrame(mode, values) for typed, mode, values in APPENDIX.values()}
+    assert understood(bytes.fromhex("".join(typed))) == [meanings[one] for one in typed]
+
+
+@given(st.binary(max_size=300), st.booleans(), st.booleans())
+def test_no_bytes_disturb_the_receiver_for_longer_than_a_frame(
+    noise: bytes, awake: bool, control_frames: bool
+) -> None:
+    """After any bytes, eight zeros bring the receiver back to listening for letters."""
+    data = noise + bytes(8) + b"S"
+    items = understood(data, awake=awake, control_frames=control_frames)
+    assert items[-1] is StateLetter.START
+
+
+def test_the_imu_frame_is_laid_out_as_in_the_manual() -> None:
+    """FF FA, then accelerometer and gyro, most significant byte first."""
+    sent = imu_frame((1, -2, 0x1234), (-6, -5, -4))
+    assert sent == bytes.fromhex("FF FA 00 01 FF FE 12 34 FF FA FF FB FF FC")
+
+
+def test_the_delta_frame_is_laid_out_as_in_the_manual() -> None:
+    """FF FB, X_DIF, Y_DIF, TH_DIF, then SEQ in the ninth byte."""
+    assert delta_frame((200, -200, 32767), 255) == bytes.fromhex("FF FB 00 C8 FF 38 7F FF FF")
+
+
+def test_the_pose_frame_is_laid_out_as_in_the_manual() -> None:
+    """FF FC, three floats with the most significant byte first, SEQ as the fifteenth byte."""
+    sent = pose_frame(1000.0, -2.5, 1.0, 7)
+    assert sent == bytes.fromhex("FF FC 44 7A 00 00 C0 20 00 00 3F 80 00 00 07")
+
+
+def test_the_pose_frame_can_be_little_endian() -> None:
+    """The other reading of the manual reverses each float and nothing else."""
+    sent = pose_frame(1000.0, -2.5, 1.0, 7, "little")
+    assert sent == bytes.fromhex("FF FC 00 00 7A 44 00 00 20 C0 00 00 80 3F 07")
+
+
+def test_the_paused_text_is_the_one_of_the_manual() -> None:
+    """A space stands before the line feed."""
+    assert paused_text(0) == b"Paused: 0 \n"
+    assert paused_text(255) == b"Paused: 255 \n"

@@ -1,0 +1,71 @@
+"""Geometry, truth and the departures of the truth from what the board believes."""
+
+from math import cos, pi, sqrt
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.chassis import PlanarPose, body_from_rims, rims_from_body
+from omnibot_driver.simulator.world import World
+
+ordinary = st.floats(-10, 10)
+L = 0.143
+
+
+@given(ordinary, ordinary, ordinary)
+def test_the_odometry_matrix_inverts_the_velocity_equations(
+    vx: float, vy: float, yaw_rate: float
+) -> None:
+    """Body to rims and back changes nothing."""
+    assert body_from_rims(rims_from_body(vx, vy, yaw_rate, L), L) == pytest.approx(
+        (vx, vy, yaw_rate), abs=1e-12
+    )
+
+
+def test_the_velocity_equations_are_those_of_the_manual() -> None:
+    """Driving along x, along y and turning, each wheel by the manual's signs."""
+    c30 = cos(pi / 6)
+    assert rims_from_body(1, 0, 0, L) == pytest.approx((-c30, c30, 0))
+    assert rims_from_body(0, 1, 0, L) == pytest.approx((-0.5, -0.5, 1))
+    assert rims_from_body(0, 0, 1, L) == pytest.approx((-L, -L, -L))
+
+
+def test_a_pose_moves_at_the_mean_heading_of_the_step() -> None:
+    """A quarter turn while driving forward ends on the diagonal."""
+    moved = PlanarPose(1.0, 2.0, 0.0).moved(1.0, 0.0, pi / 2)
+    assert moved == pytest.approx((1 + sqrt(0.5), 2 + sqrt(0.5), pi / 2))
+
+
+def drive(settings: BoardSettings, ticks: int = 300) -> World:
+    """Turn all three wheels forward, which turns the robot clockwise on the spot."""
+    world = World(settings)
+    for _ in range(ticks):
+        world.advance((1000.0, 1000.0, 1000.0))
+    return world
+
+
+def test_larger_wheels_carry_the_robot_further_than_the_encoders_say() -> None:
+    """A radius scale changes the truth by its factor and leaves the encoders alone."""
+    plain, large = drive(BoardSettings()), drive(BoardSettings(wheel_radius_scale=(1.02,) * 3))
+    assert large.encoders == plain.encoders
+    assert large.truth.yaw_rad == pytest.approx(1.02 * plain.truth.yaw_rad)
+
+
+def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
+    """Over many wheel turns the loss averages to the setting, and it depends on the seed."""
+    plain = drive(BoardSettings(), 3000)
+    first = drive(BoardSettings(slip=0.1, seed=1), 3000)
+    second = drive(BoardSettings(slip=0.1, seed=2), 3000)
+    assert first.encoders == plain.encoders
+    assert first.truth.yaw_rad == pytest.approx(0.9 * plain.truth.yaw_rad, rel=0.02)
+    assert first.truth != second.truth
+
+
+def test_the_twist_is_the_derivative_of_the_pose() -> None:
+    """At a steady turn the yaw grows by the yaw rate."""
+    world = drive(BoardSettings())
+    before = world.truth
+    world.advance((1000.0, 1000.0, 1000.0))
+    assert (world.truth.yaw_rad - before.yaw_rad) / 0.01 == pytest.approx(before.yaw_rate)
