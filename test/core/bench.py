@@ -1,0 +1,100 @@
+"""A session and a simulated board on one workbench, wired to each other in simulated time."""
+
+from omnibot_driver.core.commands import CommandSettings
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.limits import SpeedLimits
+from omnibot_driver.core.odometry import OdometryEstimate, OdometryNoise
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.session import Event, Notice, Session, SessionSettings
+from omnibot_driver.core.supervisor import Request, RequestDone
+from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+
+TICK_S = 0.01
+STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+EMERGENCY_STOP = bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+OPENING = bytes(8) + STOP
+
+
+class Bench:
+    """``hears`` and ``speaks`` cut the line in one direction: to the board, and from it."""
+
+    def __init__(self, board: BoardSettings | None = None, *, run: bool = True) -> None:
+        self.board = SimulatedBoard(board or BoardSettings())
+        frame = self.board.settings.frame
+        self.session = Session(
+            OmniBot(OmniBotSettings(delta_frame=frame)),
+            SessionSettings(
+                limits=SpeedLimits(), commands=CommandSettings(), noise=OdometryNoise()
+            ),
+            run=run,
+        )
+        self.now = 1000.0
+        self.hears = self.speaks = True
+        self.events: list[Event] = []
+        self.written: list[tuple[float, bytes]] = []
+
+    def open(self) -> None:
+        self.session.opened(self.now)
+        self.settle()
+
+    def close(self) -> None:
+        self.session.closed(self.now)
+        self.settle()
+
+    def settle(self) -> None:
+        """What the shell does after every input."""
+        data = self.session.take_output(self.now)
+        if data:
+            self.written.append((self.now, data))
+            if self.hears:
+                self.board.receive(data)
+        self.events += self.session.take_events()
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / TICK_S)):
+            self.now += TICK_S
+            data = self.board.step()
+            if data and self.speaks:
+                self.session.receive(data, self.now)
+            if self.now >= self.session.wake_at:
+                self.session.tick(self.now)
+            self.settle()
+
+    def run_until_state(self, state: str, limit_s: float = 12.0) -> None:
+        end = self.now + limit_s
+        while self.session.state != state:
+            assert self.now < end, f"still {self.session.state}, not {state}"
+            self.run(TICK_S)
+
+    def drive(self, vx: float = 0.0, vy: float = 0.0, yaw_rate: float = 0.0) -> None:
+        self.session.command_twist(BodyTwist(vx, vy, yaw_rate), self.now)
+        self.settle()
+
+    def ask(self, request: Request, limit_s: float) -> RequestDone:
+        """Make a request and wait for its answer."""
+        token = object()
+        self.session.request(request, token, self.now)
+        self.settle()
+        end = self.now + limit_s
+        while True:
+            for event in self.events:
+                if isinstance(event, RequestDone) and event.token is token:
+                    return event
+            assert self.now < end, f"no answer to {request.value} within {limit_s} s"
+            self.run(TICK_S)
+
+    def written_since(self, mark: int) -> bytes:
+        """What was written after the first ``mark`` writes."""
+        return b"".join(data for _, data in self.written[mark:])
+
+    def still(self) -> bool:
+        truth = self.board.truth
+        return max(abs(truth.vx_mps), abs(truth.vy_mps), abs(truth.yaw_rate)) < 0.01
+
+    @property
+    def notices(self) -> list[str]:
+        return [event.text for event in self.events if isinstance(event, Notice)]
+
+    @property
+    def odometry(self) -> list[OdometryEstimate]:
+        return [event for event in self.events if isinstance(event, OdometryEstimate)]

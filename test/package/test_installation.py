@@ -1,0 +1,155 @@
+"""What `colcon build` and `pip install` put where, found and started the way `ros2 run` does it."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Timer
+
+import pytest
+from ament_index_python.packages import get_package_prefix
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = "omnibot_driver"
+DEADLINE_S = 60.0
+SHARED_FILES = [
+    f"ament_index/resource_index/packages/{PACKAGE}",
+    f"{PACKAGE}/package.xml",
+    f"{PACKAGE}/config/driver.yaml",
+    f"{PACKAGE}/launch/driver.launch.py",
+    f"{PACKAGE}/launch/simulation.launch.py",
+]
+
+
+def run(command: Sequence[str | Path], cwd: Path) -> str:
+    """Run the command to its end and return its output; it must succeed."""
+    done = subprocess.run(
+        command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+@contextmanager
+def running(command: Sequence[str | Path], cwd: Path) -> Iterator[subprocess.Popen[str]]:
+    """Run the command beside the test; it is gone afterwards, at the latest by the deadline."""
+    process = subprocess.Popen(
+        command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    watchdog = Timer(DEADLINE_S, process.kill)
+    watchdog.start()
+    with process:
+        try:
+            yield process
+        finally:
+            watchdog.cancel()
+            process.kill()
+
+
+def first_line_with(text: str, process: subprocess.Popen[str]) -> str:
+    """Return the process's next line of output that contains the text."""
+    assert process.stdout is not None
+    seen = []
+    for line in process.stdout:
+        if text in line:
+            return line
+        seen.append(line)
+    pytest.fail(f"{process.args} ended without a line with {text!r}:\n{''.join(seen)}")
+
+
+@pytest.fixture(scope="module")
+def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a copy of the repository as a commit of everything in it would have it."""
+    copy = tmp_path_factory.mktemp("sources") / PACKAGE
+    listing = run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], ROOT)
+    for name in filter(None, listing.split("\0")):
+        if (ROOT / name).is_file():  # a tracked file may have been deleted since
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, copy / name)
+    return copy
+
+
+@pytest.fixture(scope="module")
+def workspace(sources: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a workspace in which colcon has built the package, out of an untouched source tree."""
+    workspace = tmp_path_factory.mktemp("workspace")
+    before = set(sources.rglob("*"))
+    run([sys.executable, "-m", "colcon", "build", "--base-paths", sources], workspace)
+    assert set(sources.rglob("*")) == before
+    return workspace
+
+
+def in_workspace(workspace: Path, command: Sequence[str | Path]) -> list[str | Path]:
+    """Return the command as it runs in a shell that has sourced the workspace."""
+    return ["bash", "-c", '. "$0" && exec "$@"', workspace / "install/setup.bash", *command]
+
+
+@pytest.fixture(scope="module")
+def prefix(workspace: Path) -> Path:
+    """Return the package's installation prefix as the ament index knows it."""
+    path = run(in_workspace(workspace, ["printenv", "AMENT_PREFIX_PATH"]), workspace).strip()
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("AMENT_PREFIX_PATH", path)
+        prefix = Path(get_package_prefix(PACKAGE))
+    assert prefix.is_relative_to(workspace)
+    return prefix
+
+
+def test_colcon_installs_what_ros2_looks_for(prefix: Path) -> None:
+    """The index entry, the manifest, launch and parameter files are under share."""
+    for name in SHARED_FILES:
+        assert (prefix / "share" / name).is_file(), name
+
+
+def test_colcon_installs_the_two_executables(prefix: Path) -> None:
+    """`ros2 run` offers every executable file in lib/omnibot_driver: driver, simulator, no more."""
+    files = list((prefix / "lib" / PACKAGE).iterdir())
+    assert {file.name for file in files} == {"driver", "simulator"}
+    assert all(os.access(file, os.X_OK) for file in files)
+
+
+def test_the_installed_package_is_the_one_that_runs(workspace: Path, prefix: Path) -> None:
+    """In a sourced workspace Python imports the installed copy, with its type marker."""
+    script = f"import {PACKAGE}; print({PACKAGE}.__file__)"
+    found = Path(run(in_workspace(workspace, [sys.executable, "-c", script]), workspace).strip())
+    assert found.is_relative_to(prefix)
+    assert found.with_name("py.typed").is_file()
+
+
+def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, prefix: Path) -> None:
+    """Both executables start from their installed places, and ctrl-C ends the driver in order."""
+    executables = prefix / "lib" / PACKAGE
+    board = workspace / "board"
+    simulator = in_workspace(workspace, [executables / "simulator", "--link", board])
+    driver = in_workspace(
+        workspace,
+        [
+            executables / "driver",
+            *("--ros-args", "--params-file", prefix / "share" / PACKAGE / "config/driver.yaml"),
+            *("-p", f"port:={board}"),
+        ],
+    )
+    with running(simulator, workspace) as board_process:
+        first_line_with("/dev/pts/", board_process)
+        with running(driver, workspace) as driver_process:
+            first_line_with(f"[{PACKAGE}]", driver_process)
+            assert board_process.poll() is None
+            driver_process.send_signal(signal.SIGINT)
+            output, _ = driver_process.communicate()
+            assert driver_process.returncode == 0, output
+
+
+def test_pip_installs_the_same_files(sources: Path, tmp_path: Path) -> None:
+    """A plain `pip install` serves people without colcon."""
+    copy = tmp_path / "sources"  # pip builds inside the source tree
+    shutil.copytree(sources, copy)
+    pip = [sys.executable, "-m", "pip", "install", "--no-deps", "--no-build-isolation"]
+    run([*pip, "--prefix", tmp_path / "prefix", copy], tmp_path)
+    for name in SHARED_FILES:
+        assert (tmp_path / "prefix/share" / name).is_file(), name
+    for name in ("driver", "simulator"):
+        assert os.access(tmp_path / "prefix/bin" / name, os.X_OK)

@@ -1,0 +1,51 @@
+"""What the Makefile says to somebody whose machine cannot do what it asks for."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def make(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run make in the repository, as from a fresh shell, and wait for it."""
+    environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
+    return subprocess.run(
+        ["make", "--no-print-directory", *arguments],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture
+def no_python(tmp_path: Path) -> str:
+    """Return an interpreter that is none for which wheels exist."""
+    interpreter = tmp_path / "python"
+    interpreter.write_text("#!/bin/sh\nexit 1\n")
+    interpreter.chmod(0o755)
+    return str(interpreter)
+
+
+@pytest.mark.parametrize("target", ["demo", "test"])
+def test_without_wheels_one_sentence_points_to_jazzy(
+    target: str, no_python: str, tmp_path: Path
+) -> None:
+    """Where PyPI has no wheels, make fails before it has made anything and says where to go."""
+    done = make(target, f"PYTHON={no_python}", f"VENV={tmp_path / 'venv'}")
+    sentence, verdict = done.stderr.splitlines()
+    assert done.returncode != 0
+    assert "https://docs.ros.org/en/jazzy/Installation.html" in sentence
+    assert verdict.startswith("make: ***")
+    assert not done.stdout
+    assert not (tmp_path / "venv").exists()
+
+
+def test_make_alone_lists_every_target() -> None:
+    """The default target explains the others in a line each."""
+    listed = {line.split()[1] for line in make().stdout.splitlines()}
+    assert listed == {"help", "demo", "test", "lint", "format", "clean"}

@@ -1,0 +1,169 @@
+"""What the package declares about itself, and who in it may import whom."""
+
+import ast
+import runpy
+import sys
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import setuptools
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = "omnibot_driver"
+CORE = f"{PACKAGE}.core"
+
+# rosdep keys of what is not a ROS package (those have one name for both).
+ROSDEP_KEYS = {
+    "hypothesis": "python3-hypothesis",
+    "numpy": "python3-numpy",
+    "pytest": "python3-pytest",
+    "serial": "python3-serial",
+    "setuptools": "python3-setuptools",
+    "yaml": "python3-yaml",
+}
+
+# Enough for values and arithmetic; nothing that waits, reads a clock or touches the world.
+PURE_MODULES = {
+    "__future__",
+    "abc",
+    "bisect",
+    "cmath",
+    "collections",
+    "dataclasses",
+    "enum",
+    "functools",
+    "itertools",
+    "math",
+    "operator",
+    "re",
+    "statistics",
+    "struct",
+    "types",
+    "typing",
+}
+
+MANIFEST = ElementTree.parse(ROOT / "package.xml").getroot()
+
+
+def declared(tag: str) -> set[str]:
+    """Return the rosdep keys in the manifest's elements of this name."""
+    return {element.text or "" for element in MANIFEST.iter(tag)}
+
+
+def python_files(*paths: str) -> list[Path]:
+    """Return the Python files at and below the paths, which are relative to the repository."""
+    files = [
+        file
+        for path in paths
+        for file in ([ROOT / path] if path.endswith(".py") else (ROOT / path).rglob("*.py"))
+    ]
+    assert files, f"nothing to check in {paths}"
+    return files
+
+
+def imports(file: Path) -> Iterator[str]:
+    """Yield the full dotted name of everything the file imports, wherever in it that happens."""
+    package = file.relative_to(ROOT).parent.parts
+    for node in ast.walk(ast.parse(file.read_text(), file)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            parents = package[: len(package) - node.level + 1] if node.level else ()
+            parts = (*parents, *filter(None, [node.module]))
+            yield from (".".join((*parts, alias.name)) for alias in node.names)
+
+
+def third_party(files: Iterable[Path]) -> set[str]:
+    """Return the rosdep keys of what the files import from outside Python and this repository."""
+    files = list(files)
+    own = {PACKAGE} | {file.stem for file in files}  # tests import their helpers by bare name
+    top_level = {name.partition(".")[0] for file in files for name in imports(file)}
+    return {ROSDEP_KEYS.get(name, name) for name in top_level - sys.stdlib_module_names - own}
+
+
+def within(name: str, module: str) -> bool:
+    """Tell whether the dotted name is the module or something in it."""
+    return name == module or name.startswith(f"{module}.")
+
+
+@pytest.fixture
+def setup_arguments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Return what setup.py hands to setuptools."""
+    captured: dict[str, Any] = {}
+    monkeypatch.setattr(setuptools, "setup", lambda **arguments: captured.update(arguments))
+    monkeypatch.chdir(ROOT)
+    runpy.run_path("setup.py")
+    return captured
+
+
+def test_manifest_and_setup_agree(setup_arguments: dict[str, Any]) -> None:
+    """What package.xml tells ROS about the package, setup.py tells Python."""
+    for key in ("name", "version", "license"):
+        assert setup_arguments[key] == MANIFEST.findtext(key)
+    assert setup_arguments["maintainer"] == MANIFEST.findtext("maintainer")
+
+
+def test_every_entry_point_names_a_function(setup_arguments: dict[str, Any]) -> None:
+    """Each executable's module exists and defines the function it starts."""
+    for script in setup_arguments["entry_points"]["console_scripts"]:
+        module, function = script.partition("=")[2].strip().split(":")
+        tree = ast.parse((ROOT / module.replace(".", "/")).with_suffix(".py").read_text())
+        assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def test_manifest_declares_what_the_package_imports_and_nothing_else() -> None:
+    """On a machine set up by rosdep no import is missing, and nothing is installed for nobody."""
+    assert third_party(python_files(PACKAGE, "launch")) == declared("exec_depend")
+
+
+def test_manifest_declares_what_the_tests_import() -> None:
+    """`rosdep install --with-test` is all that `colcon test` needs."""
+    needed = third_party(python_files("test")) - declared("exec_depend")
+    assert needed == declared("test_depend")
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "launch").iterdir()), ids=lambda path: path.name)
+def test_launch_file_describes_a_launch(path: Path) -> None:
+    """Each launch file is found by its ending, compiles, and defines what `ros2 launch` calls."""
+    assert path.name.endswith(".launch.py")
+    tree = ast.parse(path.read_text(), path)
+    compile(tree, path, "exec")
+    functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    assert "generate_launch_description" in functions
+
+
+def test_the_core_imports_itself_and_pure_modules_only() -> None:
+    """No ROS, serial port, thread, clock or file comes into the core."""
+    foreign = {
+        f"{file.relative_to(ROOT)}: {name}"
+        for file in python_files(f"{PACKAGE}/core")
+        for name in imports(file)
+        if not within(name, CORE) and name.partition(".")[0] not in PURE_MODULES
+    }
+    assert not foreign
+
+
+def test_the_simulator_shares_nothing_with_the_core() -> None:
+    """A manual misread in the driver is not misread alike in the board it is tried against."""
+    shared = {
+        f"{file.relative_to(ROOT)}: {name}"
+        for file in python_files(f"{PACKAGE}/simulator")
+        for name in imports(file)
+        if within(name, PACKAGE) and not within(name, f"{PACKAGE}.simulator")
+    }
+    assert not shared
+
+
+def test_mypy_checks_exactly_what_imports_no_ros() -> None:
+    """Every module is strictly typed that does not hang on ROS, which brings no types along."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    without_ros = {
+        file
+        for file in python_files(PACKAGE)
+        if all(key.startswith("python3-") for key in third_party([file]))
+    }
+    assert set(python_files(*settings["tool"]["mypy"]["files"])) == without_ros
