@@ -4,6 +4,7 @@ Nothing is computed here. Measurements are published by the link's reader thread
 the executor sleeps unless a message, a service call or a parameter wakes it.
 """
 
+import os
 import signal
 import sys
 import threading
@@ -64,7 +65,8 @@ class OmniBotDriver(Node):
         self._session = Session(
             self._board,
             parameters.session_settings(self._values),
-            run=bool(self._values["auto_start"]),
+            run=self._values["auto_start"],
+            axis_signs=tuple(self._values["axis_signs"]),
         )
         self._state_lock = threading.Lock()
         self._port_report: str | None = ""
@@ -77,9 +79,9 @@ class OmniBotDriver(Node):
         }
         self._link = Link(
             self._session,
-            str(self._values["port"]),
-            int(self._values["baudrate"]),
-            reconnect_interval_s=float(self._values["reconnect_interval"]),
+            self._values["port"],
+            self._values["baudrate"],
+            reconnect_interval_s=self._values["reconnect_interval"],
             deliver=self._deliver,
             report=self._report_port,
             failed=self.report_defect,
@@ -292,6 +294,31 @@ def _descriptor(parameter: parameters.Parameter) -> ParameterDescriptor:
     return descriptor
 
 
+class Ending:
+    """Where the main thread waits until the driver is to end, and why it is.
+
+    A pipe, because Python writes a signal's number into one from whichever thread the signal hits;
+    a lock that is waited for can miss it, and must not be touched by a signal handler at all.
+    """
+
+    def __init__(self) -> None:
+        self.defect: BaseException | None = None
+        self._wakes, self._wake = os.pipe()
+        os.set_blocking(self._wake, False)
+        signal.set_wakeup_fd(self._wake, warn_on_full_buffer=False)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: None)
+
+    def begin(self, defect: BaseException | None = None) -> None:
+        """End the driver; with a defect, its exit code tells. Any thread may call this."""
+        self.defect = self.defect or defect
+        os.write(self._wake, b"\0")
+
+    def wait(self) -> None:
+        """Until a signal arrives or somebody calls ``begin``."""
+        os.read(self._wakes, 1)
+
+
 def main(args: list[str] | None = None) -> int:
     """Run the driver until SIGINT, SIGTERM, a shutdown of its context or a defect.
 
@@ -299,23 +326,21 @@ def main(args: list[str] | None = None) -> int:
     thread only waits, so a signal is heard however busy the executor is, and a second one cannot
     break into the shutdown.
     """
-    finished = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: finished.set())
+    ending = Ending()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        rclpy.get_default_context().on_shutdown(finished.set)
-        return _run(finished)
+        rclpy.get_default_context().on_shutdown(ending.begin)
+        _run(ending)
     except (ParameterError, RCLError) as error:
         print(f"omnibot_driver cannot start: {error}", file=sys.stderr)
         return 2
     finally:
         rclpy.try_shutdown()
+    return 0 if ending.defect is None else 1
 
 
-def _run(finished: threading.Event) -> int:
-    defects: list[BaseException] = []
-    driver = OmniBotDriver(defect=lambda error: (defects.append(error), finished.set()))
+def _run(ending: Ending) -> None:
+    driver = OmniBotDriver(defect=ending.begin)
     executor = SingleThreadedExecutor()
     executor.add_node(driver)
     stop = Future()
@@ -324,18 +349,17 @@ def _run(finished: threading.Event) -> int:
         try:
             executor.spin_until_future_complete(stop)
         except ExternalShutdownException:
-            finished.set()
+            ending.begin()
         except Exception as error:
             driver.report_defect(error)
 
     spinner = threading.Thread(target=spin, name="omnibot-executor", daemon=True)
     spinner.start()
-    finished.wait()
+    ending.wait()
     driver.close()
     stop.set_result(None)
     spinner.join(timeout=1.0)
     driver.destroy_node()
-    return 1 if defects else 0
 
 
 if __name__ == "__main__":

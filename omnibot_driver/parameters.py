@@ -311,7 +311,6 @@ def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
         linear_scale=values["linear_scale"],
         angular_scale=values["angular_scale"],
         wheel_radius_m=values["wheel_radius"],
-        axis_signs=tuple(values["axis_signs"]),
         delta_frame=values["delta_frame"],
         pose_byte_order=values["pose_byte_order"],
         imu=ImuScale(accel_range_g=values["accel_range"], gyro_range_dps=values["gyro_range"]),

@@ -13,6 +13,8 @@ from typing import Final
 from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.kinematics import BodyTwist
 
+Signs = tuple[int, int, int]
+
 LONGEST_WAIT_S: Final = 1.0
 """Board time without any pose after which heading 0 is assumed."""
 BELIEVED_TURN_RAD: Final = 0.1
@@ -108,73 +110,71 @@ def roll(tangent: Pose) -> Pose:
 
 
 class Odometry:
-    """Adds displacements up. ``noise`` may be replaced at any time."""
+    """Adds displacements up.
 
-    def __init__(self, noise: OdometryNoise) -> None:
+    ``noise`` may be replaced at any time. ``axis_signs`` turn x, y and yaw of the board's body axes
+    into REP-103's; the board's earth frame and heading are its own affair and keep its signs.
+    """
+
+    def __init__(self, noise: OdometryNoise, axis_signs: Signs = (1, 1, 1)) -> None:
         self.noise = noise
         self.heading_assumed = False
         """True once a board sent no pose and its heading had to be taken for 0."""
+        self._axis_signs = axis_signs
+        self.reset()
+        self.attach()
+
+    def reset(self) -> None:
+        """The odometry frame begins where the robot stands."""
         self._pose = Pose()
         self._covariance = Covariance()
-        self.attach()
 
     def attach(self) -> None:
         """The board's earth frame may be another one from now on; our pose goes on from here."""
-        self._heading_offset: float | None = None
-        self._doubted_offset: float | None = None
+        self._board_yaw_rad: float | None = None
+        self._doubted_rad: float | None = None
         self._waiting: list[tuple[DisplacementReading, float]] = []
-
-    def reset(self) -> None:
-        """The odometry frame begins here; the board's earth frame stays what it is."""
-        if self._heading_offset is not None:
-            self._heading_offset += self._pose.yaw_rad
-        self._doubted_offset = None
-        self._pose = Pose()
-        self._covariance = Covariance()
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
         """The estimates that this displacement completes: none while the heading is unknown."""
         self._waiting.append((reading, stamp_s))
-        if reading.frame == "earth" and self._heading_offset is None:
+        if reading.frame == "earth" and self._board_yaw_rad is None:
             if sum(waiting.duration_s for waiting, _ in self._waiting) < LONGEST_WAIT_S:
                 return []
             self.heading_assumed = True
-            self._heading_offset = -self._pose.yaw_rad
+            self._board_yaw_rad = 0.0
         return self._release()
 
     def learn_heading(self, pose: PoseReading) -> list[OdometryEstimate]:
         """Take the board's heading from its pose; releases the displacements that waited for it."""
         if not math.isfinite(pose.yaw_rad):
             return []
-        yaw = self._pose.yaw_rad + sum(reading.dyaw_rad for reading, _ in self._waiting)
-        offset = pose.yaw_rad - yaw
-        known, doubted = self._heading_offset, self._doubted_offset
-        if (
-            known is None
-            or _near(offset, known)
-            or (doubted is not None and _near(offset, doubted))
-        ):
-            self._heading_offset, self._doubted_offset = offset, None
+        if self._board_yaw_rad is None:
+            self._board_yaw_rad = pose.yaw_rad - sum(item.dyaw_rad for item, _ in self._waiting)
+            return self._release()
+        surprise = math.remainder(pose.yaw_rad - self._board_yaw_rad, math.tau)
+        confirmed = self._doubted_rad is not None and _near(surprise, self._doubted_rad)
+        if _near(surprise, 0.0) or confirmed:
+            self._board_yaw_rad, self._doubted_rad = pose.yaw_rad, None
         else:
-            self._doubted_offset = offset
-        return self._release()
+            self._doubted_rad = surprise
+        return []
 
     def _release(self) -> list[OdometryEstimate]:
         waiting, self._waiting = self._waiting, []
         return [self._integrate(reading, stamp_s) for reading, stamp_s in waiting]
 
     def _integrate(self, reading: DisplacementReading, stamp_s: float) -> OdometryEstimate:
-        given = Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad)
-        if reading.frame == "body":
-            tangent = given
-            chord = roll(tangent)
-        else:
-            offset = self._heading_offset or 0.0
-            chord = given.turned(-(self._pose.yaw_rad + offset))
-            tangent = unroll(chord)
-        before, self._pose = self._pose, self._pose.moved(chord)
+        tangent = Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad)
+        if reading.frame == "earth":
+            board_yaw_rad = self._board_yaw_rad or 0.0
+            tangent = unroll(tangent.turned(-board_yaw_rad))
+            self._board_yaw_rad = board_yaw_rad + reading.dyaw_rad
+        x, y, yaw = self._axis_signs
+        tangent = Pose(x * tangent.x_m, y * tangent.y_m, yaw * tangent.yaw_rad)
+        before, self._pose = self._pose, self._pose.moved(roll(tangent))
         self._covariance = self._covariance.moved(
-            self._pose.x_m - before.x_m, self._pose.y_m - before.y_m, chord.yaw_rad, self.noise
+            self._pose.x_m - before.x_m, self._pose.y_m - before.y_m, tangent.yaw_rad, self.noise
         )
         rate = 1.0 / reading.duration_s
         twist = BodyTwist(tangent.x_m * rate, tangent.y_m * rate, tangent.yaw_rad * rate)

@@ -24,7 +24,7 @@ from omnibot_driver.core.commands import CommandSettings, CommandStream
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits, require_finite
-from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometryNoise
+from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometryNoise, Signs
 from omnibot_driver.core.supervisor import Phase, Request, RequestDone, Supervisor
 
 SILENCE_S: Final = 1.5
@@ -70,15 +70,25 @@ class SessionSettings:
 
 
 class Session:
-    """``run``: whether the board is to be started whenever it is there."""
+    """``run``: whether the board is to be started whenever it is there; ``axis_signs``: 1 or -1 for
+    x, y and yaw where the board's body axes are not REP-103's, for commands and odometry alike.
+    """
 
-    def __init__(self, board: Board, settings: SessionSettings, *, run: bool) -> None:
+    def __init__(
+        self,
+        board: Board,
+        settings: SessionSettings,
+        *,
+        run: bool,
+        axis_signs: Signs = (1, 1, 1),
+    ) -> None:
         self._board = board
         self._supervisor = Supervisor(board, run=run)
         self._commands = CommandStream(
             settings.commands, stop=board.stop(), emergency_stop=board.emergency_stop()
         )
-        self._odometry = Odometry(settings.noise)
+        self._odometry = Odometry(settings.noise, axis_signs)
+        self._axis_signs = axis_signs
         self._limits = settings.limits
         self._heard_at = -math.inf
         self._heading_assumed = False
@@ -151,7 +161,10 @@ class Session:
         """Drive the body. Raises CommandRefused, and then nothing changes."""
         require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
         self._require_drivable()
-        self._commands.command(self._board.velocity(self._limits.twist(twist)), now)
+        x, y, yaw = self._axis_signs
+        limited = self._limits.twist(twist)
+        signed = BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps)
+        self._commands.command(self._board.velocity(signed), now)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
         """Turn wheels A, B, C. Raises CommandRefused, and then nothing changes."""

@@ -124,8 +124,8 @@ class Supervisor:
             self._begin(now)
             if not self._run:
                 self._settle("the board has restarted and is paused, as it was before")
-        elif self.phase is Phase.SETTLED and self._run:
-            self._begin(now)
+        elif self.phase is Phase.STARTING or (self.phase is Phase.SETTLED and self._run):
+            self._begin(now)  # it has restarted, and may have slept through what was said so far
 
     def heard_data(self, now: float) -> None:
         """The board sent data, and its mode is a running one."""

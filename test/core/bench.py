@@ -18,7 +18,13 @@ OPENING = bytes(8) + STOP
 class Bench:
     """``hears`` and ``speaks`` cut the line in one direction: to the board, and from it."""
 
-    def __init__(self, board: BoardSettings | None = None, *, run: bool = True) -> None:
+    def __init__(
+        self,
+        board: BoardSettings | None = None,
+        *,
+        run: bool = True,
+        axis_signs: tuple[int, int, int] = (1, 1, 1),
+    ) -> None:
         self.board = SimulatedBoard(board or BoardSettings())
         frame = self.board.settings.frame
         self.session = Session(
@@ -27,6 +33,7 @@ class Bench:
                 limits=SpeedLimits(), commands=CommandSettings(), noise=OdometryNoise()
             ),
             run=run,
+            axis_signs=axis_signs,
         )
         self.now = 1000.0
         self.hears = self.speaks = True

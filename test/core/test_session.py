@@ -1,5 +1,6 @@
 """A session against a simulated board in simulated time: what is promised, by the board's bytes."""
 
+import itertools
 import math
 
 import pytest
@@ -502,3 +503,24 @@ def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench)
         bench.run(0.4)
     losses = [text for text in bench.notices if "lost" in text]
     assert 1 <= len(losses) <= 2
+
+
+@pytest.mark.parametrize("signs", list(itertools.product([1, -1], repeat=3)))
+@pytest.mark.parametrize("frame", ["earth", "body"])
+def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
+    signs: tuple[int, int, int], frame: str
+) -> None:
+    """A curve to the left, on a board whose own heading is something else."""
+    bench = Bench(
+        BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 2000.0), running=True),
+        axis_signs=signs,
+    )
+    bench.open()
+    bench.run(1.0)
+    for _ in range(20):
+        bench.drive(0.3, 0.1, 0.5)
+        bench.run(0.1)
+    pose, twist = bench.odometry[-1].pose, bench.odometry[-1].twist
+    assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx((0.37, 0.43, 0.95), abs=0.06)
+    assert (twist.vx_mps, twist.vy_mps) == pytest.approx((0.3, 0.1), abs=0.03)
+    assert bench.written[-1][1][3] == (0 if signs[0] > 0 else 0xFF)

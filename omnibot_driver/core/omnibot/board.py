@@ -48,15 +48,13 @@ WAKE: Final = bytes(8)
 class OmniBotSettings:
     """What cannot be known from the wire.
 
-    ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per rad/s; ``axis_signs``: ±1 for x, y
-    and yaw, applied to what is commanded and to what is read; ``delta_frame``: whether deltas are
-    differences of positions in the board's earth frame or motion along its own axes.
+    ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per rad/s; ``delta_frame``: whether deltas
+    are differences of positions in the board's earth frame or motion along its own axes.
     """
 
     linear_scale: float = 70.0
     angular_scale: float = 500.0
     wheel_radius_m: float = 0.029
-    axis_signs: tuple[int, int, int] = (1, 1, 1)
     delta_frame: Literal["earth", "body"] = "earth"
     pose_byte_order: ByteOrder = "big"
     imu: ImuScale = field(default_factory=ImuScale)
@@ -122,15 +120,9 @@ class OmniBot:
 
     def velocity(self, twist: BodyTwist) -> bytes:
         """Base vector control; Stop when it rounds to nothing."""
-        scale, (x, y, yaw) = self.settings, self.settings.axis_signs
-        return self._drive(
-            frames.VELOCITY_MODE,
-            (
-                x * twist.vx_mps * scale.linear_scale,
-                y * twist.vy_mps * scale.linear_scale,
-                yaw * twist.yaw_rate_radps * scale.angular_scale,
-            ),
-        )
+        linear, angular = self.settings.linear_scale, self.settings.angular_scale
+        counts = (twist.vx_mps * linear, twist.vy_mps * linear, twist.yaw_rate_radps * angular)
+        return self._drive(frames.VELOCITY_MODE, counts)
 
     def wheels(self, rates_radps: Vector3) -> bytes:
         """Independent wheel drive in rad/s: the unit on the wire is that of a rim speed."""
@@ -145,24 +137,21 @@ class OmniBot:
 
     def _read(self, frame: Frame) -> Reading:
         self._modes.hear(frame)
-        x, y, yaw = self.settings.axis_signs
         match frame:
             case ImuFrame(accel, gyro):
                 scale = self.settings.imu
                 return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro))
             case DeltaFrame(dx, dy, dtheta, seq):
                 return DisplacementReading(
-                    dx_m=x * dx * DELTA_LSB_M,
-                    dy_m=y * dy * DELTA_LSB_M,
-                    dyaw_rad=yaw * dtheta * DELTA_LSB_RAD,
+                    dx_m=dx * DELTA_LSB_M,
+                    dy_m=dy * DELTA_LSB_M,
+                    dyaw_rad=dtheta * DELTA_LSB_RAD,
                     frame=self.settings.delta_frame,
                     duration_s=DELTA_PERIOD_S,
                     lost=self._count_lost(seq),
                 )
-            case PoseFrame(px, py, theta, _):
-                return PoseReading(
-                    x * px * POSE_LSB_M, y * py * POSE_LSB_M, yaw * theta * POSE_LSB_RAD
-                )
+            case PoseFrame(x, y, theta, _):
+                return PoseReading(x * POSE_LSB_M, y * POSE_LSB_M, theta * POSE_LSB_RAD)
             case _:
                 self._seq = None
                 return PausedReading()

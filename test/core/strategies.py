@@ -1,0 +1,75 @@
+"""Hypothesis strategies of the core's tests, all of them."""
+
+import struct
+from collections.abc import Sequence
+
+from hypothesis import strategies as st
+
+from omnibot_driver.core.board import DisplacementReading
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.odometry import Pose
+from omnibot_driver.core.omnibot import (
+    CommandFrame,
+    DeltaFrame,
+    ImuFrame,
+    PausedFrame,
+    PoseFrame,
+)
+from omnibot_driver.core.omnibot.frames import Frame
+
+# Words the board's bytes are hard to tell apart by: header look-alikes, FF in either byte, edges.
+TREACHEROUS_WORDS = [-6, -5, -4, -1, 0, 255, -256, 0x5061, 32767, -32768]
+
+words = st.one_of(st.sampled_from(TREACHEROUS_WORDS), st.integers(-32768, 32767))
+counters = st.one_of(st.sampled_from([0, 255]), st.integers(0, 255))
+floats32 = st.floats(width=32, allow_nan=False)
+triples = st.tuples(words, words, words)
+
+imu_frames = st.builds(ImuFrame, triples, triples)
+delta_frames = st.builds(DeltaFrame, words, words, words, counters)
+pose_frames = st.builds(PoseFrame, floats32, floats32, floats32, counters)
+paused_frames = st.builds(PausedFrame, counters)
+frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_frames, paused_frames)
+commands = st.builds(CommandFrame, st.integers(0, 255), triples)
+byte_orders = st.sampled_from(["big", "little"])
+
+finite = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e308, max_value=1e308)
+twists = st.builds(BodyTwist, *[st.floats(-10, 10)] * 3)
+any_twists = st.builds(BodyTwist, finite, finite, finite)
+wheel_rates = st.tuples(*[st.floats(-200, 200)] * 3)
+axis_signs = st.tuples(*[st.sampled_from([1, -1])] * 3)
+
+headings = st.floats(-10, 10)
+small_moves = st.builds(Pose, st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-1.5, 1.5))
+"""Displacements of one 40 ms period, in body axes; generous."""
+
+
+def displacements(frame: str) -> st.SearchStrategy[DisplacementReading]:
+    """Readings of one kind."""
+    return st.builds(
+        DisplacementReading,
+        dx_m=st.floats(-0.1, 0.1),
+        dy_m=st.floats(-0.1, 0.1),
+        dyaw_rad=st.floats(-1.5, 1.5),
+        frame=st.just(frame),
+        duration_s=st.just(0.04),
+        lost=st.just(0),
+    )
+
+
+def chunkings(data: bytes) -> st.SearchStrategy[list[bytes]]:
+    """The same bytes, cut anywhere, empty chunks included."""
+    cuts = st.lists(st.integers(0, len(data)), max_size=30).map(sorted)
+    return cuts.map(lambda at: cut(data, at))
+
+
+def cut(data: bytes, at: Sequence[int]) -> list[bytes]:
+    """The pieces between ascending places."""
+    return [data[start:end] for start, end in zip([0, *at], [*at, len(data)], strict=True)]
+
+
+def float32(value: float) -> float:
+    """The nearest value that four bytes can hold."""
+    (rounded,) = struct.unpack(">f", struct.pack(">f", value))
+    assert isinstance(rounded, float)
+    return rounded

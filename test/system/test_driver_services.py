@@ -1,0 +1,231 @@
+"""Each service, called by another process, with the board's bytes and modes checked."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from conftest import Driver, Probe
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool, Trigger
+
+from omnibot_driver.simulator import BoardMode, PtyBoard, SimulatedBoard
+
+Start = Callable[..., Any]
+
+
+@pytest.fixture
+def board(start_board: Start) -> PtyBoard:
+    board: PtyBoard = start_board()
+    return board
+
+
+@pytest.fixture
+def driver(board: PtyBoard, start_driver: Start) -> Driver:
+    driver: Driver = start_driver(board.path)
+    return driver
+
+
+@pytest.fixture
+def probe(driver: Driver, probe_of: Start) -> Probe:
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    return probe
+
+
+def kinds(board: PtyBoard) -> list[str]:
+    with board.lock:
+        return [command.kind for command in board.board.commands]
+
+
+def still(board: SimulatedBoard) -> bool:
+    truth = board.truth
+    return max(abs(truth.vx_mps), abs(truth.vy_mps), abs(truth.yaw_rate)) < 0.01
+
+
+def drive(probe: Probe, board: PtyBoard) -> None:
+    """Forward, until the robot moves."""
+    commands = probe.publisher(Twist, "cmd_vel")
+    twist = Twist()
+    twist.linear.x = 0.3
+    commands.publish(twist)
+    assert board.wait_for(lambda b: b.truth.vx_mps > 0.05, 20.0)
+
+
+def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board: PtyBoard) -> None:
+    """Twice each: one P in all, and what the board does is what was asked."""
+    for data, mode in [
+        (True, BoardMode.PAUSED),
+        (True, BoardMode.PAUSED),
+        (False, BoardMode.NOMINAL),
+        (False, BoardMode.NOMINAL),
+    ]:
+        answer = probe.call(SetBool, "pause", data=data)
+        assert answer.success, answer.message
+        with board.lock:
+            assert board.board.mode is mode
+    assert kinds(board).count("pause") == 1
+
+
+def test_pausing_a_driving_robot_stops_it_first_and_unpausing_does_not_move_it(
+    probe: Probe, board: PtyBoard
+) -> None:
+    """Stop, P; then S, and the robot stands until a new command."""
+    drive(probe, board)
+    assert probe.call(SetBool, "pause", data=True).success
+    probe.wait_for_state("paused")
+    order = kinds(board)
+    assert order.index("wheels", order.index("velocity")) < order.index("pause")
+    assert board.wait_for(still, 20.0)
+    assert probe.call(SetBool, "pause", data=False).success
+    assert board.wait_for(lambda b: b.mode is BoardMode.NOMINAL and still(b), 20.0)
+    drive(probe, board)
+
+
+def test_start_starts_a_board_that_was_left_paused(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """``auto_start: false`` leaves it as it is until asked."""
+    board = start_board()
+    probe: Probe = probe_of(start_driver(board.path, auto_start=False))
+    probe.wait_for_state("paused")
+    assert kinds(board) == []
+    answer = probe.call(Trigger, "start")
+    assert answer.success, answer.message
+    assert "start" in kinds(board)
+    probe.wait_for_state("nominal")
+
+
+def test_reset_brings_the_board_back_and_odometry_goes_on(probe: Probe, board: PtyBoard) -> None:
+    """Stop, R, restart, S: the board counts from zero again, odom does not."""
+    odometry = probe.listen(Odometry, "odom")
+    drive(probe, board)
+    assert board.wait_for(lambda b: b.truth.x_m > 0.1 and still(b), 20.0)
+    with board.lock:
+        truth = board.board.truth
+    answer = probe.call(Trigger, "reset")
+    assert answer.success, answer.message
+    order = kinds(board)
+    assert order.index("wheels", order.index("velocity")) < order.index("reset")
+    assert order.index("start", order.index("reset"))
+    with board.lock:
+        assert abs(board.board.odometry.x_mm) < 1.0
+    count = len(odometry)
+    probe.wait_for(lambda: len(odometry) > count + 10)
+    assert odometry[-1].pose.pose.position.x == pytest.approx(truth.x_m, abs=2e-3)
+    assert still(board.board)
+
+
+def test_estop_latches_is_on_the_wire_at_once_and_releases_to_standing_still(
+    probe: Probe, board: PtyBoard
+) -> None:
+    """When the answer arrives the board has stopped; a release moves nothing."""
+    active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
+    drive(probe, board)
+    assert probe.call(SetBool, "estop", data=True).success
+    assert board.wait_for(lambda b: b.commands[-1].kind == "estop", 20.0)
+    probe.wait_for(lambda: active and active[-1].data)
+    assert board.wait_for(still, 20.0)
+    answer = probe.call(SetBool, "estop", data=False)
+    assert answer.success
+    assert "new command" in answer.message
+    probe.wait_for(lambda: not active[-1].data)
+    assert board.wait_for(lambda b: b.commands[-1].kind == "wheels", 20.0)
+    assert board.wait_for(still, 20.0)
+    drive(probe, board)
+
+
+def test_commands_under_estop_are_refused_and_told_what_to_do(
+    probe: Probe, driver: Driver, board: PtyBoard
+) -> None:
+    """Neither during the stop nor after its release do they move the robot."""
+    assert probe.call(SetBool, "estop", data=True).success
+    commands = probe.publisher(Twist, "cmd_vel")
+    twist = Twist()
+    twist.linear.x = 0.3
+    commands.publish(twist)
+    driver.wait_for_line("refused.*e-stop.*~/estop")
+    assert probe.call(SetBool, "estop", data=False).success
+    assert "velocity" not in kinds(board)
+
+
+def test_estop_answers_while_a_reset_waits(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """The board takes seconds to come back; the e-stop does not."""
+    board = start_board(boot_time_s=4.0, running=True)
+    probe: Probe = probe_of(start_driver(board.path))
+    probe.wait_for_state("nominal")
+    client = probe.client(SetBool, "estop")
+    reset = probe.call_async(Trigger, "reset")
+    assert board.wait_for(lambda b: b.mode is BoardMode.BOOTING, 20.0)
+    stopped = client.call_async(SetBool.Request(data=True))
+    probe.wait_for_future(stopped)
+    assert stopped.result().success
+    assert not reset.arrived
+    assert reset.wait().success
+
+
+def test_a_second_request_is_refused_while_one_is_under_way(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """And says which."""
+    board = start_board(boot_time_s=3.0, running=True)
+    probe: Probe = probe_of(start_driver(board.path))
+    probe.wait_for_state("nominal")
+    reset = probe.call_async(Trigger, "reset")
+    assert board.wait_for(lambda b: b.mode is BoardMode.BOOTING, 20.0)
+    answer = probe.call(SetBool, "pause", data=True)
+    assert not answer.success
+    assert "reset is under way" in answer.message
+    assert reset.wait().success
+
+
+def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
+    """Where the robot stands is the origin from then on, heading included."""
+    odometry = probe.listen(Odometry, "odom")
+    drive(probe, board)
+    assert board.wait_for(lambda b: b.truth.x_m > 0.1 and still(b), 20.0)
+    probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.1)
+    assert probe.call(Trigger, "reset_odometry").success
+    count = len(odometry)
+    probe.wait_for(lambda: len(odometry) > count + 3)
+    assert odometry[-1].pose.pose.position.x == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(("kind", "service"), [(Trigger, "start"), (SetBool, "pause")])
+def test_services_answer_with_a_reason_when_the_board_is_silent(
+    start_driver: Start, probe_of: Start, silent_port: str, kind: type, service: str
+) -> None:
+    """Success false, and what to look at."""
+    driver: Driver = start_driver(silent_port)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("connecting")
+    answer = probe.call(kind, service)
+    assert not answer.success
+    assert "power" in answer.message
+
+
+def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: Start) -> None:
+    """Start, pause and reset have nobody to talk to; the e-stop latches all the same."""
+    probe: Probe = probe_of(start_driver("/dev/there_is_no_such_port"))
+    for kind, service in [(Trigger, "start"), (SetBool, "pause"), (Trigger, "reset")]:
+        answer = probe.call(kind, service)
+        assert not answer.success
+        assert "port is not open" in answer.message
+    answer = probe.call(SetBool, "estop", data=True)
+    assert answer.success
+    assert "as soon as" in answer.message
+
+
+def test_the_twist_after_a_pause_is_that_of_the_robot(probe: Probe) -> None:
+    """Standing still after an un-pause is zero, whatever time has passed."""
+    odometry = probe.listen(Odometry, "odom")
+    probe.call(SetBool, "pause", data=True)
+    probe.call(SetBool, "pause", data=False)
+    count = len(odometry)
+    probe.wait_for(lambda: len(odometry) > count + 5)
+    for message in odometry[count:]:
+        assert math.hypot(message.twist.twist.linear.x, message.twist.twist.linear.y) < 0.01
