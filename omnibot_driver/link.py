@@ -10,6 +10,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from functools import partial
 from typing import Final, TypeVar
 
@@ -95,14 +96,13 @@ class Link:
     def _serve(self) -> None:
         while not self._closing.is_set():
             try:
-                port = self._open()
-                self._report(None)
-                try:
-                    self._attach(port)
-                    self._read(port)
-                finally:
-                    self._detach()
-                    port.close()
+                with closing(self._open()) as port:
+                    self._report(None)
+                    try:
+                        self._attach(port)
+                        self._read(port)
+                    finally:
+                        self._detach()
             except LinkError as error:
                 self._report(str(error))
                 self._closing.wait(self.reconnect_interval_s)
@@ -127,7 +127,9 @@ class Link:
             self._deliver(events)
 
     def _detach(self) -> None:
+        """Whatever ended the reading, the robot is not left with a command to carry out."""
         with self._changed:
+            self._write(self._session.farewell("stop"))
             self._port = None
             self._session.closed(time.monotonic())
             events = self._settle()

@@ -1,0 +1,82 @@
+"""Values to ROS messages: where each number goes, by REP-103, REP-105 and REP-145."""
+
+import math
+
+import pytest
+from geometry_msgs.msg import Twist
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver import messages, parameters
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.odometry import Covariance, OdometryEstimate, Pose
+from omnibot_driver.core.session import ImuEstimate
+
+SETTINGS = messages.MessageSettings.from_parameters(parameters.check_all({}))
+STAMP = messages.time_message(1_700_000_000_123_456_789)
+
+
+def test_a_stamp_is_seconds_and_nanoseconds() -> None:
+    """Exactly, without a detour over floating point."""
+    assert (STAMP.sec, STAMP.nanosec) == (1_700_000_000, 123_456_789)
+
+
+def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
+    """Pose in odom, twist in base_link, covariances row-major over x, y, z, roll, pitch, yaw."""
+    estimate = OdometryEstimate(
+        0.0,
+        Pose(1.0, 2.0, math.pi / 2),
+        BodyTwist(0.1, 0.2, 0.3),
+        Covariance(xx=11.0, xy=12.0, x_yaw=16.0, yy=22.0, y_yaw=26.0, yaw_yaw=66.0),
+    )
+    message = messages.odometry_message(estimate, STAMP, SETTINGS)
+    assert (message.header.frame_id, message.child_frame_id) == ("odom", "base_link")
+    assert message.header.stamp == STAMP
+    position, turn = message.pose.pose.position, message.pose.pose.orientation
+    assert (position.x, position.y, position.z) == (1.0, 2.0, 0.0)
+    assert (turn.x, turn.y) == (0.0, 0.0)
+    assert (turn.z, turn.w) == pytest.approx((math.sqrt(0.5), math.sqrt(0.5)))
+    assert (message.twist.twist.linear.x, message.twist.twist.linear.y) == (0.1, 0.2)
+    assert message.twist.twist.angular.z == 0.3
+    pose = message.pose.covariance.reshape(6, 6)
+    assert pose[0, 0] == 11.0
+    assert pose[0, 1] == pose[1, 0] == 12.0
+    assert pose[0, 5] == pose[5, 0] == 16.0
+    assert pose[1, 1] == 22.0
+    assert pose[1, 5] == pose[5, 1] == 26.0
+    assert pose[5, 5] == 66.0
+    assert pose[2, 2] == pose[3, 3] == pose[4, 4] == messages.UNMEASURED_VARIANCE
+    twist = message.twist.covariance.reshape(6, 6)
+    assert twist[0, 0] == twist[1, 1] == pytest.approx(0.02**2)
+    assert twist[5, 5] == pytest.approx(0.02**2)
+
+
+def test_an_imu_message_has_no_orientation() -> None:
+    """REP-145: the first element of its covariance is -1; force and rate are as measured."""
+    estimate = ImuEstimate(0.0, (1.0, 2.0, -9.8), (0.1, 0.2, 0.3))
+    message = messages.imu_message(estimate, STAMP, SETTINGS)
+    assert message.header.frame_id == "imu_link"
+    assert message.orientation_covariance[0] == -1.0
+    force, rate = message.linear_acceleration, message.angular_velocity
+    assert (force.x, force.y, force.z) == (1.0, 2.0, -9.8)
+    assert (rate.x, rate.y, rate.z) == (0.1, 0.2, 0.3)
+    assert message.linear_acceleration_covariance[[0, 4, 8]] == pytest.approx(0.028**2)
+    assert message.angular_velocity_covariance[[0, 4, 8]] == pytest.approx(0.00087**2)
+
+
+@given(st.floats(-1e4, 1e4))
+def test_a_yaw_becomes_a_unit_quaternion(yaw_rad: float) -> None:
+    """However many turns the robot has made."""
+    turn = messages.yaw_quaternion(yaw_rad)
+    assert math.hypot(turn.z, turn.w) == pytest.approx(1.0)
+    assert math.cos(2 * math.atan2(turn.z, turn.w)) == pytest.approx(math.cos(yaw_rad), abs=1e-6)
+
+
+@pytest.mark.parametrize("axis", ["linear.x", "linear.z", "angular.x", "angular.y", "angular.z"])
+def test_a_twist_that_is_not_finite_anywhere_is_not_finite_everywhere(axis: str) -> None:
+    """So that the session refuses all of it."""
+    twist = Twist()
+    part, name = axis.split(".")
+    setattr(getattr(twist, part), name, math.inf)
+    planar = messages.body_twist(twist)
+    assert not math.isfinite(planar.vx_mps + planar.vy_mps + planar.yaw_rate_radps)
