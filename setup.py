@@ -25,6 +25,7 @@ setup(
     ],
     entry_points={
         "console_scripts": [
+            f"demo = {NAME}.demo.__main__:main",
             f"driver = {NAME}.driver:main",
             f"simulator = {NAME}.simulator.__main__:main",
         ],

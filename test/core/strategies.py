@@ -30,6 +30,24 @@ delta_frames = st.builds(DeltaFrame, words, words, words, counters)
 pose_frames = st.builds(PoseFrame, floats32, floats32, floats32, counters)
 paused_frames = st.builds(PausedFrame, counters)
 frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_frames, paused_frames)
+
+
+def believable(frame: Frame) -> bool:
+    """No pose at the end of the world, no IMU that weighs nothing and holds a header."""
+    if isinstance(frame, PoseFrame):
+        return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7
+    return not isinstance(frame, ImuFrame) or -6 not in frame.accel or frame.accel[2] == -16384
+
+
+believable_frames = st.one_of(
+    st.builds(ImuFrame, st.tuples(words, words, st.just(-16384)), triples),
+    imu_frames.filter(believable),
+    delta_frames,
+    pose_frames.filter(believable),
+    paused_frames,
+)
+"""What an undamaged board may send; damage makes frames that it may not."""
+
 commands = st.builds(CommandFrame, st.integers(0, 255), triples)
 byte_orders = st.sampled_from(["big", "little"])
 

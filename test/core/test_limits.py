@@ -22,7 +22,9 @@ def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
     if largest_a < 1e-290 or largest_b < 1e-290:
         return True
     unit_a, unit_b = [x / largest_a for x in a], [x / largest_b for x in b]
-    return all(math.isclose(x, y, rel_tol=1e-9, abs_tol=1e-9) for x, y in zip(unit_a, unit_b))  # noqa: B905
+    return all(
+        math.isclose(x, y, rel_tol=1e-9, abs_tol=1e-9) for x, y in zip(unit_a, unit_b, strict=True)
+    )
 
 
 @given(vectors, limits)

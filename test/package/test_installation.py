@@ -106,9 +106,9 @@ def test_colcon_installs_what_ros2_looks_for(prefix: Path) -> None:
 
 
 def test_colcon_installs_the_two_executables(prefix: Path) -> None:
-    """`ros2 run` offers every executable file in lib/omnibot_driver: driver, simulator, no more."""
+    """`ros2 run` offers every executable file in lib/omnibot_driver: demo, driver, simulator, no more."""
     files = list((prefix / "lib" / PACKAGE).iterdir())
-    assert {file.name for file in files} == {"driver", "simulator"}
+    assert {file.name for file in files} == {"demo", "driver", "simulator"}
     assert all(os.access(file, os.X_OK) for file in files)
 
 

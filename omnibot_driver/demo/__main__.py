@@ -1,0 +1,116 @@
+"""Runs the demo: ``python -m omnibot_driver.demo``."""
+
+import io
+import json
+import math
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Final
+
+from omnibot_driver.core.odometry import Pose
+from omnibot_driver.demo.display import Drive, introduce, report, show
+from omnibot_driver.demo.program import PATIENCE_S, DemoFailed, Program
+
+ENVIRONMENT: Final = {"ROS_DOMAIN_ID": "97", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+"""Unless the user says otherwise: away from domain 0, where somebody's robot may be."""
+STOPPING_S: Final = 3.0
+
+
+def run(seconds: float, asked_to_end: Callable[[], bool]) -> None:
+    """Drive for so long, or until asked to end. Raises DemoFailed, and ImportError without ROS."""
+    namespace = f"/demo_{os.getpid()}"
+    show_at_s = 0.0
+    with ExitStack() as stack:
+        board = Program("simulator", console=True)
+        stack.callback(board.end)
+        port = board.ask("")
+        arguments = ("--ros-args", "-p", f"port:={port}", "-r", f"__ns:={namespace}")
+        driver = Program("driver", *arguments)
+        stack.callback(driver.end)
+        from omnibot_driver.demo.robot import Robot
+
+        robot = Robot(namespace)
+        stack.callback(robot.close)
+        exports = " ".join(f"{name}={os.environ[name]}" for name in ENVIRONMENT)
+        introduce(port, namespace, exports, seconds)
+
+        def go_on_until(done: Callable[[], bool], longest_s: float) -> bool:
+            nonlocal show_at_s
+            deadline_s = time.monotonic() + longest_s
+            while not done() and (now_s := time.monotonic()) < deadline_s:
+                board.check()
+                driver.check()
+                robot.spin_once()
+                if now_s >= show_at_s:
+                    show_at_s = now_s + show(robot.row())
+            return done()
+
+        if not go_on_until(lambda: asked_to_end() or not robot.missing(), PATIENCE_S):
+            missing = ", ".join(robot.missing())
+            raise driver.failure(f"after {PATIENCE_S:g} s still missing: {missing}")
+        if asked_to_end():
+            print()
+            return
+        started_s, counts = time.monotonic(), (robot.imu.count, robot.odom.count)
+        robot.driving = True
+        go_on_until(asked_to_end, seconds)
+        driven_s = time.monotonic() - started_s
+        rates_hz = [
+            (rate.count - before) / driven_s
+            for rate, before in zip((robot.imu, robot.odom), counts, strict=True)
+        ]
+        robot.driving = False
+        go_on_until(robot.stands, STOPPING_S)
+        show(robot.row())
+        truth = json.loads(board.ask("truth\n"))
+        report(
+            Drive(
+                seconds=driven_s,
+                way_m=robot.driven_m,
+                laps=robot.leg / 4,
+                imu_hz=rates_hz[0],
+                odom_hz=rates_hz[1],
+                pose=robot.pose,
+                true_pose=Pose(truth["x_m"], truth["y_m"], truth["yaw_rad"]),
+                points=robot.points,
+            )
+        )
+
+
+def main() -> int:
+    """Return 0 when the time is over or SIGINT or SIGTERM came, 1 on failure, 2 on wrong usage."""
+    given = os.environ.get("DEMO_SECONDS") or "inf"
+    try:
+        seconds = float(given)
+    except ValueError:
+        seconds = math.nan
+    if not seconds > 0.0:
+        print(f"DEMO_SECONDS must be a number above 0, not {given!r}", file=sys.stderr)
+        return 2
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # question marks where there is no Braille
+    signals: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda received, _frame: signals.append(received))
+    for name, default in ENVIRONMENT.items():
+        os.environ[name] = os.environ.get(name) or default
+    try:
+        run(seconds, lambda: bool(signals))
+    except ImportError as error:
+        print(f"The demo needs ROS 2 Jazzy's Python packages: {error}", file=sys.stderr)
+        return 1
+    except DemoFailed as error:
+        print(f"\ndemo: {error}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:  # nobody wants to read any more
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,118 @@
+"""What the demo shows: rows, a picture, words. Knows terminals; must not know ROS or processes."""
+
+import math
+import shutil
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Final
+
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.odometry import Pose
+from omnibot_driver.demo.square import SIDE_M
+
+HEADING: Final = """\
+             rates Hz        pose by odom       commanded          measured
+state        imu odom lap   x m   y m yaw° x m/s y m/s rad/s x m/s y m/s rad/s"""
+
+CLOSING: Final = """
+The real robot is one parameter away:
+  ros2 run omnibot_driver driver --ros-args -p port:=/dev/ttyUSB0"""
+
+
+def status_row(
+    state: str, rates_hz: tuple[int, int], leg: int, pose: Pose, *velocities: BodyTwist
+) -> str:
+    """One row under HEADING; the velocities are the commanded and the measured one."""
+    numbers = [(pose.x_m, 6, 2), (pose.y_m, 6, 2), (_degrees(pose.yaw_rad), 5, 0)]
+    for twist in velocities:
+        numbers += [(v, 6, 2) for v in (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps)]
+    # Adding 0.0 makes a rounded -0.0 positive.
+    columns = [
+        f"{round(value, places) + 0.0:{width}.{places}f}" for value, width, places in numbers
+    ]
+    return f"{state:<12}{rates_hz[0]:4d}{rates_hz[1]:5d}{leg // 4 + 1:4d}" + "".join(columns)
+
+
+def picture(points: Iterable[tuple[float, float]]) -> list[str]:
+    """The square from above in Braille, 24 x 12 characters: x to the right, y up."""
+    columns, rows, margin = 24, 12, 2.5
+    dots_per_m = (2 * columns - 2 * margin) / SIDE_M
+    cells = [[0x2800] * columns for _ in range(rows)]
+    bits = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
+    for x_m, y_m in points:
+        right = math.floor(x_m * dots_per_m + margin)
+        down = math.floor((SIDE_M - y_m) * dots_per_m + margin)
+        if 0 <= right < 2 * columns and 0 <= down < 4 * rows:
+            cells[down // 4][right // 2] |= bits[down % 4][right % 2]
+    return ["".join(map(chr, row)) for row in cells]
+
+
+def _degrees(angle_rad: float) -> float:
+    return math.degrees(math.remainder(angle_rad, math.tau))
+
+
+def show(row: str) -> float:
+    """Over the last row on a terminal, else below it; returns after how many s the next is due."""
+    if sys.stdout.isatty():
+        print(f"\r{row[: shutil.get_terminal_size().columns - 1]}\033[K", end="", flush=True)
+        return 0.2
+    print(row, flush=True)
+    return 1.0
+
+
+def introduce(port: str, namespace: str, exports: str, seconds: float) -> None:
+    """Say what is going on, and what to do with it."""
+    ending = f"for {seconds:g} s" if math.isfinite(seconds) else "until ctrl-C"
+    print(f"""\
+A simulated OmniBot drives a square of 1 m, turning as only an omni robot can.
+
+  simulator  a board on {port}: python -m omnibot_driver.simulator
+  driver     python -m omnibot_driver.driver --ros-args -p port:={port}
+  demo       steers by odom over cmd_vel, {ending}
+
+Where ROS 2 Jazzy is installed, look on and interfere from another terminal:
+
+  export {exports}
+  ros2 topic hz {namespace}/imu/data_raw
+  ros2 topic echo {namespace}/odom --field pose.pose
+  ros2 service call {namespace}/omnibot_driver/estop \\
+    std_srvs/srv/SetBool "data: true"    # then "data: false"
+
+{HEADING}""")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """What was driven and received, where the robot believes to be, and where it is."""
+
+    seconds: float
+    way_m: float
+    laps: float
+    imu_hz: float
+    odom_hz: float
+    pose: Pose
+    true_pose: Pose
+    points: Iterable[tuple[float, float]]
+
+
+def report(drive: Drive) -> None:
+    """Say what was driven and how well it is known, on a terminal beside a picture of it."""
+    pose, true_pose = drive.pose, drive.true_pose
+    error_mm = 1000 * math.dist((pose.x_m, pose.y_m), (true_pose.x_m, true_pose.y_m))
+    error_deg = abs(_degrees(pose.yaw_rad - true_pose.yaw_rad))
+    text = [
+        f"driven      {drive.way_m:.2f} m in {drive.seconds:.1f} s, {drive.laps:g} laps",
+        f"received    imu {drive.imu_hz:.1f} Hz, odom {drive.odom_hz:.1f} Hz",
+        *(
+            f"{name:<10}{p.x_m:8.3f} m {p.y_m:8.3f} m {_degrees(p.yaw_rad):7.1f}°"
+            for name, p in (("odometry", pose), ("truth", true_pose))
+        ),
+        f"pose error  {error_mm:.1f} mm, {error_deg:.2f}°",
+    ]
+    print()
+    if sys.stdout.isatty():
+        rows = zip_longest(picture(drive.points), ["", "", "", *text], fillvalue="")
+        text = ["", *(f"{drawn:28}{line}".rstrip() for drawn, line in rows)]
+    print(*text, CLOSING, sep="\n")

@@ -1,0 +1,73 @@
+"""A module of ours as a process of its own. Knows processes; must not know what they do."""
+
+import ctypes
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+from typing import Final
+
+PATIENCE_S: Final = 15.0
+
+
+class DemoFailed(Exception):
+    """The demo cannot go on; the text says why."""
+
+
+class Program:
+    """A module of ours as a process of its own, which never outlives this one.
+
+    Signals of the terminal do not reach it: it is ended when nothing depends on it any more.
+    """
+
+    def __init__(self, name: str, *arguments: str, console: bool = False) -> None:
+        self._name = name
+        self._log = tempfile.TemporaryFile("a+")  # noqa: SIM115, it lives as long as we do
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", f"omnibot_driver.{name}", *arguments],
+            stdin=subprocess.PIPE if console else subprocess.DEVNULL,
+            stdout=subprocess.PIPE if console else self._log,
+            stderr=self._log,
+            text=True,
+            start_new_session=True,
+            preexec_fn=_end_with_parent,
+        )
+
+    def end(self) -> None:
+        """End it, by force if need be."""
+        self._process.terminate()
+        try:
+            self._process.wait(3.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def failure(self, what: str) -> DemoFailed:
+        """What happened, with the last words of this process."""
+        self._log.seek(0)
+        lines = self._log.read().splitlines()[-10:] or ["(nothing)"]
+        return DemoFailed("\n  ".join([f"{what}. The {self._name} said last:", *lines]))
+
+    def check(self) -> None:
+        """Raises DemoFailed if it has ended."""
+        if (code := self._process.poll()) is not None:
+            raise self.failure(f"the {self._name} ended with code {code}")
+
+    def ask(self, question: str) -> str:
+        """The next line from its console. Raises DemoFailed when there is none."""
+        stdin, stdout = self._process.stdin, self._process.stdout
+        if stdin is None or stdout is None:
+            raise ValueError(f"the {self._name} has no console")
+        self.check()
+        stdin.write(question)
+        stdin.flush()
+        readable, _, _ = select.select([stdout], [], [], PATIENCE_S)
+        if not readable or not (answer := stdout.readline()):
+            raise self.failure(f"the {self._name} does not answer")
+        return answer.strip()
+
+
+def _end_with_parent() -> None:
+    pr_set_pdeathsig = 1
+    ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGTERM)

@@ -1,0 +1,116 @@
+"""The robot as a ROS program sees it. Must not know who made it, nor what is shown of it."""
+
+import math
+import time
+from collections import deque
+
+import rclpy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Bool, String
+
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.odometry import Pose
+from omnibot_driver.demo.display import status_row
+from omnibot_driver.demo.square import HALT, steer
+
+
+class Rate:
+    """How often something arrives, by the clock of this process."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._latest_s: deque[float] = deque(maxlen=500)
+
+    def arrived(self, _message: object) -> None:
+        """Count it."""
+        self.count += 1
+        self._latest_s.append(time.monotonic())
+
+    def last_second(self) -> int:
+        """Arrivals within the last second."""
+        since_s = time.monotonic() - 1.0
+        return sum(arrival_s > since_s for arrival_s in self._latest_s)
+
+
+class Robot:
+    """The robot as a ROS program has it: topics in, ``cmd_vel`` out.
+
+    Every other odometry message is answered with a command; unless ``driving``, with a halt.
+    """
+
+    def __init__(self, namespace: str) -> None:
+        self.driving = False
+        self.leg, self.driven_m, self.pose = 0, 0.0, Pose()
+        self.points: set[tuple[float, float]] = set()
+        self.imu, self.odom = Rate(), Rate()
+        self._state, self._estop = "no driver", False
+        self._commanded = self._measured = HALT
+        self._stood_for = 0
+        rclpy.init(
+            args=["--ros-args", "--disable-external-lib-logs"],
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        self.close = rclpy.try_shutdown
+        node = rclpy.create_node("demo", namespace=namespace)
+        self._cmd_vel = node.create_publisher(Twist, "cmd_vel", 1)
+        node.create_subscription(Imu, "imu/data_raw", self.imu.arrived, 50)
+        node.create_subscription(Odometry, "odom", self._on_odom, 50)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        node.create_subscription(String, "omnibot_driver/state", self._on_state, latched)
+        node.create_subscription(Bool, "omnibot_driver/estop_active", self._on_estop, latched)
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+
+    def spin_once(self) -> None:
+        """Take the next message, if one comes soon."""
+        self._executor.spin_once(timeout_sec=0.05)
+
+    def missing(self) -> list[str]:
+        """What a robot that can drive has and this one has not."""
+        now_hz = {"imu/data_raw": self.imu.last_second(), "odom": self.odom.last_second()}
+        wanted_hz = {"imu/data_raw": 50, "odom": 12}
+        missing = [f"{name} ({hz} Hz)" for name, hz in now_hz.items() if hz < wanted_hz[name]]
+        return missing if self._state == "nominal" else [*missing, f"nominal state ({self._state})"]
+
+    def stands(self) -> bool:
+        """Whether it has been standing still for a while since it was driving."""
+        return self._stood_for >= 5
+
+    def row(self) -> str:
+        """The row that tells how it is."""
+        rates_hz = (self.imu.last_second(), self.odom.last_second())
+        state = "e-stop" if self._estop else self._state
+        return status_row(state, rates_hz, self.leg, self.pose, self._commanded, self._measured)
+
+    def _on_state(self, message: String) -> None:
+        self._state = message.data
+
+    def _on_estop(self, message: Bool) -> None:
+        self._estop = message.data
+
+    def _on_odom(self, message: Odometry) -> None:
+        self.odom.arrived(message)
+        position, turn = message.pose.pose.position, message.pose.pose.orientation
+        before, self.pose = self.pose, Pose(position.x, position.y, 2 * math.atan2(turn.z, turn.w))
+        self.driven_m += math.dist((before.x_m, before.y_m), (self.pose.x_m, self.pose.y_m))
+        self.points.add((round(200 * position.x) / 200, round(200 * position.y) / 200))
+        linear, angular = message.twist.twist.linear, message.twist.twist.angular
+        self._measured = BodyTwist(linear.x, linear.y, angular.z)
+        moves = max(abs(linear.x), abs(linear.y), abs(angular.z)) > 0.002
+        self._stood_for = 0 if moves or self.driving else self._stood_for + 1
+        if self.odom.count % 2:
+            self._command()
+
+    def _command(self) -> None:
+        self._commanded = HALT
+        if self.driving:
+            self.leg, self._commanded = steer(self.pose, self.leg)
+        message = Twist()
+        message.linear.x, message.linear.y = self._commanded.vx_mps, self._commanded.vy_mps
+        message.angular.z = self._commanded.yaw_rate_radps
+        self._cmd_vel.publish(message)

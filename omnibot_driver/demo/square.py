@@ -1,0 +1,41 @@
+"""How the robot is steered round the square: a pure function of where it is."""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.limits import shorten
+from omnibot_driver.core.odometry import Pose
+
+SIDE_M: Final = 1.0
+SPEED_MPS: Final = 0.3
+CREEP_MPS: Final = 0.05
+YAW_RATE_RADPS: Final = 0.5
+QUARTER_RAD: Final = math.pi / 2
+CORNER_M: Final = 0.01
+"""From this distance on, a corner counts as reached."""
+GAIN_PER_S: Final = 3.0
+"""Speed per distance: to the corner ahead, and to where the robot should be."""
+HALT: Final = BodyTwist(0.0, 0.0, 0.0)
+
+
+def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
+    """The leg to be on, and the velocity along it in the robot's own axes.
+
+    Legs are counted from 0 without end: +x, +y, -x, -y in the odometry frame. On every other leg
+    the robot turns a quarter to the left, and back on the next, while it drives straight ahead.
+    """
+    direction_rad = leg % 4 * QUARTER_RAD
+    from_centre = Pose(pose.x_m - SIDE_M / 2, pose.y_m - SIDE_M / 2).turned(-direction_rad)
+    along_m, aside_m = from_centre.x_m + SIDE_M / 2, from_centre.y_m + SIDE_M / 2
+    if SIDE_M - along_m <= CORNER_M:
+        return steer(pose, leg + 1)
+    ahead = min(SPEED_MPS, max(CREEP_MPS, GAIN_PER_S * (SIDE_M - along_m)))
+    ahead, aside = shorten((ahead, -GAIN_PER_S * aside_m), SPEED_MPS)
+    turned = max(0.0, along_m / SIDE_M)
+    yaw_rad, sign = (QUARTER_RAD * turned, 1) if leg % 2 == 0 else (QUARTER_RAD * (1 - turned), -1)
+    yaw_error = math.remainder(yaw_rad - pose.yaw_rad, math.tau)
+    yaw_rate = sign * QUARTER_RAD * ahead / SIDE_M + GAIN_PER_S * yaw_error
+    velocity = Pose(ahead, aside).turned(direction_rad - pose.yaw_rad)
+    yaw_rate = max(-YAW_RATE_RADPS, min(YAW_RATE_RADPS, yaw_rate))
+    return leg, BodyTwist(velocity.x_m, velocity.y_m, yaw_rate)

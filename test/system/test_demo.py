@@ -1,0 +1,229 @@
+"""The demo: its steering and drawing as functions, and the whole of it as a user runs it."""
+
+import math
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import omnibot_driver
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.odometry import Pose
+from omnibot_driver.demo import display, square
+
+PATIENCE_S = 60.0
+ROOT = Path(omnibot_driver.__file__).parents[1]
+MARKER = "OMNIBOT_DEMO_TEST"
+CORNERS = ((1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0))
+
+coordinates = st.floats(-3.0, 3.0)
+poses = st.builds(Pose, coordinates, coordinates, st.floats(-10.0, 10.0))
+
+
+@given(poses, st.integers(0, 1000))
+def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> None:
+    """Wherever the robot is, it is sent on at no more than the speed, and never stopped."""
+    _, twist = square.steer(pose, leg)
+    assert 0.0 < math.hypot(twist.vx_mps, twist.vy_mps) <= square.SPEED_MPS + 1e-9
+    assert abs(twist.yaw_rate_radps) <= square.YAW_RATE_RADPS
+
+
+@given(st.integers(0, 1000), st.floats(0.0, 0.009), st.floats(-math.pi, math.pi))
+def test_a_corner_turns_the_robot_to_the_next_side(leg: int, before_m: float, yaw: float) -> None:
+    """Close to the corner that ends a leg, the velocity points along the next leg."""
+    x_m, y_m = CORNERS[leg % 4]
+    direction = leg * math.pi / 2
+    pose = Pose(x_m - before_m * math.cos(direction), y_m - before_m * math.sin(direction), yaw)
+    next_leg, twist = square.steer(pose, leg)
+    heading = math.atan2(twist.vy_mps, twist.vx_mps) + yaw
+    assert next_leg == leg + 1
+    assert abs(math.remainder(heading - direction - math.pi / 2, math.tau)) < 0.15
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(-0.02, 0.02), st.floats(-0.02, 0.02), st.floats(-0.1, 0.1))
+def test_the_square_closes(x_m: float, y_m: float, yaw_rad: float) -> None:
+    """A robot that answers after 0.1 s passes all corners and ends a lap where it belongs."""
+    pose, leg, step_s, lag_s = Pose(x_m, y_m, yaw_rad), 0, 0.08, 0.1
+    moving = BodyTwist(0.0, 0.0, 0.0)
+    nearest = [math.inf] * 4
+    for _ in range(round(30.0 / step_s)):
+        leg, wanted = square.steer(pose, leg)
+        if leg == 4:
+            break
+        moving = BodyTwist(
+            *(
+                now + (then - now) * step_s / lag_s
+                for now, then in (
+                    (moving.vx_mps, wanted.vx_mps),
+                    (moving.vy_mps, wanted.vy_mps),
+                    (moving.yaw_rate_radps, wanted.yaw_rate_radps),
+                )
+            )
+        )
+        step = Pose(moving.vx_mps * step_s, moving.vy_mps * step_s, moving.yaw_rate_radps * step_s)
+        pose = pose.moved(step)
+        nearest = [
+            min(so_far, math.dist((pose.x_m, pose.y_m), corner))
+            for so_far, corner in zip(nearest, CORNERS, strict=True)
+        ]
+    assert leg == 4
+    assert max(nearest) < 0.02
+    assert abs(math.remainder(pose.yaw_rad, math.tau)) < 0.05
+
+
+@given(poses, st.integers(0, 10_000), coordinates, st.sampled_from(["nominal", "disconnected"]))
+def test_a_status_row_stands_under_its_heading(
+    pose: Pose, leg: int, speed: float, state: str
+) -> None:
+    """Every row has the width of the heading, which fits a terminal of 80 columns."""
+    twist = BodyTwist(speed, -speed, speed / 10)
+    row = display.status_row(state, (100, 25), leg, pose, twist, twist)
+    assert len(row) == len(display.HEADING.splitlines()[-1]) < 80
+
+
+def test_the_picture_of_a_square_is_a_square() -> None:
+    """Its outline is drawn, its inside is empty, and points far away do no harm."""
+    side = [i / 200 for i in range(201)]
+    square = [p for t in side for p in ((t, 0.0), (t, 1.0), (0.0, t), (1.0, t))]
+    rows = display.picture([*square, (5.0, 5.0), (-5.0, 0.5)])
+    blank = "\u2800"
+    assert {len(row) for row in rows} == {24}
+    assert [rows[6][i] != blank for i in (1, 12, 22)] == [True, False, True]
+    assert all(char != blank for char in rows[0][1:23] + rows[-1][1:23])
+
+
+@contextmanager
+def running_demo(**environment: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """A demo and the mark by which it and its children are found; all killed in the end."""
+    mark = uuid.uuid4().hex
+    with subprocess.Popen(
+        [sys.executable, "-m", "omnibot_driver.demo"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env={**os.environ, "PYTHONPATH": _python_path(), MARKER: mark, **environment},
+    ) as process:
+        try:
+            yield process, mark
+        finally:
+            for pid in marked(mark):
+                os.kill(pid, signal.SIGKILL)
+
+
+def _python_path() -> str:
+    return os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+
+
+def marked(mark: str, name: str = "") -> list[int]:
+    """Process ids of those that inherited the mark and have the name in their command line."""
+    found = []
+    for directory in Path("/proc").glob("[0-9]*"):
+        try:
+            environment = (directory / "environ").read_bytes()
+            command = (directory / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if f"{MARKER}={mark}".encode() in environment and name.encode() in command:
+            found.append(int(directory.name))
+    return found
+
+
+def read_until_it_drives(process: subprocess.Popen[str]) -> None:
+    """Read its output up to the first row with a speed that was measured."""
+    assert process.stdout is not None
+    for line in process.stdout:
+        if re.match(r"nominal .* [ -]0\.[1-9]\d +-?\d\.\d\d +-?\d\.\d\d$", line):
+            return
+    raise AssertionError("the demo ended before it drove")
+
+
+def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
+    """Exit code 0, laps driven, rates as the board's, odometry within 10 mm of the truth."""
+    with running_demo(DEMO_SECONDS="20") as (process, mark):
+        output, _ = process.communicate(timeout=PATIENCE_S)
+        assert process.returncode == 0, output
+        assert marked(mark) == []
+    error = re.search(r"^pose error +(\d+\.\d) mm, (\d+\.\d\d)°$", output, re.MULTILINE)
+    rates = re.search(r"imu (\d+\.\d) Hz, odom (\d+\.\d) Hz", output)
+    driven = re.search(r"driven +(\d+\.\d+) m in .* s, ([\d.]+) laps", output)
+    assert error, output
+    assert rates, output
+    assert driven, output
+    assert float(error[1]) < 10.0
+    assert float(error[2]) < 2.0
+    assert float(rates[1]) / float(rates[2]) == pytest.approx(4.0, rel=0.1)
+    assert float(driven[2]) == pytest.approx(float(driven[1]) / 4, abs=0.5)
+    assert "/dev/ttyUSB0" in output
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_on_the_way_ends_it_cleanly(number: signal.Signals) -> None:
+    """The robot is stopped, the result is told, the exit code is 0, and nothing is left."""
+    with running_demo() as (process, mark):
+        read_until_it_drives(process)
+        process.send_signal(number)
+        output, _ = process.communicate(timeout=PATIENCE_S)
+        assert process.returncode == 0, output
+        assert marked(mark) == []
+    assert "pose error" in output
+    assert "Traceback" not in output
+
+
+def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
+    """The exit code is 1, the message names the driver, and the simulator is gone too."""
+    with running_demo() as (process, mark):
+        read_until_it_drives(process)
+        (driver,) = marked(mark, "omnibot_driver.driver")
+        os.kill(driver, signal.SIGKILL)
+        output, _ = process.communicate(timeout=PATIENCE_S)
+        assert process.returncode == 1, output
+        assert marked(mark) == []
+    assert "the driver ended with code -9" in output
+    assert "state: nominal" in output
+
+
+def test_a_killed_demo_leaves_nobody_behind() -> None:
+    """Even SIGKILL, which the demo cannot answer, ends simulator and driver."""
+    with running_demo() as (process, mark):
+        read_until_it_drives(process)
+        process.kill()
+        process.wait()
+        deadline = time.monotonic() + PATIENCE_S
+        while (left := marked(mark)) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert left == []
+
+
+@pytest.mark.parametrize("value", ["soon", "0", "-3", "nan"])
+def test_wrong_seconds_are_refused_in_one_sentence(value: str) -> None:
+    """The exit code is 2 and the only line names variable and value."""
+    with running_demo(DEMO_SECONDS=value) as (process, _):
+        output, _ = process.communicate(timeout=PATIENCE_S)
+        assert process.returncode == 2
+    assert output == f"DEMO_SECONDS must be a number above 0, not {value!r}\n"
+
+
+def test_without_ros_it_says_so_in_one_sentence() -> None:
+    """A Python without site-packages has no rclpy: one line, no traceback, exit code 1."""
+    ended = subprocess.run(
+        [sys.executable, "-ES", "-m", "omnibot_driver.demo"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("The demo needs ROS 2 Jazzy's Python packages")
+    assert ended.stderr.count("\n") == 1
