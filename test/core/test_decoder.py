@@ -339,7 +339,9 @@ def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
     assert false <= len(damage_places(sent)) * 3 / 30
 
 
-@pytest.mark.parametrize("extra", [b"\x00", b"P", b"\xfa", b"\xff", b"\xff\xff", b"\xff\xfd", b"Pau"])
+@pytest.mark.parametrize(
+    "extra", [b"\x00", b"P", b"\xfa", b"\xff", b"\xff\xff", b"\xff\xfd", b"Pau"]
+)
 def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes) -> None:
     """Nobody can tell whether they were its own; the frame behind them comes out."""
     other = ImuFrame((100, 90, -16300), (4, 5, 6))

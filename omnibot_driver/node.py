@@ -1,0 +1,288 @@
+"""The node: topics, services and parameters wired to a link and its session.
+
+Nothing is computed here. Measurements are published by the link's reader thread as they come;
+the executor sleeps unless a message, a service call or a parameter wakes it.
+"""
+
+import threading
+import time
+import traceback
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rclpy
+from geometry_msgs.msg import Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Bool, Float32MultiArray, String
+from std_srvs.srv import SetBool, Trigger
+
+from omnibot_driver import messages, parameters
+from omnibot_driver.core.errors import CommandRefused, ParameterError, RequestRefused
+from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.omnibot import OmniBot
+from omnibot_driver.core.session import (
+    Event,
+    ImuEstimate,
+    Notice,
+    RequestDone,
+    Session,
+    StateChanged,
+)
+from omnibot_driver.core.supervisor import Request
+from omnibot_driver.link import Link
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+NOT_OURS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+"""Parameters that rclpy itself declares for every node."""
+
+
+class OmniBotDriver(Node):
+    """The driver node. Raises ParameterError when it cannot start with the given parameters."""
+
+    def __init__(self, *, defect: Callable[[BaseException], object] = lambda _error: None) -> None:
+        super().__init__("omnibot_driver")
+        self._defect = defect
+        self._values = self._declare_parameters()
+        self._message_settings = messages.MessageSettings.from_parameters(self._values)
+        self._board = OmniBot(parameters.board_settings(self._values))
+        self._session = Session(
+            self._board,
+            parameters.session_settings(self._values),
+            run=self._values["auto_start"],
+            axis_signs=tuple(self._values["axis_signs"]),
+        )
+        self._state_lock = threading.Lock()
+        self._port_report: str | None = ""
+        self._handlers: dict[type, Callable[[Any, int], None]] = {
+            ImuEstimate: self._publish_imu,
+            OdometryEstimate: self._publish_odometry,
+            RequestDone: self._answer,
+            Notice: self._warn,
+            StateChanged: lambda _event, _clock_offset_ns: self._publish_state(),
+        }
+        self._link = Link(
+            self._session,
+            self._values["port"],
+            self._values["baudrate"],
+            reconnect_interval_s=self._values["reconnect_interval"],
+            deliver=self._deliver,
+            report=self._report_port,
+            failed=self.report_defect,
+        )
+        self._create_publishers()
+        self._create_inputs()
+        self._publish_state()
+        self._link.start()
+
+    def close(self) -> None:
+        """Stop the robot and give the port back; ROS entities live on until ``destroy_node``."""
+        self._link.close(self._values["on_exit"])
+
+    def report_defect(self, error: BaseException) -> None:
+        """Something that must not happen has; say so and have the driver end."""
+        trace = "".join(traceback.format_exception(error))
+        self.get_logger().fatal(
+            f"stopping after a defect of the driver, please report it:\n{trace}"
+        )
+        self._defect(error)
+
+    # Parameters
+
+    def _declare_parameters(self) -> dict[str, Any]:
+        given = {
+            name: override.value
+            for name, override in self._parameter_overrides.items()
+            if not name.startswith(NOT_OURS)
+        }
+        values = parameters.check_all(given)
+        for parameter in parameters.PARAMETERS:
+            self.declare_parameter(
+                parameter.name,
+                values[parameter.name],
+                _descriptor(parameter),
+                ignore_override=True,
+            )
+        self.add_on_set_parameters_callback(self._check_parameters)
+        self.add_post_set_parameters_callback(self._apply_parameters)
+        return values
+
+    def _check_parameters(self, changed: list[rclpy.Parameter]) -> SetParametersResult:
+        try:
+            for parameter in changed:
+                if parameter.name in parameters.BY_NAME:
+                    parameters.BY_NAME[parameter.name].check(parameter.value)
+        except ParameterError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply_parameters(self, changed: list[rclpy.Parameter]) -> None:
+        ours = {item.name: item.value for item in changed if item.name in parameters.BY_NAME}
+        self._values = parameters.check_all({**self._values, **ours})
+        self._message_settings = messages.MessageSettings.from_parameters(self._values)
+        self._board.settings = parameters.board_settings(self._values)
+        self._link.reconnect_interval_s = self._values["reconnect_interval"]
+        settings = parameters.session_settings(self._values)
+        self._link.call(lambda session, _now: session.configure(settings))
+
+    # From the board to ROS
+
+    def _create_publishers(self) -> None:
+        self._imu = self.create_publisher(Imu, "imu/data_raw", 10)
+        self._odometry = self.create_publisher(Odometry, "odom", 10)
+        self._state = self.create_publisher(String, "~/state", LATCHED)
+        self._estop_active = self.create_publisher(Bool, "~/estop_active", LATCHED)
+        self._published: tuple[str, bool] | None = None
+
+    def _deliver(self, events: Sequence[Event]) -> None:
+        if not events or not self.context.ok():
+            return
+        clock_offset_ns = self.get_clock().now().nanoseconds - time.monotonic_ns()
+        for event in events:
+            self._handlers[type(event)](event, clock_offset_ns)
+
+    def _publish_imu(self, estimate: ImuEstimate, clock_offset_ns: int) -> None:
+        stamp = messages.time_message(round(estimate.stamp_s * 1e9) + clock_offset_ns)
+        self._imu.publish(messages.imu_message(estimate, stamp, self._message_settings))
+
+    def _publish_odometry(self, estimate: OdometryEstimate, clock_offset_ns: int) -> None:
+        stamp = messages.time_message(round(estimate.stamp_s * 1e9) + clock_offset_ns)
+        self._odometry.publish(messages.odometry_message(estimate, stamp, self._message_settings))
+
+    def _publish_state(self) -> None:
+        """Latched topics show what is so now, whichever thread says so last."""
+        with self._state_lock:
+            now = (self._session.state, self._session.estop_active)
+            before = self._published or (None, None)
+            self._published = now
+            if now[0] != before[0]:
+                self.get_logger().info(f"state: {now[0]}")
+                self._state.publish(String(data=now[0]))
+            if now[1] != before[1]:
+                self._estop_active.publish(Bool(data=now[1]))
+
+    def _answer(self, done: RequestDone, _clock_offset_ns: int) -> None:
+        assert isinstance(done.token, Future)
+        done.token.set_result(done)
+        if self.executor is not None:
+            self.executor.wake()
+
+    def _warn(self, notice: Notice, _clock_offset_ns: int) -> None:
+        self.get_logger().warning(notice.text)
+
+    def _report_port(self, trouble: str | None) -> None:
+        if trouble == self._port_report:
+            return
+        self._port_report = trouble
+        if trouble is None:
+            self.get_logger().info(f"port {self._values['port']} is open")
+        else:
+            self.get_logger().error(
+                f"{trouble} (retrying every {self._values['reconnect_interval']:g} s)"
+            )
+
+    # From ROS to the board
+
+    def _create_inputs(self) -> None:
+        if self._values["enable_stamped_cmd_vel"]:
+            self.create_subscription(
+                TwistStamped, "cmd_vel", lambda stamped: self._on_twist(stamped.twist), 1
+            )
+        else:
+            self.create_subscription(Twist, "cmd_vel", self._on_twist, 1)
+        self.create_subscription(Float32MultiArray, "wheel_cmd", self._on_wheels, 1)
+        self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
+        self.create_service(SetBool, "~/estop", self._on_estop)
+        self.create_service(Trigger, "~/reset_odometry", self._on_reset_odometry)
+        waiting = ReentrantCallbackGroup()
+        self.create_service(Trigger, "~/start", self._on_start, callback_group=waiting)
+        self.create_service(SetBool, "~/pause", self._on_pause, callback_group=waiting)
+        self.create_service(Trigger, "~/reset", self._on_reset, callback_group=waiting)
+
+    def _on_twist(self, twist: Twist) -> None:
+        wanted = messages.body_twist(twist)
+        self._command(lambda session, now: session.command_twist(wanted, now))
+
+    def _on_wheels(self, wheels: Float32MultiArray) -> None:
+        self._command(lambda session, now: session.command_wheels(wheels.data, now))
+
+    def _command(self, action: Callable[[Session, float], None]) -> None:
+        try:
+            self._link.call(action)
+        except CommandRefused as error:
+            self.get_logger().warning(str(error), throttle_duration_sec=2.0)
+
+    def _on_estop_topic(self, message: Bool) -> None:
+        if message.data:
+            self._link.call(lambda session, now: session.estop(True, now))
+
+    def _on_estop(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        active = bool(request.data)
+        response.message = self._link.call(lambda session, now: session.estop(active, now))
+        response.success = True
+        return response
+
+    def _on_reset_odometry(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        self._link.call(lambda session, _now: session.reset_odometry())
+        response.success = True
+        response.message = "the odometry begins here"
+        return response
+
+    async def _on_start(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        return await self._ask(Request.START, response)
+
+    async def _on_pause(
+        self, request: SetBool.Request, response: SetBool.Response
+    ) -> SetBool.Response:
+        return await self._ask(Request.PAUSE if request.data else Request.START, response)
+
+    async def _on_reset(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        return await self._ask(Request.RESET, response)
+
+    async def _ask(self, request: Request, response: Any) -> Any:
+        answer = Future()
+        try:
+            self._link.call(lambda session, now: session.request(request, answer, now))
+        except RequestRefused as error:
+            response.success, response.message = False, str(error)
+            return response
+        done: RequestDone = await answer
+        response.success, response.message = done.success, done.message
+        return response
+
+
+def _descriptor(parameter: parameters.Parameter) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(
+        description=f"{parameter.description} [{parameter.unit}]"
+        if parameter.unit
+        else parameter.description,
+        additional_constraints=parameter.allowed,
+        read_only=parameter.fixed,
+        dynamic_typing=True,
+    )
+    if parameter.low is not None and parameter.high is not None:
+        if isinstance(parameter.default, int):
+            whole = IntegerRange(
+                from_value=int(parameter.low), to_value=int(parameter.high), step=1
+            )
+            descriptor.integer_range = [whole]
+        else:
+            span = FloatingPointRange(from_value=parameter.low, to_value=parameter.high)
+            descriptor.floating_point_range = [span]
+    return descriptor

@@ -1,0 +1,489 @@
+"""Odometry: displacements from a made-up board, and from the simulated one.
+
+``Trip`` is a board by itself: it turns body twists into what the manual's firmware sends, written
+with rotation matrices and independent of the code under test.
+"""
+
+import math
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from strategies import axis_signs, displacements, headings, small_moves
+
+from omnibot_driver.core.board import DisplacementReading, PoseReading
+from omnibot_driver.core.odometry import (
+    Covariance,
+    Odometry,
+    OdometryEstimate,
+    OdometryNoise,
+    Pose,
+    roll,
+    unroll,
+)
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.simulator import BoardPose, BoardSettings, SimulatedBoard
+
+PERIOD_S = 0.04
+NOISE = OdometryNoise()
+Triple = tuple[float, float, float]
+
+
+def xyyaw(pose: Pose) -> Triple:
+    return pose.x_m, pose.y_m, pose.yaw_rad
+
+
+def close(values: Triple, tolerance: float = 1e-9) -> object:
+    return pytest.approx(values, abs=tolerance, rel=1e-9)
+
+
+def arc(vx: float, vy: float, turn: float) -> tuple[float, float]:
+    """Where a constant twist leads, by the textbook's integral of the rotation matrix."""
+    if abs(turn) < 1e-6:
+        return vx - vy * turn / 2, vy + vx * turn / 2
+    a, b = math.sin(turn) / turn, (1 - math.cos(turn)) / turn
+    return a * vx - b * vy, b * vx + a * vy
+
+
+class Trip:
+    """A board that has the given pose already, sends earth deltas, and whose axes have signs."""
+
+    def __init__(self, heading: float = 0.0, signs: tuple[int, int, int] = (1, 1, 1)) -> None:
+        self.board = (12.0, -34.0, heading)
+        self.truth = (0.0, 0.0, 0.0)
+        self._signs = signs
+
+    def move(self, dx: float, dy: float, turn: float, frame: str = "earth") -> DisplacementReading:
+        """One period of constant twist in the true body's axes; what the board makes of it."""
+        self.truth = self._moved(self.truth, dx, dy, turn)
+        x, y, yaw = self._signs
+        before = self.board
+        self.board = self._moved(before, x * dx, y * dy, yaw * turn)
+        if frame == "body":
+            return DisplacementReading(x * dx, y * dy, yaw * turn, "body", PERIOD_S, 0)
+        return DisplacementReading(
+            self.board[0] - before[0], self.board[1] - before[1], yaw * turn, "earth", PERIOD_S, 0
+        )
+
+    @property
+    def pose(self) -> PoseReading:
+        """The board's own."""
+        return PoseReading(*self.board)
+
+    @staticmethod
+    def _moved(pose: Triple, dx: float, dy: float, turn: float) -> Triple:
+        x, y, yaw = pose
+        ahead, left = arc(dx, dy, turn)
+        c, s = math.cos(yaw), math.sin(yaw)
+        return x + c * ahead - s * left, y + s * ahead + c * left, yaw + turn
+
+
+def earth(dx: float, dy: float, turn: float = 0.0) -> DisplacementReading:
+    return DisplacementReading(dx, dy, turn, "earth", PERIOD_S, 0)
+
+
+def body(dx: float, dy: float, turn: float = 0.0) -> DisplacementReading:
+    return DisplacementReading(dx, dy, turn, "body", PERIOD_S, 0)
+
+
+def heading(yaw: float) -> PoseReading:
+    return PoseReading(1.0, 2.0, yaw)
+
+
+def last(estimates: list[OdometryEstimate]) -> Triple:
+    return xyyaw(estimates[-1].pose)
+
+
+# SE(2)
+
+
+@given(small_moves)
+def test_roll_is_the_integral_of_a_constant_twist(tangent: Pose) -> None:
+    """As in the textbook."""
+    chord = roll(tangent)
+    expected = arc(tangent.x_m, tangent.y_m, tangent.yaw_rad)
+    assert (chord.x_m, chord.y_m) == pytest.approx(expected, abs=1e-9)
+    assert chord.yaw_rad == tangent.yaw_rad
+
+
+@given(st.builds(Pose, st.floats(-10, 10), st.floats(-10, 10), st.floats(-3.2767, 3.2767)))
+def test_unroll_and_roll_are_inverse(displacement: Pose) -> None:
+    """For every turn that a delta frame can hold."""
+    assert xyyaw(roll(unroll(displacement))) == close(xyyaw(displacement))
+    assert xyyaw(unroll(roll(displacement))) == close(xyyaw(displacement))
+
+
+@pytest.mark.parametrize("turn", [0.0, 5e-324, 1e-300, -1e-300, 1e-9, -1e-9])
+def test_a_turn_of_almost_nothing_is_no_trouble(turn: float) -> None:
+    """No division by zero, no loss of digits."""
+    assert xyyaw(roll(Pose(0.1, 0.2, turn))) == close((0.1, 0.2, turn), 1e-9)
+    assert xyyaw(unroll(Pose(0.1, 0.2, turn))) == close((0.1, 0.2, turn), 1e-9)
+
+
+# Ways
+
+
+def test_straight_ahead_is_x() -> None:
+    """A second of 0.5 m/s."""
+    odometry = Odometry(NOISE)
+    for _ in range(25):
+        estimates = odometry.displace(body(0.02, 0.0), 0.0)
+    assert last(estimates) == close((0.5, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
+def test_a_quarter_circle_to_the_left_ends_at_its_radius(frame: str) -> None:
+    """Radius 1 m in 50 steps, exactly."""
+    odometry, trip = Odometry(NOISE), Trip()
+    odometry.learn_heading(trip.pose)
+    step = math.pi / 2 / 50
+    for _ in range(50):
+        estimates = odometry.displace(trip.move(step, 0.0, step, frame), 0.0)
+    assert last(estimates) == close((1.0, 1.0, math.pi / 2))
+
+
+def test_a_spin_stays_in_place_and_counts_its_turns() -> None:
+    """Yaw is unwrapped."""
+    odometry = Odometry(NOISE)
+    for _ in range(100):
+        estimates = odometry.displace(body(0.0, 0.0, 0.2), 0.0)
+    assert last(estimates) == close((0.0, 0.0, 20.0))
+
+
+@given(st.lists(small_moves, min_size=1, max_size=40), headings, axis_signs)
+@settings(max_examples=200)
+def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
+    moves: list[Pose], initial: float, signs: tuple[int, int, int]
+) -> None:
+    """A board that has driven before, or whose axes point elsewhere, gives the same odometry."""
+    odometry, trip = Odometry(NOISE, signs), Trip(initial, signs)
+    odometry.learn_heading(trip.pose)
+    for number, move in enumerate(moves):
+        estimates = odometry.displace(trip.move(*xyyaw(move)), 0.0)
+        if number % 5 == 4:
+            odometry.learn_heading(trip.pose)
+    assert last(estimates) == close(trip.truth, 1e-8)
+
+
+@given(st.lists(small_moves, min_size=1, max_size=40), axis_signs)
+def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]) -> None:
+    """Each comes out at once, along the true way."""
+    odometry, trip = Odometry(NOISE, signs), Trip(1.0, signs)
+    for move in moves:
+        estimates = odometry.displace(trip.move(*xyyaw(move), "body"), 0.0)
+        assert len(estimates) == 1
+    assert last(estimates) == close(trip.truth, 1e-8)
+    assert not odometry.heading_assumed
+
+
+@given(small_moves, headings, st.sampled_from(["earth", "body"]))
+def test_the_twist_is_the_bodys_over_40_ms(move: Pose, initial: float, frame: str) -> None:
+    """Of a constant twist exactly, in the body's axes, whatever came before."""
+    odometry, trip = Odometry(NOISE), Trip(initial)
+    odometry.learn_heading(trip.pose)
+    for _ in range(3):
+        (estimate,) = odometry.displace(trip.move(*xyyaw(move), frame), 0.0)
+        twist = estimate.twist
+        assert (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps) == close(
+            (move.x_m / 0.04, move.y_m / 0.04, move.yaw_rad / 0.04), 1e-7
+        )
+
+
+def test_every_delta_gives_one_estimate_with_its_own_stamp() -> None:
+    """In order."""
+    odometry = Odometry(NOISE)
+    assert odometry.displace(earth(0.01, 0.0), 1.0) == []
+    assert odometry.displace(earth(0.01, 0.0), 1.04) == []
+    stamps = [estimate.stamp_s for estimate in odometry.learn_heading(heading(0.0))]
+    stamps += [estimate.stamp_s for estimate in odometry.displace(earth(0.01, 0.0), 1.08)]
+    assert stamps == [1.0, 1.04, 1.08]
+
+
+# Heading
+
+
+@given(st.lists(small_moves, min_size=1, max_size=5), headings)
+def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: float) -> None:
+    """And come out with it, turned as if it had come before them."""
+    odometry, trip = Odometry(NOISE), Trip(initial)
+    for move in moves:
+        assert odometry.displace(trip.move(*xyyaw(move)), 0.0) == []
+    estimates = odometry.learn_heading(trip.pose)
+    assert len(estimates) == len(moves)
+    assert last(estimates) == close(trip.truth, 1e-8)
+    assert not odometry.heading_assumed
+
+
+def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
+    """25 deltas come out together, later ones at once."""
+    odometry = Odometry(NOISE)
+    for _ in range(24):
+        assert odometry.displace(earth(0.01, 0.0), 0.0) == []
+    assert not odometry.heading_assumed
+    estimates = odometry.displace(earth(0.01, 0.0), 0.0)
+    assert odometry.heading_assumed
+    assert len(estimates) == 25
+    assert last(estimates) == close((0.25, 0.0, 0.0))
+    assert last(odometry.displace(earth(0.0, 0.01), 0.0)) == close((0.25, 0.01, 0.0))
+
+
+def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
+    """What was driven on the assumption stays; what follows is right."""
+    odometry = Odometry(NOISE)
+    for _ in range(25):
+        odometry.displace(earth(0.0, 0.0), 0.0)
+    odometry.learn_heading(heading(math.pi / 2))
+    odometry.learn_heading(heading(math.pi / 2))
+    assert last(odometry.displace(earth(0.0, 0.1), 0.0)) == close((0.1, 0.0, 0.0))
+
+
+@given(st.floats(0.15, 6.1), headings)
+def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
+    """One damaged pose does not turn the odometry; two that agree do."""
+    odometry = Odometry(NOISE)
+    odometry.learn_heading(heading(initial))
+    c, s = math.cos(initial), math.sin(initial)
+    odometry.learn_heading(heading(initial + surprise))
+    assert last(odometry.displace(earth(c, s), 0.0)) == close((1.0, 0.0, 0.0))
+    odometry.learn_heading(heading(initial))
+    odometry.learn_heading(heading(initial + surprise))
+    assert last(odometry.displace(earth(c, s), 0.0)) == close((2.0, 0.0, 0.0))
+    odometry.learn_heading(heading(initial + surprise))
+    c, s = math.cos(initial + surprise), math.sin(initial + surprise)
+    assert last(odometry.displace(earth(c, s), 0.0)) == close((3.0, 0.0, 0.0))
+
+
+def test_two_surprising_poses_that_disagree_confirm_nothing() -> None:
+    """Each is damaged in its own way."""
+    odometry = Odometry(NOISE)
+    for yaw in (0.0, 1.0, 2.0, -1.0):
+        odometry.learn_heading(heading(yaw))
+    assert last(odometry.displace(earth(1.0, 0.0), 0.0)) == close((1.0, 0.0, 0.0))
+
+
+def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> None:
+    """From +π to −π is no jump."""
+    odometry = Odometry(NOISE)
+    odometry.learn_heading(heading(math.pi - 0.01))
+    odometry.displace(earth(0.0, 0.0, 0.02), 0.0)
+    odometry.learn_heading(heading(-math.pi + 0.05))
+    ahead = earth(math.cos(-math.pi + 0.05), math.sin(-math.pi + 0.05))
+    assert last(odometry.displace(ahead, 0.0)) == close((math.cos(0.02), math.sin(0.02), 0.02))
+
+
+def test_small_errors_of_the_summed_heading_are_corrected_by_each_pose() -> None:
+    """The heading of the board's earth frame is the pose's, not the sum of rounded turns."""
+    odometry = Odometry(NOISE)
+    odometry.learn_heading(heading(0.0))
+    odometry.learn_heading(heading(0.05))
+    c, s = math.cos(0.05), math.sin(0.05)
+    assert last(odometry.displace(earth(c, s), 0.0)) == close((1.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
+    """Before the first good one, and after it."""
+    odometry = Odometry(NOISE)
+    odometry.displace(earth(0.0, 0.1), 0.0)
+    assert odometry.learn_heading(PoseReading(0.0, 0.0, bad)) == []
+    assert len(odometry.learn_heading(heading(math.pi / 2))) == 1
+    odometry.learn_heading(PoseReading(0.0, 0.0, bad))
+    odometry.learn_heading(PoseReading(0.0, 0.0, bad))
+    assert last(odometry.displace(earth(0.0, 0.1), 0.0)) == close((0.2, 0.0, 0.0))
+
+
+# Attaching and resetting
+
+
+@given(
+    st.lists(small_moves, min_size=1, max_size=8),
+    st.lists(small_moves, min_size=1, max_size=8),
+    headings,
+    axis_signs,
+)
+def test_attaching_again_goes_on_from_here(
+    before: list[Pose], after: list[Pose], initial: float, signs: tuple[int, int, int]
+) -> None:
+    """A board that restarts counts from zero; the odometry knows no seam."""
+    odometry, first = Odometry(NOISE, signs), Trip(initial, signs)
+    odometry.learn_heading(first.pose)
+    for move in before:
+        odometry.displace(first.move(*xyyaw(move)), 0.0)
+    odometry.attach()
+    second = Trip(0.0, signs)
+    second.truth = first.truth
+    for move in after:
+        assert odometry.displace(second.move(*xyyaw(move)), 0.0) == []
+    assert last(odometry.learn_heading(second.pose)) == close(second.truth, 1e-8)
+
+
+def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
+    """Pose and covariance; forward is forward afterwards too."""
+    odometry, trip = Odometry(NOISE), Trip(0.7)
+    odometry.learn_heading(trip.pose)
+    for _ in range(10):
+        odometry.displace(trip.move(0.02, 0.01, 0.1), 0.0)
+    odometry.reset()
+    (estimate,) = odometry.displace(trip.move(0.0, 0.0, 0.0), 0.0)
+    assert xyyaw(estimate.pose) == close((0.0, 0.0, 0.0))
+    assert estimate.covariance == Covariance()
+    odometry.learn_heading(trip.pose)
+    assert last(odometry.displace(trip.move(0.1, 0.0, 0.0), 0.0)) == close((0.1, 0.0, 0.0))
+
+
+def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> None:
+    """Also where it still waited for the board's first pose."""
+    odometry, trip = Odometry(NOISE), Trip(0.7)
+    for _ in range(3):
+        odometry.displace(trip.move(0.02, 0.0, 0.1), 0.0)
+    odometry.reset()
+    reading = trip.move(0.01, 0.0, 0.0)
+    estimates = odometry.displace(reading, 0.0) + odometry.learn_heading(trip.pose)
+    assert last(estimates) == close((0.01, 0.0, 0.0))
+
+
+# Covariance
+
+
+def minors(c: Covariance) -> Triple:
+    """The leading principal minors: all positive exactly for a positive definite matrix."""
+    first = c.xx
+    second = c.xx * c.yy - c.xy**2
+    third = (
+        c.xx * (c.yy * c.yaw_yaw - c.y_yaw**2)
+        - c.xy * (c.xy * c.yaw_yaw - c.y_yaw * c.x_yaw)
+        + c.x_yaw * (c.xy * c.y_yaw - c.yy * c.x_yaw)
+    )
+    return first, second, third
+
+
+@given(st.lists(displacements("body"), max_size=60))
+def test_the_covariance_is_positive_definite_and_grows(readings: list[DisplacementReading]) -> None:
+    """Its volume and the variance of the yaw never shrink: nothing corrects dead reckoning."""
+    odometry, before = Odometry(NOISE), Covariance()
+    for reading in readings:
+        (estimate,) = odometry.displace(reading, 0.0)
+        now = estimate.covariance
+        assert min(minors(now)) > 0
+        assert now.yaw_yaw >= before.yaw_yaw
+        assert minors(now)[2] >= minors(before)[2] * (1 - 1e-6)
+        before = now
+
+
+def test_a_robot_at_rest_grows_no_less_sure() -> None:
+    """No way, no slip."""
+    odometry = Odometry(NOISE)
+    for _ in range(100):
+        (estimate,) = odometry.displace(body(0.0, 0.0), 0.0)
+    assert estimate.covariance == Covariance()
+
+
+def test_the_covariance_is_a_random_walk_over_the_way() -> None:
+    """After 1 m the deviations are those of the settings, whatever the step."""
+    noise = OdometryNoise(m_per_sqrt_m=0.03, rad_per_sqrt_m=0.0, rad_per_sqrt_rad=0.05)
+    for steps in (10, 100):
+        odometry = Odometry(noise)
+        for _ in range(steps):
+            (ahead,) = odometry.displace(body(1.0 / steps, 0.0), 0.0)
+        assert ahead.covariance.xx == pytest.approx(0.03**2 + 1e-6, rel=0.01)
+        odometry.reset()
+        for _ in range(steps):
+            (turned,) = odometry.displace(body(0.0, 0.0, -1.0 / steps), 0.0)
+        assert turned.covariance.yaw_yaw == pytest.approx(0.05**2 + 1e-6, rel=0.01)
+
+
+def test_a_doubtful_heading_makes_the_way_doubtful_across_it() -> None:
+    """Sampled: 2000 robots with random yaw errors spread as the covariance says."""
+    random, yaw_deviation = Random(1), 0.02
+    noise = OdometryNoise(m_per_sqrt_m=1e-6, rad_per_sqrt_m=yaw_deviation, rad_per_sqrt_rad=1e-6)
+    odometry = Odometry(noise)
+    for _ in range(20):
+        (estimate,) = odometry.displace(body(0.1, 0.0), 0.0)
+    across, yaws = [], []
+    for _ in range(2000):
+        y, yaw = 0.0, random.gauss(0.0, 1e-3)
+        for _ in range(20):
+            y += 0.1 * math.sin(yaw)
+            yaw += random.gauss(0.0, yaw_deviation * math.sqrt(0.1))
+        across.append(y)
+        yaws.append(yaw)
+    covariance = estimate.covariance
+    n = len(across)
+    assert covariance.yy == pytest.approx(sum(y * y for y in across) / n, rel=0.15)
+    assert covariance.yaw_yaw == pytest.approx(sum(yaw * yaw for yaw in yaws) / n, rel=0.15)
+    mixed = sum(y * yaw for y, yaw in zip(across, yaws, strict=True)) / n
+    assert covariance.y_yaw == pytest.approx(mixed, rel=0.15)
+
+
+# Against the simulated board
+
+
+def drive(board: SimulatedBoard, seed: int) -> tuple[list[OdometryEstimate], Odometry]:
+    """Twelve seconds of smooth curves and a stop, through the wire."""
+    settings_ = board.settings
+    bot = OmniBot(OmniBotSettings(delta_frame=settings_.frame))
+    odometry, estimates, random = Odometry(NOISE), [], Random(seed)
+    phases = [random.uniform(0, math.tau) for _ in range(3)]
+    for tick in range(1400):
+        if tick % 5 == 0:
+            t, drives = tick / 100, tick < 1200
+            command = [
+                drives * size * math.sin(t * speed + phase)
+                for size, speed, phase in zip((30, 30, 240), (0.9, 1.3, 0.5), phases, strict=True)
+            ]
+            words = [round(value) & 0xFFFF for value in command]
+            data = bytes.fromhex("FF FE 01") + b"".join(word.to_bytes(2, "big") for word in words)
+            board.receive(data)
+        for reading in bot.receive(board.step(), tick / 100):
+            if isinstance(reading, DisplacementReading):
+                estimates += odometry.displace(reading, tick / 100)
+            elif isinstance(reading, PoseReading):
+                estimates += odometry.learn_heading(reading)
+    return estimates, odometry
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("frame", ["earth", "body"])
+@pytest.mark.parametrize(
+    "initial", [BoardPose(), BoardPose(1000.0, -500.0, 2000.0), BoardPose(0.0, 9e3, -7000.0)]
+)
+def test_the_odometry_is_the_truth_of_the_simulated_robot(
+    frame: str, initial: BoardPose, seed: int
+) -> None:
+    """Metres of curves end within 5 mm and 3 mrad, also on a board that has driven before."""
+    board = SimulatedBoard(
+        BoardSettings(seed=seed, frame=frame, initial_pose=initial, running=True)
+    )
+    estimates, odometry = drive(board, seed)
+    truth = board.truth
+    way = sum(math.hypot(e.twist.vx_mps, e.twist.vy_mps) * PERIOD_S for e in estimates)
+    assert len(estimates) == 350
+    assert way > 2.0
+    assert not odometry.heading_assumed
+    pose = estimates[-1].pose
+    assert math.hypot(pose.x_m - truth.x_m, pose.y_m - truth.y_m) < 0.005
+    assert pose.yaw_rad == pytest.approx(truth.yaw_rad, abs=0.003)
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
+def test_the_twist_is_the_velocity_of_the_simulated_robot(frame: str) -> None:
+    """Forward, left and turning at once, on a board whose heading is a quarter turn."""
+    board = SimulatedBoard(
+        BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 1571.0), running=True)
+    )
+    bot, odometry = OmniBot(OmniBotSettings(delta_frame=board.settings.frame)), Odometry(NOISE)
+    board.receive(bytes.fromhex("FF FE 01 00 15 00 0E 00 C8"))  # 0.3 m/s, 0.2 m/s, 0.4 rad/s
+    twists = []
+    for tick in range(600):
+        for reading in bot.receive(board.step(), tick / 100):
+            if isinstance(reading, DisplacementReading):
+                twists += [e.twist for e in odometry.displace(reading, 0.0)]
+            elif isinstance(reading, PoseReading):
+                twists += [e.twist for e in odometry.learn_heading(reading)]
+    settled = twists[-100:]
+    mean = [
+        sum(getattr(twist, name) for twist in settled) / 100
+        for name in ("vx_mps", "vy_mps", "yaw_rate_radps")
+    ]
+    assert mean == pytest.approx([0.3, 0.2, 0.4], abs=0.003)
