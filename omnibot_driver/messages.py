@@ -20,7 +20,7 @@ from omnibot_driver.core.odometry import OdometryEstimate
 from omnibot_driver.core.session import ImuEstimate
 
 UNMEASURED_VARIANCE: Final = 1e6
-"""For z, roll and pitch, which a planar odometry says nothing of."""
+"""For z, roll and pitch, of which a planar odometry says nothing, and for a twist not known."""
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 
 
@@ -82,9 +82,11 @@ def odometry_message(
         covariance.y_yaw,
         covariance.yaw_yaw,
     )
-    message.twist.twist.linear = Vector3(x=twist.vx_mps, y=twist.vy_mps, z=0.0)
-    message.twist.twist.angular = Vector3(x=0.0, y=0.0, z=twist.yaw_rate_radps)
-    linear, angular = settings.twist_linear_stddev**2, settings.twist_angular_stddev**2
+    linear = angular = UNMEASURED_VARIANCE
+    if twist is not None:
+        message.twist.twist.linear = Vector3(x=twist.vx_mps, y=twist.vy_mps, z=0.0)
+        message.twist.twist.angular = Vector3(x=0.0, y=0.0, z=twist.yaw_rate_radps)
+        linear, angular = settings.twist_linear_stddev**2, settings.twist_angular_stddev**2
     message.twist.covariance = _planar(linear, 0.0, 0.0, linear, 0.0, angular)
     return message
 

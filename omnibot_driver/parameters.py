@@ -56,7 +56,7 @@ class Parameter:
         if type(value) is not type(self.default):
             raise self._refusal(value, f"a value of type {type(self.default).__name__}")
         if isinstance(value, list):
-            if len(value) != 3 or any(abs(item) != 1 for item in value):
+            if len(value) != 3 or any(item not in (1, -1) for item in value):
                 raise self._refusal(value, "three numbers, each 1 or -1")
             return [int(item) for item in value]
         assert isinstance(value, bool | int | float | str)

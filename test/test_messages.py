@@ -51,6 +51,15 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
     assert twist[5, 5] == pytest.approx(0.02**2)
 
 
+def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> None:
+    """The first displacement after a pause holds all motion since, nobody knows how fast."""
+    message = messages.odometry_message(
+        OdometryEstimate(0.0, Pose(), None, Covariance()), STAMP, SETTINGS
+    )
+    assert message.twist.twist.linear.x == 0.0
+    assert message.twist.covariance[[0, 7, 35]].tolist() == [messages.UNMEASURED_VARIANCE] * 3
+
+
 def test_an_imu_message_has_no_orientation() -> None:
     """REP-145: the first element of its covariance is -1; force and rate are as measured."""
     estimate = ImuEstimate(0.0, (1.0, 2.0, -9.8), (0.1, 0.2, 0.3))

@@ -38,13 +38,16 @@ class ImuReading:
 
 @dataclass(frozen=True, slots=True)
 class DisplacementReading:
-    """Motion during the last ``duration_s``; ``lost`` frames of this kind are missing before it."""
+    """Motion during the last ``duration_s``; ``lost`` frames of this kind are missing before it.
+
+    ``duration_s`` is None where nobody knows it: the first after a pause holds all motion since.
+    """
 
     dx_m: float
     dy_m: float
     dyaw_rad: float
     frame: Literal["earth", "body"]
-    duration_s: float
+    duration_s: float | None
     lost: int
 
 

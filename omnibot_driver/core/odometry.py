@@ -41,6 +41,10 @@ class Pose:
         way = displacement.turned(self.yaw_rad)
         return Pose(self.x_m + way.x_m, self.y_m + way.y_m, self.yaw_rad + way.yaw_rad)
 
+    def over(self, duration_s: float) -> BodyTwist:
+        """The constant twist that makes this tangent in this time."""
+        return BodyTwist(self.x_m / duration_s, self.y_m / duration_s, self.yaw_rad / duration_s)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryNoise:
@@ -85,11 +89,14 @@ class Covariance:
 
 @dataclass(frozen=True, slots=True)
 class OdometryEstimate:
-    """At ``stamp_s``: pose and covariance in the odometry frame, twist in the body's."""
+    """At ``stamp_s``: pose and covariance in the odometry frame, twist in the body's.
+
+    ``twist`` is None where the time that the displacement took is not known.
+    """
 
     stamp_s: float
     pose: Pose
-    twist: BodyTwist
+    twist: BodyTwist | None
     covariance: Covariance
 
 
@@ -128,18 +135,19 @@ class Odometry:
         """The odometry frame begins where the robot stands."""
         self._pose = Pose()
         self._covariance = Covariance()
+        self._waiting: list[tuple[DisplacementReading, float]] = []
 
     def attach(self) -> None:
         """The board's earth frame may be another one from now on; our pose goes on from here."""
         self._board_yaw_rad: float | None = None
         self._doubted_rad: float | None = None
-        self._waiting: list[tuple[DisplacementReading, float]] = []
+        self._waiting = []
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
         """The estimates that this displacement completes: none while the heading is unknown."""
         self._waiting.append((reading, stamp_s))
         if reading.frame == "earth" and self._board_yaw_rad is None:
-            if sum(waiting.duration_s for waiting, _ in self._waiting) < LONGEST_WAIT_S:
+            if sum(waiting.duration_s or 0.0 for waiting, _ in self._waiting) < LONGEST_WAIT_S:
                 return []
             self.heading_assumed = True
             self._board_yaw_rad = 0.0
@@ -176,8 +184,7 @@ class Odometry:
         self._covariance = self._covariance.moved(
             self._pose.x_m - before.x_m, self._pose.y_m - before.y_m, tangent.yaw_rad, self.noise
         )
-        rate = 1.0 / reading.duration_s
-        twist = BodyTwist(tangent.x_m * rate, tangent.y_m * rate, tangent.yaw_rad * rate)
+        twist = tangent.over(reading.duration_s) if reading.duration_s else None
         return OdometryEstimate(stamp_s, self._pose, twist, self._covariance)
 
 

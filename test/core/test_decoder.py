@@ -257,6 +257,12 @@ def test_one_whole_text_is_enough_to_believe() -> None:
     assert FrameDecoder().feed(b"used: 3 \nPaused: 4 \n", 0.0) == [PausedFrame(4)]
 
 
+def test_two_frames_with_nonsense_behind_them_are_not_believed() -> None:
+    """Out of step, what follows speaks against them all."""
+    look_alike = encode(DeltaFrame(1, 2, 3, 4)) + encode(DeltaFrame(5, 6, 7, 8))
+    assert decoded([look_alike + b"\x00" + LEAD_IN * 2]) == [REST] * 4
+
+
 @pytest.mark.parametrize("start", range(12))
 def test_a_paused_board_is_understood_from_the_first_whole_text(start: int) -> None:
     """Starting anywhere within a text."""

@@ -394,26 +394,24 @@ def test_the_covariance_is_a_random_walk_over_the_way() -> None:
 
 
 def test_a_doubtful_heading_makes_the_way_doubtful_across_it() -> None:
-    """Sampled: 2000 robots with random yaw errors spread as the covariance says."""
-    random, yaw_deviation = Random(1), 0.02
-    noise = OdometryNoise(m_per_sqrt_m=1e-6, rad_per_sqrt_m=yaw_deviation, rad_per_sqrt_rad=1e-6)
+    """Sampled: 4000 robots with random yaw errors are spread as the covariance says."""
+    random, deviation, n = Random(1), 0.02, 4000
+    noise = OdometryNoise(m_per_sqrt_m=1e-6, rad_per_sqrt_m=deviation, rad_per_sqrt_rad=1e-6)
     odometry = Odometry(noise)
     for _ in range(20):
-        (estimate,) = odometry.displace(body(0.1, 0.0), 0.0)
-    across, yaws = [], []
-    for _ in range(2000):
-        y, yaw = 0.0, random.gauss(0.0, 1e-3)
+        (estimate,) = odometry.displace(body(0.08, 0.06), 0.0)
+    ends = []
+    for _ in range(n):
+        x, y, yaw = 0.0, 0.0, random.gauss(0.0, 1e-3)
         for _ in range(20):
-            y += 0.1 * math.sin(yaw)
-            yaw += random.gauss(0.0, yaw_deviation * math.sqrt(0.1))
-        across.append(y)
-        yaws.append(yaw)
-    covariance = estimate.covariance
-    n = len(across)
-    assert covariance.yy == pytest.approx(sum(y * y for y in across) / n, rel=0.15)
-    assert covariance.yaw_yaw == pytest.approx(sum(yaw * yaw for yaw in yaws) / n, rel=0.15)
-    mixed = sum(y * yaw for y, yaw in zip(across, yaws, strict=True)) / n
-    assert covariance.y_yaw == pytest.approx(mixed, rel=0.15)
+            c, s = math.cos(yaw), math.sin(yaw)
+            x, y = x + 0.08 * c - 0.06 * s, y + 0.08 * s + 0.06 * c
+            yaw += random.gauss(0.0, deviation * math.sqrt(0.1))
+        ends.append((x - 1.6, y - 1.2, yaw))
+    pairs = {"xx": (0, 0), "xy": (0, 1), "x_yaw": (0, 2), "yy": (1, 1), "y_yaw": (1, 2)}
+    for name, (i, j) in {**pairs, "yaw_yaw": (2, 2)}.items():
+        sampled = sum(end[i] * end[j] for end in ends) / n
+        assert getattr(estimate.covariance, name) == pytest.approx(sampled, rel=0.1), name
 
 
 # Against the simulated board

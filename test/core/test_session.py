@@ -505,6 +505,21 @@ def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench)
     assert 1 <= len(losses) <= 2
 
 
+def test_motion_during_a_pause_moves_the_pose_and_is_no_speed(bench: Bench) -> None:
+    """The robot rolled to a halt while nobody was told; afterwards it stands."""
+    bench.drive(0.5)
+    bench.run(0.4)
+    bench.board.receive(b"P")
+    count = len(bench.odometry)
+    bench.run_until_state("paused")
+    bench.run_until_state("nominal")
+    bench.run(1.0)
+    after = bench.odometry[count:]
+    assert after[0].twist is None
+    assert all(abs(item.twist.vx_mps) < 0.01 for item in after[1:] if item.twist)
+    assert after[-1].pose.x_m == pytest.approx(bench.board.truth.x_m, abs=2e-3)
+
+
 @pytest.mark.parametrize("signs", list(itertools.product([1, -1], repeat=3)))
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(

@@ -105,8 +105,8 @@ def test_colcon_installs_what_ros2_looks_for(prefix: Path) -> None:
         assert (prefix / "share" / name).is_file(), name
 
 
-def test_colcon_installs_the_two_executables(prefix: Path) -> None:
-    """`ros2 run` offers every executable file in lib/omnibot_driver: demo, driver, simulator, no more."""
+def test_colcon_installs_the_executables(prefix: Path) -> None:
+    """`ros2 run` offers every executable file in lib/omnibot_driver: these and no more."""
     files = list((prefix / "lib" / PACKAGE).iterdir())
     assert {file.name for file in files} == {"demo", "driver", "simulator"}
     assert all(os.access(file, os.X_OK) for file in files)

@@ -17,7 +17,7 @@ from omnibot_driver.core.board import (
     Reading,
     Vector3,
 )
-from omnibot_driver.core.imu import ImuScale
+from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, ImuScale
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import to_words
 from omnibot_driver.core.omnibot import frames
@@ -69,9 +69,12 @@ class OmniBot:
 
     def connect(self) -> None:
         """A new line: a new decoder, and no belief."""
-        self._decoder = FrameDecoder(self.settings.pose_byte_order)
+        self._decoder = FrameDecoder(
+            self.settings.pose_byte_order, ACCEL_COUNTS_PER_G[self.settings.imu.accel_range_g]
+        )
         self._modes = ModeTracker()
         self._seq: int | None = None
+        self._paused = False
 
     @property
     def mode(self) -> Mode:
@@ -142,18 +145,19 @@ class OmniBot:
                 scale = self.settings.imu
                 return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro))
             case DeltaFrame(dx, dy, dtheta, seq):
+                after_pause, self._paused = self._paused, False
                 return DisplacementReading(
                     dx_m=dx * DELTA_LSB_M,
                     dy_m=dy * DELTA_LSB_M,
                     dyaw_rad=dtheta * DELTA_LSB_RAD,
                     frame=self.settings.delta_frame,
-                    duration_s=DELTA_PERIOD_S,
+                    duration_s=None if after_pause else DELTA_PERIOD_S,
                     lost=self._count_lost(seq),
                 )
             case PoseFrame(x, y, theta, _):
                 return PoseReading(x * POSE_LSB_M, y * POSE_LSB_M, theta * POSE_LSB_RAD)
             case _:
-                self._seq = None
+                self._seq, self._paused = None, True
                 return PausedReading()
 
     def _count_lost(self, seq: int) -> int:

@@ -22,9 +22,12 @@ from omnibot_driver.core.omnibot.frames import (
     INCOMPLETE,
     NO_FRAME,
     ByteOrder,
+    DeltaFrame,
     Frame,
     ImuFrame,
     PausedFrame,
+    PoseFrame,
+    Words,
     decode_measured,
     measure,
 )
@@ -37,8 +40,13 @@ IDLE_S: Final = 0.1
 TICK_BYTES: Final = 14 + 9 + 15
 """All that one tick can bring. More at once after a pause means that we were late, not the line."""
 
-MIN_GRAVITY_COUNTS: Final = 1024
-"""Half of 1 g in the coarsest range (16 g, 2048 counts per g)."""
+FARTHEST_POSE: Final = 1e7
+"""Poses are in mm and mrad: beyond 10 km, or 1600 turns, a pose is other bytes misread."""
+IMU_HEADER_WORD: Final = -6
+"""FF FA, read as a signed word."""
+DEAD_SENSOR: Final = (0, 0, 0)
+LARGEST_DELTA: Final = 4000
+"""Deltas are in 0.1 mm and 0.1 mrad: 10 m/s or 10 rad/s."""
 
 
 @dataclass(slots=True)
@@ -54,9 +62,12 @@ class DecoderStatistics:
 class FrameDecoder:
     """Feed it what the line brings, in any chunking; it returns the frames that were in it."""
 
-    def __init__(self, pose_byte_order: ByteOrder = "big") -> None:
+    def __init__(
+        self, pose_byte_order: ByteOrder = "big", accel_counts_per_g: float = 16384.0
+    ) -> None:
         self.statistics = DecoderStatistics()
         self._pose_byte_order: ByteOrder = pose_byte_order
+        self._half_g_counts = accel_counts_per_g / 2
         self._held = bytearray()
         self._in_step = False
         self._last_arrival_s: float | None = None
@@ -119,6 +130,8 @@ class FrameDecoder:
         end = at + length
         if length <= 0:
             return length
+        if self._look_alike(self._decode(at, length)):
+            return NO_FRAME
         if end < len(self._held):
             return length if measure(self._held, end) != NO_FRAME else NO_FRAME
         return INCOMPLETE if self._held[-1] == 0xFF else length
@@ -138,17 +151,42 @@ class FrameDecoder:
             length = measure(self._held, at) if at < len(self._held) else INCOMPLETE
             if length == INCOMPLETE:
                 return None
-            if length == NO_FRAME or not self._plausible(at, length):
+            if length == NO_FRAME:
                 return False
-            if isinstance(self._decode(at, length), PausedFrame):
+            frame = self._decode(at, length)
+            if isinstance(frame, PausedFrame):
                 return True
+            if not self._convincing(frame):
+                return False
             at += length
         return at == len(self._held) or measure(self._held, at) != NO_FRAME
 
-    def _plausible(self, at: int, length: int) -> bool:
-        """Only asked out of step: in step, a true shock or a free fall must be delivered."""
-        frame = self._decode(at, length)
-        return not isinstance(frame, ImuFrame) or math.hypot(*frame.accel) >= MIN_GRAVITY_COUNTS
+    def _look_alike(self, frame: Frame) -> bool:
+        """Bytes of other frames that can only look like this one.
+
+        In a run of IMU frames a gyro that reads -6 makes a second, shifted run. Its frames have no
+        weight, since the gyro stands where the accelerometer should, and the true header in it.
+        """
+        match frame:
+            case ImuFrame(accel, _):
+                return IMU_HEADER_WORD in accel and self._weightless(accel)
+            case PoseFrame(x, y, theta, _):
+                return not all(abs(value) <= FARTHEST_POSE for value in (x, y, theta))
+            case _:
+                return False
+
+    def _convincing(self, frame: Frame) -> bool:
+        """Enough to step in with. In step, a shock, a free fall or a dead sensor is delivered."""
+        match frame:
+            case ImuFrame(accel, _):
+                return not self._weightless(accel) or accel == DEAD_SENSOR
+            case DeltaFrame(dx, dy, dtheta, _):
+                return max(abs(dx), abs(dy), abs(dtheta)) <= LARGEST_DELTA
+            case _:
+                return not self._look_alike(frame)
+
+    def _weightless(self, accel: Words) -> bool:
+        return math.hypot(*accel) < self._half_g_counts
 
     def _take(self, at: int, length: int) -> Frame:
         self.statistics.frames += 1
