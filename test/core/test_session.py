@@ -509,10 +509,10 @@ def test_motion_during_a_pause_moves_the_pose_and_is_no_speed(bench: Bench) -> N
     """The robot rolled to a halt while nobody was told; afterwards it stands."""
     bench.drive(0.5)
     bench.run(0.4)
-    bench.board.receive(b"P")
+    bench.ask(Request.PAUSE, 5.0)
     count = len(bench.odometry)
-    bench.run_until_state("paused")
-    bench.run_until_state("nominal")
+    bench.run(1.0)
+    bench.ask(Request.START, 5.0)
     bench.run(1.0)
     after = bench.odometry[count:]
     assert after[0].twist is None
