@@ -14,6 +14,8 @@ SITE_PACKAGES := import sysconfig; print(sysconfig.get_path("purelib"))
 NO_WHEELS = There are no ROS 2 Jazzy wheels for this machine's Python (PyPI has them for CPython \
   3.11 to 3.13 on x86-64 Linux): please install Jazzy, \
   https://docs.ros.org/en/jazzy/Installation.html, and build this package there with colcon.
+NO_PYTHON = There is no $(PYTHON) here: please install Python 3.12, or name another one with \
+  make PYTHON=...
 NO_VENV = $(PYTHON) cannot create virtual environments: please install its venv module (on Debian \
   and Ubuntu: apt install $(notdir $(PYTHON))-venv) and run make again.
 
@@ -54,6 +56,7 @@ clean:  ## remove .venv and everything else that was generated
 $(shell test -x $(PY) || rm -f $(VENV)/.runtime)
 
 $(VENV)/.runtime: requirements/runtime.txt
+	@command -v $(PYTHON) >/dev/null || { echo "$(NO_PYTHON)" >&2; exit 1; }
 	@$(PYTHON) -c '$(HAS_WHEELS)' 2>/dev/null || { echo "$(NO_WHEELS)" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "$(NO_VENV)" >&2; exit 1; }
 	@echo "[1/2] creating $(VENV) with $$($(PYTHON) --version)"

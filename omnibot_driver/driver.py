@@ -4,15 +4,20 @@ import os
 import signal
 import sys
 import threading
+from typing import Final
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
 
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.node import OmniBotDriver
+
+STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM)
+USAGE: Final = "parameters are given like this: --ros-args -p port:=/dev/ttyUSB0"
 
 
 class Ending:
@@ -27,7 +32,7 @@ class Ending:
         self._wakes, self._wake = os.pipe()
         os.set_blocking(self._wake, False)
         signal.set_wakeup_fd(self._wake, warn_on_full_buffer=False)
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in STOPPED_BY:
             signal.signal(number, lambda *_: None)
 
     def begin(self, defect: BaseException | None = None) -> None:
@@ -47,6 +52,10 @@ def main(args: list[str] | None = None) -> int:
     thread only waits, so a signal is heard however busy the executor is, and a second one cannot
     break into the shutdown.
     """
+    unknown = remove_ros_args(args if args is not None else sys.argv)[1:]
+    if unknown:
+        print(f"omnibot_driver does not know {' '.join(unknown)}; {USAGE}", file=sys.stderr)
+        return 2
     ending = Ending()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -57,6 +66,8 @@ def main(args: list[str] | None = None) -> int:
         return 2
     finally:
         rclpy.try_shutdown()
+        for number in STOPPED_BY:  # while Python ends, a late ctrl-C would kill it
+            signal.signal(number, signal.SIG_IGN)
     return 0 if ending.defect is None else 1
 
 

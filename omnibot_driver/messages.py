@@ -16,6 +16,7 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
 
 from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.limits import require_finite
 from omnibot_driver.core.odometry import OdometryEstimate
 from omnibot_driver.core.session import ImuEstimate
 
@@ -92,13 +93,14 @@ def odometry_message(
 
 
 def body_twist(twist: Any) -> BodyTwist:
-    """The planar part of a geometry_msgs/Twist; NaN or infinity anywhere makes all of it NaN.
+    """The planar part of a geometry_msgs/Twist.
 
-    A publisher that says nonsense of one axis is not to be trusted with the others.
+    Raises CommandRefused for NaN or infinity anywhere in it: a publisher that says nonsense of one
+    axis is not to be trusted with the others.
     """
-    unused = (twist.linear.z, twist.angular.x, twist.angular.y)
-    if not all(map(math.isfinite, unused)):
-        return BodyTwist(math.nan, math.nan, math.nan)
+    linear, angular = twist.linear, twist.angular
+    values = (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+    require_finite("cmd_vel", values)
     return BodyTwist(twist.linear.x, twist.linear.y, twist.angular.z)
 
 

@@ -210,8 +210,7 @@ class OmniBotDriver(Node):
         self.create_service(Trigger, "~/reset", self._on_reset, callback_group=waiting)
 
     def _on_twist(self, twist: Twist) -> None:
-        wanted = messages.body_twist(twist)
-        self._command(lambda session, now: session.command_twist(wanted, now))
+        self._command(lambda session, now: session.command_twist(messages.body_twist(twist), now))
 
     def _on_wheels(self, wheels: Float32MultiArray) -> None:
         self._command(lambda session, now: session.command_wheels(wheels.data, now))

@@ -298,7 +298,10 @@ def check_all(given: Mapping[str, object]) -> dict[str, Value]:
     for name in given:
         if name not in BY_NAME:
             nearest = difflib.get_close_matches(name, BY_NAME, n=1, cutoff=0.0)[0]
-            raise ParameterError(f"there is no parameter '{name}'; did you mean '{nearest}'?")
+            raise ParameterError(
+                f"there is no parameter '{name}'; the nearest is '{nearest}'"
+                " (config/driver.yaml has them all)"
+            )
     return {
         parameter.name: parameter.check(given.get(parameter.name, parameter.default))
         for parameter in PARAMETERS

@@ -5,6 +5,7 @@ It knows no threads and no board.
 """
 
 import errno
+import termios
 from typing import Final
 
 import serial
@@ -67,11 +68,16 @@ class Port:
 def _explain(url: str, error: OSError | ValueError) -> str:
     """What is wrong with this port, and what to do."""
     code = error.errno if isinstance(error, OSError) else None
-    if isinstance(error, ValueError):
+    # pyserial words some errors anew without their number; where it stumbled is in the context.
+    if isinstance(error, ValueError) or isinstance(
+        error.__context__, TypeError | ValueError | LookupError
+    ):
         return (
-            f"port '{url}' is not understood ({error}): give a device like /dev/ttyUSB0"
+            f"port '{url}' is not understood: give a device like /dev/ttyUSB0"
             " or a pyserial URL like socket://host:port"
         )
+    if isinstance(error.__context__, termios.error):
+        return f"{url} is no serial port: `ls /dev/serial/by-id/` shows what is; set `port`"
     if code == errno.ENOENT:
         return (
             f"{url} does not exist: plug the board in, look it up with `ls /dev/serial/by-id/`"

@@ -90,7 +90,8 @@ class Session:
         self._odometry = Odometry(settings.noise, axis_signs)
         self._axis_signs = axis_signs
         self._limits = settings.limits
-        self._heard_at = -math.inf
+        self._heard_at = self._came_at = -math.inf
+        self._silent = False
         self._heading_assumed = False
         self._lost = 0
         self._lost_told_at = -math.inf
@@ -114,7 +115,7 @@ class Session:
         """When ``tick`` must be called at the latest; infinity when nothing is due."""
         if self._closed:
             return math.inf
-        silent_at = math.inf if self._board.mode is Mode.UNKNOWN else self._heard_at + SILENCE_S
+        silent_at = math.inf if self._silent else self._heard_at + SILENCE_S
         return min(silent_at, self._supervisor.wake_at, self._commands.wake_at)
 
     # What happens
@@ -129,6 +130,7 @@ class Session:
         """The port is open."""
         self._board.connect()
         self._start_anew()
+        self._silent, self._heard_at, self._came_at = False, now, -math.inf
         self._supervisor.opened(now)
         if self.estop_active:
             self._commands.latch()
@@ -141,6 +143,7 @@ class Session:
 
     def receive(self, data: bytes, now: float) -> None:
         """Bytes came in at ``now``."""
+        self._came_at = now
         was_running = self._board.mode.running
         self._take_in(self._board.receive(data, now), now)
         if self._board.mode.running and not was_running:
@@ -148,11 +151,14 @@ class Session:
 
     def tick(self, now: float) -> None:
         """Time passed."""
-        if self._board.mode is not Mode.UNKNOWN and now - self._heard_at >= SILENCE_S:
-            self._board.silence()
-            self._start_anew()
-            self._commands.halt(now)
-            self._supervisor.heard_nothing(now)
+        if not self._silent and now - self._heard_at >= SILENCE_S:
+            self._silent = True
+            self._events.append(Notice(self._why_silent()))
+            if self._board.mode is not Mode.UNKNOWN:
+                self._board.silence()
+                self._start_anew()
+                self._commands.halt(now)
+                self._supervisor.heard_nothing(now)
         self._supervisor.tick(now)
 
     # What is wanted
@@ -243,7 +249,7 @@ class Session:
     def _take_in(self, readings: list[Reading], now: float) -> None:
         if not readings:
             return
-        self._heard_at = now
+        self._heard_at, self._silent = now, False
         for reading in readings:
             match reading:
                 case ImuReading(force, rate):
@@ -259,10 +265,21 @@ class Session:
         if self._odometry.heading_assumed and not self._heading_assumed:
             self._heading_assumed = True
             self._events.append(
-                Notice("the board sends no pose; its heading is assumed to have been 0 at start")
+                Notice("the board sends no pose: its heading is assumed to have been 0 at first")
             )
         if self._board.mode.running and not isinstance(readings[-1], PausedReading):
             self._supervisor.heard_data(now)
+
+    def _why_silent(self) -> str:
+        if self._came_at > self._heard_at:
+            return (
+                f"nothing that comes in makes sense for {SILENCE_S:g} s: check the parameter"
+                " `baudrate`, the cable, and that it is this board"
+            )
+        return (
+            f"nothing comes from the board for {SILENCE_S:g} s: check its power and the cable,"
+            " and that `port` is its port"
+        )
 
     def _count_lost(self, lost: int, now: float) -> None:
         self._lost += lost

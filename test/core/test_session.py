@@ -72,6 +72,22 @@ def test_garbage_is_not_an_understood_board() -> None:
         bench.session.receive(b"\x00\x55\xff\x13" * 4, bench.now)
         bench.run(0.01)
     assert bench.session.state == "connecting"
+    assert [text for text in bench.notices if "baudrate" in text] == bench.notices
+    assert len(bench.notices) == 1
+
+
+def test_a_silent_board_is_told_once() -> None:
+    """And again only after it has been heard meanwhile."""
+    bench = Bench()
+    bench.speaks = False
+    bench.open()
+    bench.run(10.0)
+    assert len([text for text in bench.notices if "power" in text]) == 1
+    bench.speaks = True
+    bench.run(2.0)
+    bench.speaks = False
+    bench.run(10.0)
+    assert len([text for text in bench.notices if "power" in text]) == 2
 
 
 def test_a_command_is_on_the_wire_before_the_call_returns(bench: Bench) -> None:

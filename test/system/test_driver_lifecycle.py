@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ from conftest import Driver, Probe
 from geometry_msgs.msg import Twist
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParameters
+from sensor_msgs.msg import Imu
 
 from omnibot_driver.simulator import BoardMode, PtyBoard, SimulatedBoard
 
@@ -117,8 +120,10 @@ def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
     [
         ("nonsense://board", "not understood.*socket://"),
         ("/", "check the parameter"),
-        ("/dev/null", "check the parameter"),
-        ("socket://localhost:1", "cannot open"),
+        ("/dev/null", "no serial port.*by-id"),
+        ("socket://nohost", "not understood.*socket://"),
+        ("socket://localhost:99999", "not understood.*socket://"),
+        ("socket://localhost:1", "cannot open.*refused"),
     ],
 )
 def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
@@ -138,8 +143,7 @@ def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("connecting")
-    from sensor_msgs.msg import Imu
-
+    driver.wait_for_line("nothing comes from the board.*power")
     imu = probe.listen(Imu, "imu/data_raw")
     write_to_silent_port(bytes(range(256)) * 40)
     write_to_silent_port(bytes.fromhex("FF FA 00 00 00 00 40 00 00 01 00 02 00 03") * 3)
@@ -150,7 +154,7 @@ def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"max_liner_speed": 0.3}, "no parameter 'max_liner_speed'.*'max_linear_speed'"),
+        ({"max_liner_speed": 0.3}, "no parameter 'max_liner_speed'.*nearest is 'max_linear_speed'"),
         ({"command_rate": 500.0}, "'command_rate' must be 1 to 50 Hz"),
         ({"cmd_vel_timeout": float("nan")}, "'cmd_vel_timeout' must be"),
         ({"on_exit": "explode"}, "'on_exit' must be one of stop, pause, reset"),
@@ -224,3 +228,12 @@ def test_every_parameter_is_described(
         if parameter.low is not None:
             (span,) = [*descriptor.floating_point_range, *descriptor.integer_range]
             assert (span.from_value, span.to_value) == (parameter.low, parameter.high)
+
+
+@pytest.mark.parametrize("arguments", [["/dev/ttyUSB0"], ["--help"], ["--port", "x"]])
+def test_arguments_that_are_no_ros_arguments_are_not_ignored(arguments: list[str]) -> None:
+    """They would leave the user with another port than the one that was meant."""
+    command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+    assert ended.returncode == 2
+    assert "--ros-args -p port:=" in ended.stderr
