@@ -7,16 +7,17 @@ import threading
 from typing import Final
 
 import rclpy
-from rclpy._rclpy_pybind11 import RCLError
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.node import OmniBotDriver
+from omnibot_driver.output import UnblockedOutput
 
-STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM)
+STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 USAGE: Final = "parameters are given like this: --ros-args -p port:=/dev/ttyUSB0"
 
 
@@ -33,7 +34,8 @@ class Ending:
         os.set_blocking(self._wake, False)
         signal.set_wakeup_fd(self._wake, warn_on_full_buffer=False)
         for number in STOPPED_BY:
-            signal.signal(number, lambda *_: None)
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # nohup
+                signal.signal(number, lambda *_: None)
 
     def begin(self, defect: BaseException | None = None) -> None:
         """End the driver; with a defect, its exit code tells. Any thread may call this."""
@@ -52,16 +54,19 @@ def main(args: list[str] | None = None) -> int:
     thread only waits, so a signal is heard however busy the executor is, and a second one cannot
     break into the shutdown.
     """
-    unknown = remove_ros_args(args if args is not None else sys.argv)[1:]
-    if unknown:
-        print(f"omnibot_driver does not know {' '.join(unknown)}; {USAGE}", file=sys.stderr)
-        return 2
+    with UnblockedOutput():
+        return _main(sys.argv if args is None else args)
+
+
+def _main(args: list[str]) -> int:
     ending = Ending()
     try:
+        if unknown := remove_ros_args(args)[1:]:
+            raise ParameterError(f"it does not know {' '.join(unknown)}; {USAGE}")
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         rclpy.get_default_context().on_shutdown(ending.begin)
         _run(ending)
-    except (ParameterError, RCLError) as error:
+    except (ParameterError, ParameterException, RCLError, UnknownROSArgsError) as error:
         print(f"omnibot_driver cannot start: {error}", file=sys.stderr)
         return 2
     finally:
@@ -75,11 +80,12 @@ def _run(ending: Ending) -> None:
     driver = OmniBotDriver(defect=ending.begin)
     executor = SingleThreadedExecutor()
     executor.add_node(driver)
-    stop = Future()
+    stopping = threading.Event()
 
     def spin() -> None:
         try:
-            executor.spin_until_future_complete(stop)
+            while not stopping.is_set():
+                executor.spin_once()
         except ExternalShutdownException:
             ending.begin()
         except Exception as error:
@@ -89,7 +95,8 @@ def _run(ending: Ending) -> None:
     spinner.start()
     ending.wait()
     driver.close()
-    stop.set_result(None)
+    stopping.set()
+    executor.create_task(lambda: None)  # wake-ups alone do not end spin_once
     spinner.join(timeout=1.0)
     driver.destroy_node()
 

@@ -4,6 +4,7 @@ Nothing is computed here. Measurements are published by the link's reader thread
 the executor sleeps unless a message, a service call or a parameter wakes it.
 """
 
+import re
 import threading
 import time
 import traceback
@@ -43,7 +44,8 @@ from omnibot_driver.core.supervisor import Request
 from omnibot_driver.link import Link
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-NOT_OURS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+UNHEARD = ("disconnected", "connecting")
+NOT_OURS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..+")
 """Parameters that rclpy itself declares for every node."""
 
 
@@ -63,7 +65,7 @@ class OmniBotDriver(Node):
             axis_signs=tuple(self._values["axis_signs"]),
         )
         self._state_lock = threading.Lock()
-        self._port_report: str | None = ""
+        self._told: set[str] = set()
         self._handlers: dict[type, Callable[[Any, int], None]] = {
             ImuEstimate: self._publish_imu,
             OdometryEstimate: self._publish_odometry,
@@ -103,7 +105,7 @@ class OmniBotDriver(Node):
         given = {
             name: override.value
             for name, override in self._parameter_overrides.items()
-            if not name.startswith(NOT_OURS)
+            if not NOT_OURS.fullmatch(name)
         }
         values = parameters.check_all(given)
         for parameter in parameters.PARAMETERS:
@@ -166,7 +168,10 @@ class OmniBotDriver(Node):
             before = self._published or (None, None)
             self._published = now
             if now[0] != before[0]:
-                self.get_logger().info(f"state: {now[0]}")
+                if now[0] not in UNHEARD:
+                    self._told = set()
+                if self._is_news(state := f"state: {now[0]}"):
+                    self.get_logger().info(state)
                 self._state.publish(String(data=now[0]))
             if now[1] != before[1]:
                 self._estop_active.publish(Bool(data=now[1]))
@@ -181,15 +186,17 @@ class OmniBotDriver(Node):
         self.get_logger().warning(notice.text)
 
     def _report_port(self, trouble: str | None) -> None:
-        if trouble == self._port_report:
-            return
-        self._port_report = trouble
         if trouble is None:
-            self.get_logger().info(f"port {self._values['port']} is open")
-        else:
-            self.get_logger().error(
-                f"{trouble} (retrying every {self._values['reconnect_interval']:g} s)"
-            )
+            if self._is_news(text := f"port {self._values['port']} is open"):
+                self.get_logger().info(text)
+        elif self._is_news(trouble):
+            interval_s = self._values["reconnect_interval"]
+            self.get_logger().error(f"{trouble} (retrying every {interval_s:g} s)")
+
+    def _is_news(self, text: str) -> bool:
+        """Each thing once until the board is understood again: a port that flaps is no news."""
+        told, self._told = self._told, self._told | {text}
+        return text not in told
 
     # From ROS to the board
 

@@ -5,6 +5,7 @@ It knows no threads and no board.
 """
 
 import errno
+import re
 import termios
 from typing import Final
 
@@ -28,10 +29,11 @@ class Port:
                 url,
                 baudrate=baudrate,
                 timeout=READ_TIMEOUT_S,
-                write_timeout=WRITE_TIMEOUT_S,
+                # Over rfc2217 pyserial cannot limit a write; there its socket does, to 5 s.
+                write_timeout=None if url.startswith("rfc2217:") else WRITE_TIMEOUT_S,
                 exclusive=True,
             )
-        except (OSError, ValueError) as error:
+        except Exception as error:  # its URL handlers raise whatever they stumble over
             raise LinkError(_explain(url, error)) from error
 
     def read(self) -> bytes:
@@ -39,13 +41,15 @@ class Port:
 
         Raises LinkError when the port is gone.
         """
+        data = b""
         try:
-            data: bytes = self._serial.read(1)
+            data = self._serial.read(1)
             while data and len(data) < MOST_AT_ONCE and (waiting := self._serial.in_waiting):
                 data += self._serial.read(waiting)
         except OSError as error:
-            raise LinkError(f"lost {self._url} while reading: {error}") from error
-        return data
+            if not data:
+                raise LinkError(f"lost {self._url} while reading: {error}") from error
+        return data  # what came before the loss; the next call finds it again
 
     def write(self, data: bytes) -> None:
         """All of it, or LinkError."""
@@ -65,18 +69,17 @@ class Port:
         self._serial.close()
 
 
-def _explain(url: str, error: OSError | ValueError) -> str:
+def _explain(url: str, error: Exception) -> str:
     """What is wrong with this port, and what to do."""
     code = error.errno if isinstance(error, OSError) else None
     # pyserial words some errors anew without their number; where it stumbled is in the context.
-    if isinstance(error, ValueError) or isinstance(
-        error.__context__, TypeError | ValueError | LookupError
-    ):
+    misread = TypeError | ValueError | LookupError | re.error
+    if isinstance(error, misread) or isinstance(error.__context__, misread):
         return (
             f"port '{url}' is not understood: give a device like /dev/ttyUSB0"
             " or a pyserial URL like socket://host:port"
         )
-    if isinstance(error.__context__, termios.error):
+    if isinstance(error, termios.error) or isinstance(error.__context__, termios.error):
         return f"{url} is no serial port: `ls /dev/serial/by-id/` shows what is; set `port`"
     if code == errno.ENOENT:
         return (

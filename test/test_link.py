@@ -1,5 +1,6 @@
 """The threads around a session, on a real pseudo-terminal and without ROS."""
 
+import contextlib
 import os
 import socket
 import threading
@@ -7,6 +8,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
+import serial
+import serial.rfc2217
 
 from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, LinkError
@@ -225,3 +228,45 @@ def test_a_board_behind_a_socket_is_served_as_well() -> None:
         port.read()
     port.close()
     server.close()
+
+
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name)")  # pyserial 3.5
+def test_a_board_behind_rfc2217_is_served_as_well() -> None:
+    """A serial port server on the network, as pyserial's own example has it."""
+    board_side = serial.serial_for_url("loop://", timeout=0.05)
+    listener = socket.create_server(("127.0.0.1", 0))
+    done = threading.Event()
+
+    def serve() -> None:
+        client, _ = listener.accept()
+        client.settimeout(0.05)
+        manager = serial.rfc2217.PortManager(board_side, Connection(client))
+        while not done.is_set():
+            with contextlib.suppress(TimeoutError):
+                board_side.write(b"".join(manager.filter(client.recv(1024))))
+            if data := board_side.read(board_side.in_waiting):
+                client.sendall(b"".join(manager.escape(data)))
+        client.close()
+
+    server = threading.Thread(target=serve)
+    server.start()
+    port = Port(f"rfc2217://127.0.0.1:{listener.getsockname()[1]}", 115200)
+    port.write(b"Paused: 0 \n")
+    received = b""
+    while len(received) < 11:
+        received += port.read()
+    assert received == b"Paused: 0 \n"
+    port.close()
+    done.set()
+    server.join(PATIENCE_S)
+    listener.close()
+
+
+class Connection:
+    """What rfc2217's PortManager wants of a connection."""
+
+    def __init__(self, client: socket.socket) -> None:
+        self._client = client
+
+    def write(self, data: bytes) -> None:
+        self._client.sendall(data)

@@ -62,7 +62,12 @@ class PoseReading:
 
 @dataclass(frozen=True, slots=True)
 class PausedReading:
-    """The board said that it is paused (or still initialising)."""
+    """The board said that it is paused (or still initialising).
+
+    ``continues``: it has said so just before, so it has not restarted meanwhile.
+    """
+
+    continues: bool = False
 
 
 Reading = ImuReading | DisplacementReading | PoseReading | PausedReading
@@ -95,6 +100,9 @@ class Board(Protocol):
 
     def pause(self) -> bytes:
         """Pause a running board. Refused when it is not known to run."""
+
+    def force_pause(self) -> bytes:
+        """Pause, whatever it did before and whatever of ours is still on the way to it."""
 
     def reset(self) -> bytes:
         """Reboot; the mode is unknown until the board is heard again."""

@@ -43,9 +43,7 @@ class CommandStream:
         self._current = frame
         self._expires_at = now + self.settings.timeout_s
         self._fresh = True
-        self._urgent = frame == self._stop and (
-            self._last_written != self._stop or now - self._written_at >= PACE_S
-        )
+        self._urgent = frame == self._stop and not self._just_written(frame, now)
 
     def discard(self) -> None:
         """No command is current and the line goes quiet; an e-stop stays."""
@@ -59,10 +57,11 @@ class CommandStream:
         self._stopping_until = now + STOPPING_S
         self._urgent = True
 
-    def latch(self) -> None:
+    def latch(self, now: float) -> None:
         """E-stop: nothing but emergency-stop frames from now on, the first at once."""
         self.discard()
-        self.latched = self._urgent = True
+        self.latched = True
+        self._urgent = not self._just_written(self._emergency_stop, now)
 
     def release(self, now: float) -> None:
         """End the e-stop; the robot stands until a new command comes."""
@@ -94,6 +93,9 @@ class CommandStream:
         if self._current is not None and not self.latched:
             return min(next_write, self._expires_at)
         return next_write if self._frame(next_write) else math.inf
+
+    def _just_written(self, frame: bytes, now: float) -> bool:
+        return self._last_written == frame and now - self._written_at < PACE_S
 
     def _next_write(self) -> float:
         if self._urgent:

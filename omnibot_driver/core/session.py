@@ -133,7 +133,7 @@ class Session:
         self._silent, self._heard_at, self._came_at = False, now, -math.inf
         self._supervisor.opened(now)
         if self.estop_active:
-            self._commands.latch()
+            self._commands.latch(now)
 
     def closed(self, now: float) -> None:
         """The port is gone."""
@@ -192,7 +192,7 @@ class Session:
     def estop(self, active: bool, now: float) -> str:
         """Latch or release the e-stop; returns what is so now, in a sentence."""
         if active:
-            self._commands.latch()
+            self._commands.latch(now)
             later = "; the port is not open: the stop is sent as soon as it is"
             return "e-stop latched" + (later if self._closed else "")
         if not self.estop_active:
@@ -207,10 +207,13 @@ class Session:
     def farewell(self, on_exit: OnExit) -> bytes:
         """The last bytes to write before the port is closed."""
         data = self._board.stop()
+        settled = self._supervisor.phase is Phase.SETTLED
         if on_exit == "reset":
             data = self._board.reset()
-        elif on_exit == "pause" and self._board.mode.running:
+        elif on_exit == "pause" and settled and self._board.mode.running:
             data = self._board.pause()
+        elif on_exit == "pause" and not (settled and self._board.mode is Mode.PAUSED):
+            data = self._board.force_pause()
         self._commands.discard()
         return data + (self._board.emergency_stop() if self.estop_active else b"")
 
@@ -259,9 +262,9 @@ class Session:
                     self._events += self._odometry.displace(reading, now)
                 case PoseReading():
                     self._events += self._odometry.learn_heading(reading)
-                case PausedReading():
+                case PausedReading(continues):
                     self._start_anew()
-                    self._supervisor.heard_paused(now)
+                    self._supervisor.heard_paused(now, continues=continues)
         if self._odometry.heading_assumed and not self._heading_assumed:
             self._heading_assumed = True
             self._events.append(

@@ -115,11 +115,13 @@ class Supervisor:
             self._deadline = now + RESET_WITHIN_S
             self._say(self._board.reset(), now)
 
-    def heard_paused(self, now: float) -> None:
-        """The board said that it is paused."""
+    def heard_paused(self, now: float, *, continues: bool) -> None:
+        """The board said that it is paused; ``continues``: and that it has not restarted."""
         in_flight = now - self._said_at < IN_FLIGHT_S
         if self.phase is Phase.PAUSING and (self._paused_with_p or not in_flight):
             self._settle("paused")
+        elif self.phase is Phase.RESETTING and continues and not in_flight:
+            self._say(self._board.reset(), now)
         elif self.phase is Phase.RESETTING and not in_flight:
             self._begin(now)
             if not self._run:

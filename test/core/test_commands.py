@@ -94,18 +94,28 @@ def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Comm
     """A latched stop is said for as long as it is latched."""
     stream.command(GO, 1.0)
     stream.due(1.0)
-    stream.latch()
+    stream.latch(1.001)
     assert stream.due(1.001) == ESTOP
     written = run(stream, 1.001, 101.0)
     assert {frame for _, frame in written} == {ESTOP}
     assert len(written) == pytest.approx(2000, abs=2)
 
 
+def test_a_flood_of_emergency_stops_keeps_the_pace(stream: CommandStream) -> None:
+    """A button node may publish as fast as it likes; the line has to take other things too."""
+    written = []
+    for step in range(1000):
+        now = 1.0 + step * 0.001
+        stream.latch(now)
+        written.append(stream.due(now))
+    assert 90 <= written.count(ESTOP) <= 101
+
+
 def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: CommandStream) -> None:
     """The robot moves again only on a command that is newer than the release."""
     stream.command(GO, 1.0)
     stream.due(1.0)
-    stream.latch()
+    stream.latch(1.1)
     stream.due(1.1)
     stream.release(1.2)
     assert {frame for _, frame in run(stream, 1.2, 5.0)} == {STOP}
@@ -148,7 +158,7 @@ def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
         elif step == "stop":
             stream.command(STOP, now)
         elif step == "latch":
-            stream.latch()
+            stream.latch(now)
         elif step == "release":
             stream.release(now)
         elif step == "discard":

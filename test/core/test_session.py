@@ -322,6 +322,17 @@ def test_a_reset_of_a_paused_board_leaves_it_paused() -> None:
     assert [command.kind for command in bench.board.commands].count("reset") == 1
 
 
+def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
+    """Its notices go on counting, as they did before."""
+    bench = Bench(run=False)
+    bench.open()
+    bench.run(2.5)
+    bench.hears = False
+    answer = bench.ask(Request.RESET, 10.0)
+    assert not answer.success
+    assert "cable" in answer.message
+
+
 def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -> None:
     """Brown-out while driving: what was commanded before the restart is not sent after it."""
     bench.drive(0.5)
@@ -454,6 +465,34 @@ def test_a_farewell_to_a_paused_board_does_not_unpause_it() -> None:
     bench.open()
     bench.run_until_state("paused")
     assert bench.session.farewell("pause") == STOP
+
+
+def test_a_farewell_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
+    """P has been said and not yet shown: a second one alone would undo it."""
+    bench.session.request(Request.PAUSE, object(), bench.now)
+    bench.settle()
+    bench.speaks = False
+    while b"P" not in bench.written_since(0):
+        bench.speaks = True
+        bench.run(0.01)
+        bench.speaks = False
+    bench.board.receive(bench.session.farewell("pause"))
+    bench.hears = False
+    bench.run(1.0)
+    assert bench.board.mode is BoardMode.PAUSED
+
+
+def test_a_farewell_while_a_start_is_in_flight_ends_paused() -> None:
+    """The notice is still believed, but S is on its way."""
+    bench = Bench(run=False)
+    bench.open()
+    bench.run_until_state("paused")
+    bench.session.request(Request.START, object(), bench.now)
+    bench.settle()
+    bench.board.receive(bench.session.farewell("pause"))
+    bench.hears = False
+    bench.run(1.0)
+    assert bench.board.mode is BoardMode.PAUSED
 
 
 def test_a_farewell_under_estop_repeats_the_estop(bench: Bench) -> None:

@@ -1,7 +1,9 @@
 """Starting, ending, parameters and ports that are missing, busy, wrong or come late."""
 
+import contextlib
 import os
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,6 +16,7 @@ from geometry_msgs.msg import Twist
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParameters
 from sensor_msgs.msg import Imu
+from std_srvs.srv import SetBool
 
 from omnibot_driver.simulator import BoardMode, PtyBoard, SimulatedBoard
 
@@ -36,6 +39,7 @@ def driving(probe: Probe, board: PtyBoard) -> None:
         [signal.SIGTERM],
         [signal.SIGINT, signal.SIGINT],
         [signal.SIGTERM, signal.SIGINT, signal.SIGINT],
+        [signal.SIGHUP],
     ],
     ids=lambda signals: "+".join(number.name for number in signals),
 )
@@ -161,6 +165,8 @@ def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
         ({"axis_signs": "[1, 2, 1]"}, "'axis_signs' must be three numbers"),
         ({"baudrate": "fast"}, "'baudrate' must be a value of type int"),
         ({"odom_frame": "/odom"}, "leading slash"),
+        ({"use_sim_times": True}, "no parameter 'use_sim_times'"),
+        ({"use_sim_time": 5}, "cannot start.*use_sim_time"),
     ],
 )
 def test_wrong_parameters_end_the_start_with_a_sentence(
@@ -230,10 +236,65 @@ def test_every_parameter_is_described(
             assert (span.from_value, span.to_value) == (parameter.low, parameter.high)
 
 
-@pytest.mark.parametrize("arguments", [["/dev/ttyUSB0"], ["--help"], ["--port", "x"]])
-def test_arguments_that_are_no_ros_arguments_are_not_ignored(arguments: list[str]) -> None:
-    """They would leave the user with another port than the one that was meant."""
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["/dev/ttyUSB0"],
+        ["--help"],
+        ["--port", "x"],
+        ["--ros-args", "-r", "__node:=bad name"],
+        ["--ros-args", "--log-level", "nonsense"],
+    ],
+)
+def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -> None:
+    """Ignored, they would leave the user with another port than the one that was meant."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
     assert ended.returncode == 2
-    assert "--ros-args -p port:=" in ended.stderr
+    assert "omnibot_driver cannot start: " in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_a_log_that_nobody_reads_does_not_keep_the_robot_moving(start_board: Start) -> None:
+    """A terminal held by ctrl-S, a hung pipe: watchdog, e-stop and SIGTERM still work."""
+    board = start_board(running=True)
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writing, b"x" * 4096)
+    os.set_blocking(writing, True)
+    namespace = "unread"
+    command = [sys.executable, "-m", "omnibot_driver.driver", "--ros-args"]
+    command += ["-p", f"port:={board.path}", "-r", f"__ns:=/{namespace}"]
+    process = subprocess.Popen(command, stdout=writing, stderr=writing)
+    try:
+        with Probe(namespace) as probe:
+            probe.wait_for_state("nominal")
+            driving(probe, board)
+            bad = Twist()
+            bad.linear.x = float("nan")
+            probe.publisher(Twist, "cmd_vel").publish(bad)
+            assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), 20.0)
+            assert probe.call(SetBool, "estop", data=True).success
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(20.0) == 0
+    finally:
+        process.kill()
+        process.wait()
+        os.close(reading)
+        os.close(writing)
+
+
+def test_a_port_that_flaps_is_told_once(start_driver: Start) -> None:
+    """A server that hangs up at once, twenty times."""
+    server = socket.create_server(("127.0.0.1", 0))
+    port = f"socket://127.0.0.1:{server.getsockname()[1]}"
+    driver: Driver = start_driver(port, reconnect_interval=0.05)
+    for _ in range(20):
+        peer, _ = server.accept()
+        peer.close()
+    server.close()
+    driver.wait_for_line("cannot open.*refused")
+    assert driver.output.count("is open") == 1
+    assert driver.output.count("lost") <= 2

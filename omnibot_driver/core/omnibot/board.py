@@ -28,6 +28,7 @@ from omnibot_driver.core.omnibot.frames import (
     DeltaFrame,
     Frame,
     ImuFrame,
+    PausedFrame,
     PoseFrame,
 )
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
@@ -75,6 +76,7 @@ class OmniBot:
         self._modes = ModeTracker()
         self._seq: int | None = None
         self._paused = False
+        self._paused_count = 0
 
     @property
     def mode(self) -> Mode:
@@ -106,6 +108,10 @@ class OmniBot:
         """Stop, then P: a toggle, so refused unless the board is known to run."""
         self._modes.apply(Happening.SENT_PAUSE)
         return STOP + frames.TOGGLE_PAUSE
+
+    def force_pause(self) -> bytes:
+        """Stop, S, P: S makes it run in any case, so that the toggle has one outcome."""
+        return STOP + frames.FORCE_START + frames.TOGGLE_PAUSE
 
     def reset(self) -> bytes:
         """Stop, then R; zeros first where the board may not be listening yet."""
@@ -156,9 +162,10 @@ class OmniBot:
                 )
             case PoseFrame(x, y, theta, _):
                 return PoseReading(x * POSE_LSB_M, y * POSE_LSB_M, theta * POSE_LSB_RAD)
-            case _:
-                self._seq, self._paused = None, True
-                return PausedReading()
+            case PausedFrame(count):
+                continues = self._paused and count == (self._paused_count + 1) % 256
+                self._seq, self._paused, self._paused_count = None, True, count
+                return PausedReading(continues)
 
     def _count_lost(self, seq: int) -> int:
         before, self._seq = self._seq, seq

@@ -1,0 +1,66 @@
+"""Log lines that never block the process. Knows descriptors; must not know what is printed.
+
+rclpy writes log lines while it holds the interpreter: a terminal that is stopped by ctrl-S, or a
+pipe that nobody reads, would freeze every thread, the watchdog included, and the robot would go on
+with its last command. So what is printed goes through a pipe that would rather lose a line.
+"""
+
+import os
+import sys
+import threading
+from types import TracebackType
+from typing import Final, Self
+
+STANDARD: Final = (1, 2)
+LAST_WORDS_S: Final = 0.5
+CHUNK_BYTES: Final = 4096
+
+
+class UnblockedOutput:
+    """While entered, writing to the standard output and error of this process never waits."""
+
+    def __enter__(self) -> Self:
+        if os.isatty(2):
+            os.environ.setdefault("RCUTILS_COLORIZED_OUTPUT", "1")  # it would see our pipe
+        self._originals = [os.dup(descriptor) for descriptor in STANDARD]
+        self._copiers = [
+            threading.Thread(target=_copy, args=(_redirect(descriptor), original), daemon=True)
+            for descriptor, original in zip(STANDARD, self._originals, strict=True)
+        ]
+        for copier in self._copiers:
+            copier.start()
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        sys.stdout.flush()
+        for descriptor, original in zip(STANDARD, self._originals, strict=True):
+            os.dup2(original, descriptor)  # closes the pipe's last writing end
+        for copier, original in zip(self._copiers, self._originals, strict=True):
+            copier.join(LAST_WORDS_S)
+            if not copier.is_alive():
+                os.close(original)
+
+
+def _redirect(descriptor: int) -> int:
+    """Put the writing end of a pipe in this descriptor's place; return the reading end."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    os.dup2(writing, descriptor)
+    os.close(writing)
+    return reading
+
+
+def _copy(reading: int, writing: int) -> None:
+    try:
+        while data := os.read(reading, CHUNK_BYTES):
+            while data:
+                data = data[os.write(writing, data) :]
+    except OSError:
+        return  # nobody listens any more
+    finally:
+        os.close(reading)
