@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 from omnibot_driver import messages, parameters
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.odometry import Covariance, OdometryEstimate, Pose
+from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.se2 import Pose
 from omnibot_driver.core.session import ImuEstimate
+from omnibot_driver.core.uncertainty import Covariance
 
 SETTINGS = messages.MessageSettings.from_parameters(parameters.check_all({}))
 STAMP = messages.time_message(1_700_000_000_123_456_789)

@@ -41,6 +41,7 @@ class DisplacementReading:
     """Motion during the last ``duration_s``; ``lost`` frames of this kind are missing before it.
 
     ``duration_s`` is None where nobody knows it: the first after a pause holds all motion since.
+    ``restarted``: the board's counters seem to begin anew here, and its earth frame with them.
     """
 
     dx_m: float
@@ -49,15 +50,20 @@ class DisplacementReading:
     frame: Literal["earth", "body"]
     duration_s: float | None
     lost: int
+    restarted: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class PoseReading:
-    """The board's own dead reckoning, in the earth frame it has chosen for itself."""
+    """The board's own dead reckoning, in the earth frame it has chosen for itself.
+
+    It is known to include ``unheard_s`` of motion whose displacements were lost.
+    """
 
     x_m: float
     y_m: float
     yaw_rad: float
+    unheard_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

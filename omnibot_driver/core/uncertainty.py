@@ -1,0 +1,151 @@
+"""How far the odometry may be off: what it does not know, kept apart by where it comes from.
+
+* ``drift`` only grows: the slip of every metre (a random walk), and wheels that are larger or
+  smaller than believed (the same error in every turn of a wheel, so it grows with the way itself,
+  and a way back undoes it).
+* ``gap`` is the motion that nobody reported; a pose of the board tells it after all.
+* What is known to be wrong and still being put right counts in full.
+
+Knows covariances and the wheels' geometry; no time, no frames, no board.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.kinematics import OmniKinematics
+from omnibot_driver.core.se2 import Pose
+
+INITIAL_VARIANCE: Final = 1e-6
+"""(1 mm)² and (1 mrad)²: about the resolution of the board's own poses."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometryNoise:
+    """How uncertainty grows.
+
+    Standard deviations of a random walk after 1 m in m, after 1 m in rad (a wheel's slip turns the
+    body), and after turning 1 rad in rad; of a wheel's relative size error, each by itself; and of
+    the acceleration in m/s² and rad/s² of a robot that nobody hears.
+    """
+
+    m_per_sqrt_m: float = 0.02
+    rad_per_sqrt_m: float = 0.02
+    rad_per_sqrt_rad: float = 0.02
+    wheel_scale: float = 0.01
+    base_radius_m: float = 0.143
+    unheard_mps2: float = 2.0
+    unheard_radps2: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Covariance:
+    """Of (x, y, yaw) in the odometry frame: m², m·rad, rad²; symmetric."""
+
+    xx: float = INITIAL_VARIANCE
+    xy: float = 0.0
+    x_yaw: float = 0.0
+    yy: float = INITIAL_VARIANCE
+    y_yaw: float = 0.0
+    yaw_yaw: float = INITIAL_VARIANCE
+
+    @classmethod
+    def diagonal(cls, m2: float, rad2: float) -> "Covariance":
+        """Of independent errors."""
+        return cls(m2, 0.0, 0.0, m2, 0.0, rad2)
+
+    @classmethod
+    def of(cls, error: Pose, factor: float = 1.0) -> "Covariance":
+        """Of an error along one line in (x, y, yaw)."""
+        x, y, yaw = error.x_m, error.y_m, error.yaw_rad
+        return cls(
+            *(factor * value for value in (x * x, x * y, x * yaw, y * y, y * yaw, yaw * yaw))
+        )
+
+    def __add__(self, other: "Covariance") -> "Covariance":
+        """Of the sum of two independent errors."""
+        return Covariance(
+            self.xx + other.xx,
+            self.xy + other.xy,
+            self.x_yaw + other.x_yaw,
+            self.yy + other.yy,
+            self.y_yaw + other.y_yaw,
+            self.yaw_yaw + other.yaw_yaw,
+        )
+
+    def carried(self, way: Pose) -> "Covariance":
+        """After a displacement given in the odometry frame: a wrong yaw makes a wrong way."""
+        dx_m, dy_m = way.x_m, way.y_m
+        return Covariance(
+            xx=self.xx - 2 * dy_m * self.x_yaw + dy_m**2 * self.yaw_yaw,
+            xy=self.xy + dx_m * self.x_yaw - dy_m * self.y_yaw - dx_m * dy_m * self.yaw_yaw,
+            x_yaw=self.x_yaw - dy_m * self.yaw_yaw,
+            yy=self.yy + 2 * dx_m * self.y_yaw + dx_m**2 * self.yaw_yaw,
+            y_yaw=self.y_yaw + dx_m * self.yaw_yaw,
+            yaw_yaw=self.yaw_yaw,
+        )
+
+
+NOTHING: Final = Covariance.diagonal(0.0, 0.0)
+
+
+class Uncertainty:
+    """``noise`` may be replaced at any time."""
+
+    def __init__(self, noise: OdometryNoise) -> None:
+        self.noise = noise
+        self.gap = NOTHING
+        self._walk = Covariance()
+        self._levers = (Pose(), Pose(), Pose())
+        """What the pose is off by, per relative size error of wheel A, B, C."""
+
+    def move(self, heading_rad: float, tangent: Pose) -> None:
+        """The body moved along this tangent from this heading."""
+        noise = self.noise
+        way = tangent.turned(heading_rad + tangent.yaw_rad / 2)
+        along = noise.m_per_sqrt_m**2 * way.way_m
+        turning = noise.rad_per_sqrt_m**2 * way.way_m
+        turning += noise.rad_per_sqrt_rad**2 * abs(tangent.yaw_rad)
+        self._walk = self._walk.carried(way) + Covariance.diagonal(along, turning)
+        self.gap = self.gap.carried(way)
+        wheels = OmniKinematics(wheel_radius_m=1.0, base_radius_m=noise.base_radius_m)
+        rims_m = wheels.wheel_rates(tangent.over(1.0))
+        a, b, c = (
+            lever + Pose(-way.y_m * lever.yaw_rad, way.x_m * lever.yaw_rad)
+            for lever in self._levers
+        )
+        turn_rad = heading_rad + tangent.yaw_rad / 2
+        of_a, of_b, of_c = (
+            Pose(alone.vx_mps, alone.vy_mps, alone.yaw_rate_radps).turned(turn_rad)
+            for alone in map(
+                wheels.body_twist,
+                ((rims_m[0], 0.0, 0.0), (0.0, rims_m[1], 0.0), (0.0, 0.0, rims_m[2])),
+            )
+        )
+        self._levers = (a + of_a, b + of_b, c + of_c)
+
+    def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
+        """Nobody reported the motion of this time; the speeds before and after it are known.
+
+        A robot that speeds up and brakes again meanwhile is a quarter of a·t² away from the even
+        way, and never further than its speed allows.
+        """
+        square = duration_s * duration_s / 4
+        self.gap += Covariance.diagonal(
+            min(self.noise.unheard_mps2 * square, fastest_mps * duration_s) ** 2,
+            min(self.noise.unheard_radps2 * square, fastest_radps * duration_s) ** 2,
+        )
+
+    def settle(self) -> None:
+        """The motion in all gaps is known now."""
+        self.gap = NOTHING
+
+    def give_up(self) -> None:
+        """The motion in all gaps will never be known."""
+        self._walk, self.gap = self._walk + self.gap, NOTHING
+
+    def total(self, open_error: Pose) -> Covariance:
+        """Of a pose that is known to be off by ``open_error`` and otherwise at its best."""
+        covariance = self._walk + self.gap + Covariance.of(open_error)
+        for lever in self._levers:
+            covariance += Covariance.of(lever, self.noise.wheel_scale**2)
+        return covariance
