@@ -57,13 +57,14 @@ class DisplacementReading:
 class PoseReading:
     """The board's own dead reckoning, in the earth frame it has chosen for itself.
 
-    It is known to include ``unheard_s`` of motion whose displacements were lost.
+    ``lost`` displacements that it includes are known to be missing before it; they are not counted
+    again by the next displacement.
     """
 
     x_m: float
     y_m: float
     yaw_rad: float
-    unheard_s: float = 0.0
+    lost: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,7 +73,7 @@ class Odometry:
         self._restarted: Pose | None = None
         self._waiting: list[tuple[DisplacementReading, float]] = []
         self._last_stamp_s: float | None = None
-        self._last_rate: Pose | None = None
+        self._last: tuple[Pose, float] | None = None
         self.reset()
 
     @property
@@ -95,7 +95,7 @@ class Odometry:
         self._waiting = []
         self._pose = self._target = Pose()
         self._uncertainty = Uncertainty(self._settings.noise)
-        self._settling_s = 0.0
+        self._settling_s = self._room_m = self._room_rad = 0.0
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
         """The estimates that this displacement completes: none while the heading is unknown."""
@@ -125,7 +125,7 @@ class Odometry:
         self._restarted = None
         estimates = self._release()
         if self._settings.use_board_pose:
-            self._miss(reading.unheard_s)
+            self._bridge_until_pose(reading.lost)
             self._judge(told)
         return estimates
 
@@ -198,31 +198,51 @@ class Odometry:
         return [self._integrate(reading, stamp_s) for reading, stamp_s in waiting]
 
     def _integrate(self, reading: DisplacementReading, stamp_s: float) -> OdometryEstimate:
-        elapsed_s = self._elapsed_s(reading, stamp_s)
+        last_stamp_s, self._last_stamp_s = self._last_stamp_s, stamp_s
         bridge, tangent = self._tangents(reading)
-        if reading.lost or reading.duration_s is None:
-            self._miss((reading.lost + 1) * (reading.duration_s or UNKNOWN_S))
+        seconds = reading.duration_s
+        if seconds is None:
+            self._miss(UNKNOWN_S)
+            seconds = max(0.0, stamp_s - (stamp_s if last_stamp_s is None else last_stamp_s))
+        elif reading.lost:
+            self._miss((reading.lost + 1) * seconds)
+        if self._uncertainty.gap == NOTHING and not self._settling_s and self._wrong.tiny:
+            self._room_m = self._room_rad = 0.0
+        self._bridge(bridge, reading.lost * seconds)
         if self._board is not None:
-            self._board = _advanced(self._board, reading, bridge)
+            self._board = _advanced(self._board, reading)
         if self._doubted is not None:
-            self._doubted = _advanced(self._doubted, reading, bridge)
-        before = self._pose
-        for part in (self._signed(bridge), self._signed(tangent)):
-            self._uncertainty.move(self._target.yaw_rad, part)
-            self._target = self._target.moved(roll(part))
-            self._pose = self._pose.moved(roll(part))
-        self._follow(self._pose - before, elapsed_s)
-        twist = self._signed(tangent).over(reading.duration_s) if reading.duration_s else None
-        covariance = self._uncertainty.total(self._target - self._pose)
-        return OdometryEstimate(stamp_s, self._pose, twist, covariance)
+            self._doubted = _advanced(self._doubted, reading)
+        self._move(tangent, seconds)
+        self._follow((reading.lost + 1) * seconds)
+        twist = self._signed(tangent).over(seconds) if reading.duration_s else None
+        return OdometryEstimate(stamp_s, self._pose, twist, self._uncertainty.total(self._wrong))
 
-    def _elapsed_s(self, reading: DisplacementReading, stamp_s: float) -> float:
-        """Since the displacement before; by the board's count, else by the stamps."""
-        last, self._last_stamp_s = self._last_stamp_s, stamp_s
-        counted_s = (reading.lost + 1) * (reading.duration_s or 0.0)
-        elapsed_s = counted_s or max(0.0, stamp_s - last if last is not None else 0.0)
-        self._unproved_s += elapsed_s
-        return elapsed_s
+    def _bridge(self, tangent: Pose, seconds: float) -> None:
+        """Motion that was not told, taken to be this one."""
+        if self._board is not None:
+            self._board = self._board.moved(roll(tangent))
+        if self._doubted is not None:
+            self._doubted = self._doubted.moved(roll(tangent))
+        self._move(tangent, seconds)
+
+    def _bridge_until_pose(self, lost: int) -> None:
+        """Displacements are missing that the pose includes; nobody knows what comes after it."""
+        if lost and self._last is not None:
+            tangent, period_s = self._last
+            self._miss((lost + 1) * period_s)
+            self._bridge(tangent.times(lost, lost, lost), lost * period_s)
+
+    def _move(self, tangent: Pose, seconds: float) -> None:
+        """Along a tangent in the board's body axes."""
+        part = self._signed(tangent)
+        chord = roll(part)
+        self._uncertainty.move(self._target.yaw_rad, part)
+        self._target = self._target.moved(chord)
+        self._pose = self._pose.moved(chord)
+        self._room_m += self._settings.fastest_mps * seconds - chord.way_m
+        self._room_rad += self._settings.fastest_radps * seconds - abs(chord.yaw_rad)
+        self._unproved_s += seconds
 
     def _tangents(self, reading: DisplacementReading) -> tuple[Pose, Pose]:
         """In the board's body axes: of the lost displacements before this one, and of this one.
@@ -230,12 +250,13 @@ class Odometry:
         What was lost is taken to have been like the motion on both sides of it.
         """
         if reading.duration_s is None:
-            self._last_rate = None
+            self._last = None
             return Pose(), self._tangent(reading, 0.0)
         half = reading.lost / 2
-        last_turn_rad = self._last_rate.yaw_rad if self._last_rate else reading.dyaw_rad
+        last_turn_rad = self._last[0].yaw_rad if self._last else reading.dyaw_rad
         tangent = self._tangent(reading, half * (last_turn_rad + reading.dyaw_rad))
-        last, self._last_rate = self._last_rate or tangent, tangent
+        last = self._last[0] if self._last else tangent
+        self._last = (tangent, reading.duration_s)
         return (last + tangent).times(half, half, half), tangent
 
     def _tangent(self, reading: DisplacementReading, bridged_rad: float) -> Pose:
@@ -243,22 +264,28 @@ class Odometry:
             return _chord(reading)
         return unroll(_chord(reading).turned(-self._board.yaw_rad - bridged_rad))
 
-    def _follow(self, own: Pose, elapsed_s: float) -> None:
-        """Approach the target by this step's share, no faster than the robot could have moved."""
-        still_open = self._target - self._pose
-        share = elapsed_s / self._settling_s if self._settling_s > elapsed_s else 1.0
-        self._settling_s = max(0.0, self._settling_s - elapsed_s)
-        room_m = self._settings.fastest_mps * elapsed_s - own.way_m
-        room_rad = self._settings.fastest_radps * elapsed_s - abs(own.yaw_rad)
-        linear = min(share, _part(still_open.way_m, room_m))
-        angular = min(share, _part(abs(still_open.yaw_rad), room_rad))
-        self._pose += still_open.times(linear, linear, angular)
+    @property
+    def _wrong(self) -> Pose:
+        """By how much the pose that is given out is known to be off."""
+        return self._target - self._pose
+
+    def _follow(self, seconds: float) -> None:
+        """Approach the target by this step's share, no further than the robot could have moved.
+
+        What it could have moved in a gap and did not by the bridge is left for the correction.
+        """
+        wrong = self._wrong
+        share = seconds / self._settling_s if self._settling_s > seconds else 1.0
+        self._settling_s = max(0.0, self._settling_s - seconds)
+        linear = min(share, _part(wrong.way_m, self._room_m))
+        angular = min(share, _part(abs(wrong.yaw_rad), self._room_rad))
+        step = wrong.times(linear, linear, angular)
+        self._room_m -= step.way_m
+        self._room_rad -= abs(step.yaw_rad)
+        self._pose += step
 
     def _miss(self, duration_s: float) -> None:
-        if duration_s:
-            self._uncertainty.miss(
-                duration_s, self._settings.fastest_mps, self._settings.fastest_radps
-            )
+        self._uncertainty.miss(duration_s, self._settings.fastest_mps, self._settings.fastest_radps)
 
     def _signed(self, tangent: Pose) -> Pose:
         return tangent.times(*self._axis_signs)
@@ -268,9 +295,8 @@ def _chord(reading: DisplacementReading) -> Pose:
     return Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad)
 
 
-def _advanced(board: Pose, reading: DisplacementReading, bridge: Pose = Pose()) -> Pose:  # noqa: B008
-    """A pose in the board's frame after the lost displacements and this one."""
-    board = board.moved(roll(bridge))
+def _advanced(board: Pose, reading: DisplacementReading) -> Pose:
+    """A pose in the board's frame after this displacement."""
     if reading.frame == "earth":
         return board + _chord(reading)
     return board.moved(roll(_chord(reading)))

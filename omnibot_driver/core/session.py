@@ -247,7 +247,8 @@ class Session:
                 case DisplacementReading(lost=lost):
                     self._count_lost(lost, now)
                     self._events += self._odometry.displace(reading, now)
-                case PoseReading():
+                case PoseReading(lost=lost):
+                    self._count_lost(lost, now)
                     self._events += self._odometry.settle(reading)
                 case PausedReading():
                     self._commands.discard()

@@ -33,7 +33,7 @@ from omnibot_driver.core.omnibot.frames import (
     Words,
 )
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
-from omnibot_driver.core.omnibot.sequence import DELTA_PERIOD_S, Sequence
+from omnibot_driver.core.omnibot.sequence import Sequence
 
 DELTA_LSB: Final = (1e-4, 1e-4, 1e-4)
 """m, m, rad."""
@@ -152,8 +152,8 @@ class OmniBot:
             case DeltaFrame():
                 return self._displacement(frame, now)
             case PoseFrame(x, y, theta, seq):
-                unheard_s = self._sequence.pose(seq) * DELTA_PERIOD_S
-                return PoseReading(x * POSE_LSB_M, y * POSE_LSB_M, theta * POSE_LSB_RAD, unheard_s)
+                lost = self._sequence.pose(seq)
+                return PoseReading(x * POSE_LSB_M, y * POSE_LSB_M, theta * POSE_LSB_RAD, lost)
             case _:
                 self._sequence.pause()
                 return PausedReading()

@@ -40,6 +40,8 @@ class Sequence:
         self._pose: int | None = None
         self._since_pose = 0
         self._told = 0
+        self._regular = False
+        """Five deltas to a pose were seen; only then is a sixth missed."""
         self._paused = self._reconnected = False
 
     def pause(self) -> None:
@@ -78,5 +80,6 @@ class Sequence:
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0
         passed = (count - before) % WRAP * DELTAS_PER_POSE if before is not None else 0
-        self._told = max(0, passed - counted)
+        self._regular = self._regular or 0 < passed == counted
+        self._told = max(0, passed - counted) if self._regular else 0
         return self._told
