@@ -1,8 +1,8 @@
 """How far the odometry may be off: what it does not know, kept apart by where it comes from.
 
-* ``drift`` only grows: the slip of every metre (a random walk), and wheels that are larger or
-  smaller than believed (the same error in every turn of a wheel, so it grows with the way itself,
-  and a way back undoes it).
+* What the wheels do not tell: the slip of every metre (a random walk), and wheels that are larger
+  or smaller than believed or slip all the time (the same error in every turn of a wheel, so it
+  grows with the way itself, and a way back undoes it).
 * ``gap`` is the motion that nobody reported; a pose of the board tells it after all.
 * What is known to be wrong and still being put right counts in full.
 
@@ -21,17 +21,16 @@ INITIAL_VARIANCE: Final = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryNoise:
-    """How uncertainty grows.
+    """How uncertainty grows. Each wheel goes wrong by itself, and the body with it.
 
-    Standard deviations of a random walk after 1 m in m, after 1 m in rad (a wheel's slip turns the
-    body), and after turning 1 rad in rad; of a wheel's relative size error, each by itself; and of
-    the acceleration in m/s² and rad/s² of a robot that nobody hears.
+    ``wheel_drift``: standard deviation in m of a random walk after 1 m of rim; ``wheel_scale``: of
+    a wheel's relative size error; ``wheel_slip``: the mean part of the way that slip takes from all
+    wheels alike; ``unheard_mps2``, ``unheard_radps2``: acceleration of a robot that nobody hears.
     """
 
-    m_per_sqrt_m: float = 0.02
-    rad_per_sqrt_m: float = 0.02
-    rad_per_sqrt_rad: float = 0.02
+    wheel_drift: float = 0.0035
     wheel_scale: float = 0.01
+    wheel_slip: float = 0.02
     base_radius_m: float = 0.143
     unheard_mps2: float = 2.0
     unheard_radps2: float = 10.0
@@ -100,28 +99,25 @@ class Uncertainty:
 
     def move(self, heading_rad: float, tangent: Pose) -> None:
         """The body moved along this tangent from this heading."""
-        noise = self.noise
-        way = tangent.turned(heading_rad + tangent.yaw_rad / 2)
-        along = noise.m_per_sqrt_m**2 * way.way_m
-        turning = noise.rad_per_sqrt_m**2 * way.way_m
-        turning += noise.rad_per_sqrt_rad**2 * abs(tangent.yaw_rad)
-        self._walk = self._walk.carried(way) + Covariance.diagonal(along, turning)
+        heading_rad += tangent.yaw_rad / 2
+        way = tangent.turned(heading_rad)
+        self._walk = self._walk.carried(way)
         self.gap = self.gap.carried(way)
-        wheels = OmniKinematics(wheel_radius_m=1.0, base_radius_m=noise.base_radius_m)
+        levers = []
+        for lever, (rim_m, part) in zip(self._levers, self._by_wheel(tangent), strict=True):
+            along = part.turned(heading_rad)
+            turned = Pose(-way.y_m * lever.yaw_rad, way.x_m * lever.yaw_rad)
+            levers.append(lever + turned + along.times(rim_m, rim_m, rim_m))
+            self._walk += Covariance.of(along, self.noise.wheel_drift**2 * abs(rim_m))
+        self._levers = (levers[0], levers[1], levers[2])
+
+    def _by_wheel(self, tangent: Pose) -> list[tuple[float, Pose]]:
+        """For wheels A, B, C: how far the rim rolled, and what a metre of it alone does."""
+        wheels = OmniKinematics(wheel_radius_m=1.0, base_radius_m=self.noise.base_radius_m)
         rims_m = wheels.wheel_rates(tangent.over(1.0))
-        a, b, c = (
-            lever + Pose(-way.y_m * lever.yaw_rad, way.x_m * lever.yaw_rad)
-            for lever in self._levers
-        )
-        turn_rad = heading_rad + tangent.yaw_rad / 2
-        of_a, of_b, of_c = (
-            Pose(alone.vx_mps, alone.vy_mps, alone.yaw_rate_radps).turned(turn_rad)
-            for alone in map(
-                wheels.body_twist,
-                ((rims_m[0], 0.0, 0.0), (0.0, rims_m[1], 0.0), (0.0, 0.0, rims_m[2])),
-            )
-        )
-        self._levers = (a + of_a, b + of_b, c + of_c)
+        alone = map(wheels.body_twist, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+        parts = (Pose(twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps) for twist in alone)
+        return list(zip(rims_m, parts, strict=True))
 
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
         """Nobody reported the motion of this time; the speeds before and after it are known.
@@ -148,4 +144,4 @@ class Uncertainty:
         covariance = self._walk + self.gap + Covariance.of(open_error)
         for lever in self._levers:
             covariance += Covariance.of(lever, self.noise.wheel_scale**2)
-        return covariance
+        return covariance + Covariance.of(sum(self._levers, Pose()), self.noise.wheel_slip**2)

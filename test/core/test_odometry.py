@@ -360,7 +360,7 @@ def minors(c: Covariance) -> Triple:
 @given(st.lists(displacements("body"), max_size=60))
 def test_the_covariance_is_positive_definite_and_grows(readings: list[DisplacementReading]) -> None:
     """Its volume and the variance of the yaw never shrink: nothing corrects slip."""
-    odometry = Odometry(OdometrySettings(noise=OdometryNoise(wheel_scale=0.0)))
+    odometry = Odometry(OdometrySettings(noise=OdometryNoise(wheel_scale=0.0, wheel_slip=0.0)))
     before = Covariance()
     for reading in readings:
         (estimate,) = odometry.displace(reading, 0.0)
@@ -380,56 +380,58 @@ def test_a_robot_at_rest_grows_no_less_sure() -> None:
 
 
 def test_the_covariance_is_a_random_walk_over_the_way() -> None:
-    """After 1 m the deviations are those of the settings, whatever the step."""
-    noise = OdometryNoise(
-        m_per_sqrt_m=0.03, rad_per_sqrt_m=0.0, rad_per_sqrt_rad=0.05, wheel_scale=0.0
-    )
+    """Straight ahead, A and B roll 0.87 m to a metre, whatever the step; their errors add up."""
+    noise = OdometryNoise(wheel_drift=0.01, wheel_scale=0.0, wheel_slip=0.0)
     for steps in (10, 100):
         odometry = Odometry(OdometrySettings(noise=noise))
         for _ in range(steps):
             (ahead,) = odometry.displace(body(1.0 / steps, 0.0), 0.0)
-        assert ahead.covariance.xx == pytest.approx(0.03**2 + 1e-6, rel=0.01)
-        odometry.reset()
-        for _ in range(steps):
-            (turned,) = odometry.displace(body(0.0, 0.0, -1.0 / steps), 0.0)
-        assert turned.covariance.yaw_yaw == pytest.approx(0.05**2 + 1e-6, rel=0.01)
+        of_a_metre = 0.01**2 * math.cos(math.pi / 6) * 2
+        assert ahead.covariance.xx == pytest.approx(of_a_metre / 3 + 1e-6, rel=0.01)
+        assert ahead.covariance.yaw_yaw == pytest.approx(of_a_metre / (3 * 0.143) ** 2, rel=0.01)
 
 
-def test_a_doubtful_heading_makes_the_way_doubtful_across_it() -> None:
-    """Sampled: 4000 robots with random yaw errors are spread as the covariance says."""
-    random, deviation, n = Random(1), 0.02, 4000
-    noise = OdometryNoise(
-        m_per_sqrt_m=1e-6, rad_per_sqrt_m=deviation, rad_per_sqrt_rad=1e-6, wheel_scale=0.0
-    )
+def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
+    """Sampled: 2000 robots whose wheels go wrong at random, through the manual's matrix."""
+    random, deviation, n, steps = Random(1), 0.003, 2000, 25
+    noise = OdometryNoise(wheel_drift=deviation, wheel_scale=0.0, wheel_slip=0.0)
     odometry = Odometry(OdometrySettings(noise=noise))
-    for _ in range(20):
-        (estimate,) = odometry.displace(body(0.08, 0.06), 0.0)
+    for _ in range(steps):
+        (estimate,) = odometry.displace(body(0.06, 0.04, 0.05), 0.0)
+    c, radius = math.cos(math.pi / 6), 0.143
+    rims = (-c * 0.06 - 0.02 - radius * 0.05, c * 0.06 - 0.02 - radius * 0.05, 0.04 - radius * 0.05)
     ends = []
     for _ in range(n):
-        x, y, yaw = 0.0, 0.0, random.gauss(0.0, 1e-3)
-        for _ in range(20):
-            c, s = math.cos(yaw), math.sin(yaw)
-            x, y = x + 0.08 * c - 0.06 * s, y + 0.08 * s + 0.06 * c
-            yaw += random.gauss(0.0, deviation * math.sqrt(0.1))
-        ends.append((x - 1.6, y - 1.2, yaw))
+        x, y, yaw = (random.gauss(0.0, 1e-3) for _ in range(3))
+        for _ in range(steps):
+            a, b, d = (rim + random.gauss(0.0, deviation * math.sqrt(abs(rim))) for rim in rims)
+            dx, dy, turn = (b - a) / (2 * c), (2 * d - a - b) / 3, -(a + b + d) / (3 * radius)
+            ahead, left = arc(dx, dy, turn)
+            x, y = (
+                x + math.cos(yaw) * ahead - math.sin(yaw) * left,
+                y + math.sin(yaw) * ahead + math.cos(yaw) * left,
+            )
+            yaw += turn
+        off = estimate.pose
+        ends.append((x - off.x_m, y - off.y_m, yaw - off.yaw_rad))
     pairs = {"xx": (0, 0), "xy": (0, 1), "x_yaw": (0, 2), "yy": (1, 1), "y_yaw": (1, 2)}
     for name, (i, j) in {**pairs, "yaw_yaw": (2, 2)}.items():
-        sampled = sum(end[i] * end[j] for end in ends) / n
-        assert getattr(estimate.covariance, name) == pytest.approx(sampled, rel=0.1), name
+        products = [end[i] * end[j] for end in ends]
+        mean = sum(products) / n
+        error = math.sqrt(sum((product - mean) ** 2 for product in products)) / n
+        assert getattr(estimate.covariance, name) == pytest.approx(mean, abs=4 * error), name
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
     """Ten metres: ten times the deviation of one, and none of it where it began."""
-    noise = OdometryNoise(m_per_sqrt_m=0.0, rad_per_sqrt_m=0.0, rad_per_sqrt_rad=0.0)
+    noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
     odometry = Odometry(OdometrySettings(noise=noise))
     for step in [0.02] * 500 + [-0.02] * 500:
         (estimate,) = odometry.displace(body(step, 0.0), 0.0)
         deviations.append(math.sqrt(estimate.covariance.yaw_yaw - 1e-6))
     assert deviations[499] == pytest.approx(10 * deviations[49], rel=1e-6)
-    assert deviations[49] == pytest.approx(
-        0.01 * math.sqrt(2) / math.sqrt(3) / 0.143 * 0.5, rel=0.01
-    )
+    assert deviations[49] == pytest.approx(0.01 * math.sqrt(2 / 3) / 2 / 0.143, rel=0.01)
     assert deviations[999] == pytest.approx(0.0, abs=1e-7)
     assert estimate.covariance.yy < 1e-3
 
