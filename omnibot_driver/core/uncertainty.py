@@ -9,7 +9,9 @@
 Knows covariances and the wheels' geometry; no time, no frames, no board.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 from omnibot_driver.core.kinematics import OmniKinematics
@@ -111,13 +113,10 @@ class Uncertainty:
             self._walk += Covariance.of(along, self.noise.wheel_drift**2 * abs(rim_m))
         self._levers = (levers[0], levers[1], levers[2])
 
-    def _by_wheel(self, tangent: Pose) -> list[tuple[float, Pose]]:
+    def _by_wheel(self, tangent: Pose) -> Iterator[tuple[float, Pose]]:
         """For wheels A, B, C: how far the rim rolled, and what a metre of it alone does."""
-        wheels = OmniKinematics(wheel_radius_m=1.0, base_radius_m=self.noise.base_radius_m)
-        rims_m = wheels.wheel_rates(tangent.over(1.0))
-        alone = map(wheels.body_twist, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
-        parts = (Pose(twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps) for twist in alone)
-        return list(zip(rims_m, parts, strict=True))
+        wheels = _wheels(self.noise.base_radius_m)
+        return zip(wheels.wheel_rates(tangent.over(1.0)), _alone(wheels), strict=True)
 
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
         """Nobody reported the motion of this time; the speeds before and after it are known.
@@ -145,3 +144,14 @@ class Uncertainty:
         for lever in self._levers:
             covariance += Covariance.of(lever, self.noise.wheel_scale**2)
         return covariance + Covariance.of(sum(self._levers, Pose()), self.noise.wheel_slip**2)
+
+
+@cache
+def _wheels(base_radius_m: float) -> OmniKinematics:
+    return OmniKinematics(wheel_radius_m=1.0, base_radius_m=base_radius_m)
+
+
+@cache
+def _alone(wheels: OmniKinematics) -> tuple[Pose, ...]:
+    alone = map(wheels.body_twist, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    return tuple(Pose(twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps) for twist in alone)

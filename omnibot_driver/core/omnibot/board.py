@@ -152,7 +152,7 @@ class OmniBot:
             case DeltaFrame():
                 return self._displacement(frame, now)
             case PoseFrame(x, y, theta, seq):
-                lost = self._sequence.pose(seq)
+                lost = self._sequence.pose(seq, now)
                 return PoseReading(x * POSE_LSB_M, y * POSE_LSB_M, theta * POSE_LSB_RAD, lost)
             case _:
                 self._sequence.pause()

@@ -15,7 +15,7 @@ WRAP: Final = 256
 LATE_S: Final = 0.5
 """Arrival may differ so much from the board's count: beyond, the count did not simply go on."""
 EARLY_S: Final = 0.2
-"""A restarted board's first deltas may come in one read with the last before."""
+"""More than this cannot have been sent since the last delta came in, than has passed since then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,11 +75,13 @@ class Sequence:
         self._since_pose += lost + 1
         return Step(lost)
 
-    def pose(self, count: int) -> int:
+    def pose(self, count: int, now: float) -> int:
         """A pose with this count came in: how many deltas are missing that it includes."""
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0
         passed = (count - before) % WRAP * DELTAS_PER_POSE if before is not None else 0
         self._regular = self._regular or 0 < passed == counted
-        self._told = max(0, passed - counted) if self._regular else 0
+        missing = max(0, passed - counted)
+        in_time = missing * DELTA_PERIOD_S <= now - self._delta_at + EARLY_S
+        self._told = missing if self._regular and in_time else 0
         return self._told
