@@ -339,7 +339,7 @@ PARAMETERS: Final = (
     ),
     Parameter(
         "twist_angular_stddev",
-        0.02,
+        0.025,
         "rad/s",
         "Noise of the measured yaw rate, for the covariance.",
         low=1e-6,

@@ -50,7 +50,7 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
     assert pose[2, 2] == pose[3, 3] == pose[4, 4] == messages.UNMEASURED_VARIANCE
     twist = message.twist.covariance.reshape(6, 6)
     assert twist[0, 0] == twist[1, 1] == pytest.approx(0.02**2)
-    assert twist[5, 5] == pytest.approx(0.02**2)
+    assert twist[5, 5] == pytest.approx(0.025**2)
 
 
 def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> None:

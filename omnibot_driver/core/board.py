@@ -58,13 +58,15 @@ class PoseReading:
     """The board's own dead reckoning, in the earth frame it has chosen for itself.
 
     ``lost`` displacements that it includes are known to be missing before it; they are not counted
-    again by the next displacement.
+    again by the next displacement. ``restarted``: its counter begins anew, and so did the
+    displacements' some time before.
     """
 
     x_m: float
     y_m: float
     yaw_rad: float
     lost: int = 0
+    restarted: bool = False
 
 
 @dataclass(frozen=True, slots=True)

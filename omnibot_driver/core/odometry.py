@@ -120,7 +120,7 @@ class Odometry:
         told = Pose(reading.x_m, reading.y_m, reading.yaw_rad)
         if not told.finite:
             return []
-        if self._board is None or self._has_restarted(told):
+        if self._board is None or reading.restarted or self._has_restarted(told):
             return self._attach(told)
         self._restarted = None
         estimates = self._release()

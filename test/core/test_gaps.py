@@ -452,3 +452,22 @@ def test_settling_removes_nothing_but_the_gap() -> None:
     (after,) = odometry.displace(still, 0.0)
     assert after.covariance.xx == pytest.approx(before.covariance.xx)
     assert after.covariance.yaw_yaw == pytest.approx(before.covariance.yaw_yaw)
+
+
+def test_the_twist_is_as_good_as_its_default_covariance_says() -> None:
+    """Against the true velocity of robots that slip, speed up and brake: 0.02 m/s, 0.025 rad/s."""
+    linear, angular, n = 0.0, 0.0, 0
+    for seed in range(8):
+        random = Random(seed)
+        a, b, c = (1 + random.gauss(0.0, 0.01) for _ in range(3))
+        board = BoardSettings(seed=seed, running=True, slip=0.02, wheel_radius_scale=(a, b, c))
+        on = Line(board, seed=seed)
+        on.run(1.0)
+        for _ in range(100):
+            twist, true = on.run(PERIOD_S)[-1].twist, on.board.truth
+            assert twist is not None
+            linear += ((twist.vx_mps - true.vx_mps) ** 2 + (twist.vy_mps - true.vy_mps) ** 2) / 2
+            angular += (twist.yaw_rate_radps - true.yaw_rate) ** 2
+            n += 1
+    assert 0.2 * 0.02 < math.sqrt(linear / n) < 0.02
+    assert 0.2 * 0.025 < math.sqrt(angular / n) < 0.025

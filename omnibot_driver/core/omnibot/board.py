@@ -152,8 +152,14 @@ class OmniBot:
             case DeltaFrame():
                 return self._displacement(frame, now)
             case PoseFrame(x, y, theta, seq):
-                lost = self._sequence.pose(seq, now)
-                return PoseReading(x * POSE_LSB_M, y * POSE_LSB_M, theta * POSE_LSB_RAD, lost)
+                step = self._sequence.pose(seq, now)
+                return PoseReading(
+                    x * POSE_LSB_M,
+                    y * POSE_LSB_M,
+                    theta * POSE_LSB_RAD,
+                    lost=step.lost,
+                    restarted=step.restarted,
+                )
             case _:
                 self._sequence.pause()
                 return PausedReading()

@@ -75,13 +75,20 @@ class Sequence:
         self._since_pose += lost + 1
         return Step(lost)
 
-    def pose(self, count: int, now: float) -> int:
-        """A pose with this count came in: how many deltas are missing that it includes."""
+    def pose(self, count: int, now: float) -> Step:
+        """A pose with this count came in: what is missing of the deltas that it includes."""
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0
-        passed = (count - before) % WRAP * DELTAS_PER_POSE if before is not None else 0
+        if before is None or self._delta is None:
+            return Step(0)
+        passed = (count - before) % WRAP * DELTAS_PER_POSE
         self._regular = self._regular or 0 < passed == counted
+        if not self._regular:
+            return Step(0)
+        from_zero = abs(count * DELTAS_PER_POSE - self._delta) <= DELTAS_PER_POSE
+        if from_zero and abs(passed - counted) > 2 * DELTAS_PER_POSE:
+            return Step(0, None, restarted=True)
         missing = max(0, passed - counted)
         in_time = missing * DELTA_PERIOD_S <= now - self._delta_at + EARLY_S
-        self._told = missing if self._regular and in_time else 0
-        return self._told
+        self._told = missing if in_time else 0
+        return Step(self._told)
