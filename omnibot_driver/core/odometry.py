@@ -1,10 +1,9 @@
 """From displacements and the board's own poses to pose, twist and covariance.
 
 One idea: ``_board`` is where the board believes to be, told by displacements at once and by its
-poses for certain; ``_target`` is the same place in the odometry frame. Both always move together,
-by the same tangent in the body's axes, so motion that was lost on the line is found again with the
-next pose. The pose that is given out moves with the robot and follows the target no faster than the
-robot could. This module knows SE(2); it knows no bytes, no clock and no ROS.
+poses for certain; the follower's target is the same place in the odometry frame. Both always move
+together, by the same tangent in the body's axes, so motion that was lost on the line is found again
+with the next pose. This module knows SE(2); it knows no bytes, no clock and no ROS.
 """
 
 import math
@@ -12,14 +11,13 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from omnibot_driver.core.board import DisplacementReading, PoseReading
+from omnibot_driver.core.follower import Follower
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose, Signs, roll, unroll
 from omnibot_driver.core.uncertainty import NOTHING, Covariance, OdometryNoise, Uncertainty
 
 LONGEST_WAIT_S: Final = 1.0
 """Board time without any pose after which heading 0 is assumed."""
-SPREAD_S: Final = 0.2
-"""Board time over which a correction is spread: that from one pose to the next."""
 UNKNOWN_S: Final = 0.5
 """Time in which a robot rolls out: what may be unreported where nobody knows how long it was."""
 BELIEVED_M: Final = 0.02
@@ -93,9 +91,8 @@ class Odometry:
             if self._uncertainty.gap != NOTHING:
                 self._proved = None  # what the next pose corrects was before the reset
         self._waiting = []
-        self._pose = self._target = Pose()
+        self._follower = Follower()
         self._uncertainty = Uncertainty(self._settings.noise)
-        self._settling_s = self._room_m = self._room_rad = 0.0
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
         """The estimates that this displacement completes: none while the heading is unknown."""
@@ -167,8 +164,7 @@ class Odometry:
             self._doubted = told
             return
         if reachable:
-            self._target = self._target.moved(roll(self._signed(unroll(way))))
-            self._settling_s = SPREAD_S
+            self._follower.correct(roll(self._signed(unroll(way))))
             self._uncertainty.settle()
         else:
             self._uncertainty.give_up()
@@ -206,17 +202,18 @@ class Odometry:
             seconds = max(0.0, stamp_s - (stamp_s if last_stamp_s is None else last_stamp_s))
         elif reading.lost:
             self._miss((reading.lost + 1) * seconds)
-        if self._uncertainty.gap == NOTHING and not self._settling_s and self._wrong.tiny:
-            self._room_m = self._room_rad = 0.0
         self._bridge(bridge, reading.lost * seconds)
         if self._board is not None:
             self._board = _advanced(self._board, reading)
         if self._doubted is not None:
             self._doubted = _advanced(self._doubted, reading)
         self._move(tangent, seconds)
-        self._follow((reading.lost + 1) * seconds)
+        self._follower.follow(
+            (reading.lost + 1) * seconds, keep_room=self._uncertainty.gap != NOTHING
+        )
         twist = self._signed(tangent).over(seconds) if reading.duration_s else None
-        return OdometryEstimate(stamp_s, self._pose, twist, self._uncertainty.total(self._wrong))
+        covariance = self._uncertainty.total(self._follower.wrong)
+        return OdometryEstimate(stamp_s, self._follower.pose, twist, covariance)
 
     def _bridge(self, tangent: Pose, seconds: float) -> None:
         """Motion that was not told, taken to be this one."""
@@ -236,12 +233,10 @@ class Odometry:
     def _move(self, tangent: Pose, seconds: float) -> None:
         """Along a tangent in the board's body axes."""
         part = self._signed(tangent)
-        chord = roll(part)
-        self._uncertainty.move(self._target.yaw_rad, part)
-        self._target = self._target.moved(chord)
-        self._pose = self._pose.moved(chord)
-        self._room_m += self._settings.fastest_mps * seconds - chord.way_m
-        self._room_rad += self._settings.fastest_radps * seconds - abs(chord.yaw_rad)
+        self._uncertainty.move(self._follower.target.yaw_rad, part)
+        self._follower.move(
+            roll(part), self._settings.fastest_mps * seconds, self._settings.fastest_radps * seconds
+        )
         self._unproved_s += seconds
 
     def _tangents(self, reading: DisplacementReading) -> tuple[Pose, Pose]:
@@ -264,26 +259,6 @@ class Odometry:
             return _chord(reading)
         return unroll(_chord(reading).turned(-self._board.yaw_rad - bridged_rad))
 
-    @property
-    def _wrong(self) -> Pose:
-        """By how much the pose that is given out is known to be off."""
-        return self._target - self._pose
-
-    def _follow(self, seconds: float) -> None:
-        """Approach the target by this step's share, no further than the robot could have moved.
-
-        What it could have moved in a gap and did not by the bridge is left for the correction.
-        """
-        wrong = self._wrong
-        share = seconds / self._settling_s if self._settling_s > seconds else 1.0
-        self._settling_s = max(0.0, self._settling_s - seconds)
-        linear = min(share, _part(wrong.way_m, self._room_m))
-        angular = min(share, _part(abs(wrong.yaw_rad), self._room_rad))
-        step = wrong.times(linear, linear, angular)
-        self._room_m -= step.way_m
-        self._room_rad -= abs(step.yaw_rad)
-        self._pose += step
-
     def _miss(self, duration_s: float) -> None:
         self._uncertainty.miss(duration_s, self._settings.fastest_mps, self._settings.fastest_radps)
 
@@ -300,8 +275,3 @@ def _advanced(board: Pose, reading: DisplacementReading) -> Pose:
     if reading.frame == "earth":
         return board + _chord(reading)
     return board.moved(roll(_chord(reading)))
-
-
-def _part(wanted: float, room: float) -> float:
-    """How much of what is wanted there is room for."""
-    return min(1.0, max(0.0, room) / wanted) if wanted else 1.0
