@@ -121,8 +121,8 @@ class Odometry:
             return self._attach(told)
         self._restarted = None
         estimates = self._release()
+        self._bridge_until_pose(reading.lost)
         if self._settings.use_board_pose:
-            self._bridge_until_pose(reading.lost)
             self._judge(told)
         return estimates
 

@@ -152,6 +152,18 @@ def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
     assert last.covariance.xx > first.covariance.xx
 
 
+@pytest.mark.parametrize("use_board_pose", [True, False])
+@pytest.mark.parametrize("phase", range(5))
+def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose: bool) -> None:
+    """The pose tells of it before the next displacement does, and it is not counted twice."""
+    on = line(0, OdometrySettings(use_board_pose=use_board_pose))
+    on.run(phase * PERIOD_S)
+    lose(on, 2 * PERIOD_S, DELTA)
+    for _ in range(10):
+        on.run(PERIOD_S)
+        assert on.error.way_m < 0.005, on.error
+
+
 def test_a_board_that_sends_no_pose_is_bridged() -> None:
     """At an even pace in an even curve the bridge is the way itself."""
     odometry = Odometry(OdometrySettings())
