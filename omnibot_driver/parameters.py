@@ -315,7 +315,7 @@ PARAMETERS: Final = (
     ),
     Parameter(
         "odom_gap_acceleration",
-        2.0,
+        1.0,
         "m/s²",
         "How hard the robot may speed up and brake while its odometry frames are lost.",
         low=0.0,
@@ -323,7 +323,7 @@ PARAMETERS: Final = (
     ),
     Parameter(
         "odom_gap_angular_acceleration",
-        10.0,
+        5.0,
         "rad/s²",
         "Likewise, for turning.",
         low=0.0,

@@ -34,8 +34,8 @@ class OdometryNoise:
     wheel_scale: float = 0.01
     wheel_slip: float = 0.02
     base_radius_m: float = 0.143
-    unheard_mps2: float = 2.0
-    unheard_radps2: float = 10.0
+    unheard_mps2: float = 1.0
+    unheard_radps2: float = 5.0
 
 
 @dataclass(frozen=True, slots=True)
