@@ -13,9 +13,10 @@ from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, GYRO_COUNTS_PER_DPS, ImuScale
 from omnibot_driver.core.limits import SpeedLimits
-from omnibot_driver.core.odometry import OdometryNoise
+from omnibot_driver.core.odometry import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBotSettings
 from omnibot_driver.core.session import SessionSettings
+from omnibot_driver.core.uncertainty import OdometryNoise
 
 Value = bool | int | float | str | list[int]
 
@@ -193,9 +194,16 @@ PARAMETERS: Final = (
         "earth",
         "",
         "What the board's odometry deltas are: differences of two positions in its earth frame,"
-        " or motion along its own axes.",
-        choices=("earth", "body"),
+        " motion along its own axes, or (older firmware) counts of its wheels.",
+        choices=("earth", "body", "wheel_counts"),
         fixed=True,
+    ),
+    Parameter(
+        "use_board_pose",
+        True,
+        "",
+        "Let the board's own pose settle lost motion and rounding; otherwise only its first"
+        " heading is taken.",
     ),
     Parameter(
         "pose_byte_order",
@@ -212,9 +220,42 @@ PARAMETERS: Final = (
         "wheel_radius",
         0.029,
         "m",
-        "Radius of a wheel, for wheel_cmd.",
+        "Radius of a wheel, for wheel_cmd and for odometry from wheel counts.",
         low=0.001,
         high=1.0,
+    ),
+    Parameter(
+        "base_radius",
+        0.143,
+        "m",
+        "From the centre of the robot to a wheel, for odometry from wheel counts and covariance.",
+        low=0.01,
+        high=10.0,
+    ),
+    Parameter(
+        "counts_per_revolution",
+        1560,
+        "counts",
+        "Encoder counts of one turn of a wheel, for odometry from wheel counts.",
+        low=1,
+        high=1_000_000,
+    ),
+    Parameter(
+        "fastest_linear_speed",
+        2.0,
+        "m/s",
+        "What the robot can never exceed, pushed by hand too: no pose of the board is believed that"
+        " is further away, no correction of odom is faster.",
+        low=0.1,
+        high=_SPEED,
+    ),
+    Parameter(
+        "fastest_angular_speed",
+        8.0,
+        "rad/s",
+        "Likewise, for turning.",
+        low=0.1,
+        high=100.0,
     ),
     Parameter(
         "accel_range",
@@ -249,28 +290,44 @@ PARAMETERS: Final = (
         high=100.0,
     ),
     Parameter(
-        "odom_linear_drift",
-        0.02,
+        "odom_wheel_drift",
+        0.0035,
         "m/√m",
-        "Standard deviation of the position after 1 m; it grows with the root of the way.",
+        "Standard deviation of a wheel's way after 1 m; it grows with the root of the way.",
         low=1e-6,
         high=10.0,
     ),
     Parameter(
-        "odom_angular_drift",
-        0.02,
-        "rad/√m",
-        "Standard deviation of the yaw after 1 m; it grows with the root of the way.",
-        low=1e-6,
-        high=10.0,
+        "odom_wheel_scale",
+        0.01,
+        "m/m",
+        "Standard deviation of a wheel's relative size error; it counts for the whole way.",
+        low=0.0,
+        high=1.0,
     ),
     Parameter(
-        "odom_turning_drift",
+        "odom_wheel_slip",
         0.02,
-        "rad/√rad",
-        "Standard deviation of the yaw after turning 1 rad; it grows with the root of the turn.",
-        low=1e-6,
-        high=10.0,
+        "m/m",
+        "Mean part of the way that slip takes from all wheels alike; it counts for the whole way.",
+        low=0.0,
+        high=1.0,
+    ),
+    Parameter(
+        "odom_gap_acceleration",
+        1.0,
+        "m/s²",
+        "How hard the robot may speed up and brake while its odometry frames are lost.",
+        low=0.0,
+        high=100.0,
+    ),
+    Parameter(
+        "odom_gap_angular_acceleration",
+        5.0,
+        "rad/s²",
+        "Likewise, for turning.",
+        low=0.0,
+        high=1000.0,
     ),
     Parameter(
         "twist_linear_stddev",
@@ -282,7 +339,7 @@ PARAMETERS: Final = (
     ),
     Parameter(
         "twist_angular_stddev",
-        0.02,
+        0.025,
         "rad/s",
         "Noise of the measured yaw rate, for the covariance.",
         low=1e-6,
@@ -314,6 +371,8 @@ def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
         linear_scale=values["linear_scale"],
         angular_scale=values["angular_scale"],
         wheel_radius_m=values["wheel_radius"],
+        base_radius_m=values["base_radius"],
+        counts_per_revolution=values["counts_per_revolution"],
         delta_frame=values["delta_frame"],
         pose_byte_order=values["pose_byte_order"],
         imu=ImuScale(accel_range_g=values["accel_range"], gyro_range_dps=values["gyro_range"]),
@@ -331,9 +390,17 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
         commands=CommandSettings(
             timeout_s=values["cmd_vel_timeout"], rate_hz=values["command_rate"]
         ),
-        noise=OdometryNoise(
-            m_per_sqrt_m=values["odom_linear_drift"],
-            rad_per_sqrt_m=values["odom_angular_drift"],
-            rad_per_sqrt_rad=values["odom_turning_drift"],
+        odometry=OdometrySettings(
+            noise=OdometryNoise(
+                wheel_drift=values["odom_wheel_drift"],
+                wheel_scale=values["odom_wheel_scale"],
+                wheel_slip=values["odom_wheel_slip"],
+                base_radius_m=values["base_radius"],
+                unheard_mps2=values["odom_gap_acceleration"],
+                unheard_radps2=values["odom_gap_angular_acceleration"],
+            ),
+            use_board_pose=values["use_board_pose"],
+            fastest_mps=values["fastest_linear_speed"],
+            fastest_radps=values["fastest_angular_speed"],
         ),
     )

@@ -41,6 +41,9 @@ PROMISED: dict[str, object] = {
     "base_frame": "base_link",
     "imu_frame": "imu_link",
     "wheel_radius": 0.029,
+    "base_radius": 0.143,
+    "counts_per_revolution": 1560,
+    "use_board_pose": True,
     "accel_range": 2,
     "gyro_range": 250,
 }
@@ -251,8 +254,11 @@ def test_values_reach_the_core_under_their_meaning() -> None:
             "linear_scale": 71, "angular_scale": 501, "wheel_radius": 0.03, "delta_frame": "body",
             "pose_byte_order": "little", "accel_range": 8, "gyro_range": 1000,
             "max_linear_speed": 0.6, "max_angular_speed": 0.7, "max_wheel_speed": 18,
-            "cmd_vel_timeout": 0.4, "command_rate": 25, "odom_linear_drift": 0.03,
-            "odom_angular_drift": 0.04, "odom_turning_drift": 0.05,
+            "cmd_vel_timeout": 0.4, "command_rate": 25, "odom_wheel_drift": 0.03,
+            "odom_wheel_scale": 0.06, "odom_wheel_slip": 0.05,
+            "odom_gap_acceleration": 3, "odom_gap_angular_acceleration": 4,
+            "use_board_pose": False, "base_radius": 0.2, "counts_per_revolution": 1000,
+            "fastest_linear_speed": 1.5, "fastest_angular_speed": 5,
         }
     )  # fmt: skip
     board, session = board_settings(values), session_settings(values)
@@ -262,8 +268,13 @@ def test_values_reach_the_core_under_their_meaning() -> None:
     limits = session.limits
     assert (limits.linear_mps, limits.angular_radps, limits.wheel_radps) == (0.6, 0.7, 18.0)
     assert (session.commands.timeout_s, session.commands.rate_hz) == (0.4, 25.0)
-    noise = session.noise
-    assert (noise.m_per_sqrt_m, noise.rad_per_sqrt_m, noise.rad_per_sqrt_rad) == (0.03, 0.04, 0.05)
+    assert (board.base_radius_m, board.counts_per_revolution) == (0.2, 1000)
+    odometry, noise = session.odometry, session.odometry.noise
+    assert (odometry.fastest_mps, odometry.fastest_radps) == (1.5, 5.0)
+    assert odometry.use_board_pose is False
+    assert (noise.wheel_scale, noise.base_radius_m) == (0.06, 0.2)
+    assert (noise.unheard_mps2, noise.unheard_radps2) == (3.0, 4.0)
+    assert (noise.wheel_drift, noise.wheel_slip) == (0.03, 0.05)
 
 
 # The file

@@ -41,6 +41,7 @@ class DisplacementReading:
     """Motion during the last ``duration_s``; ``lost`` frames of this kind are missing before it.
 
     ``duration_s`` is None where nobody knows it: the first after a pause holds all motion since.
+    ``restarted``: the board's counters seem to begin anew here, and its earth frame with them.
     """
 
     dx_m: float
@@ -49,15 +50,23 @@ class DisplacementReading:
     frame: Literal["earth", "body"]
     duration_s: float | None
     lost: int
+    restarted: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class PoseReading:
-    """The board's own dead reckoning, in the earth frame it has chosen for itself."""
+    """The board's own dead reckoning, in the earth frame it has chosen for itself.
+
+    ``lost`` displacements that it includes are known to be missing before it; they are not counted
+    again by the next displacement. ``restarted``: its counter begins anew, and so did the
+    displacements' some time before.
+    """
 
     x_m: float
     y_m: float
     yaw_rad: float
+    lost: int = 0
+    restarted: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,8 @@ from omnibot_driver.core.commands import CommandSettings, CommandStream
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits, require_finite
-from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometryNoise, Signs
+from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.se2 import Signs
 from omnibot_driver.core.supervisor import Phase, Request, RequestDone, Supervisor
 
 SILENCE_S: Final = 1.5
@@ -66,7 +67,7 @@ class SessionSettings:
 
     limits: SpeedLimits
     commands: CommandSettings
-    noise: OdometryNoise
+    odometry: OdometrySettings
 
 
 class Session:
@@ -87,7 +88,7 @@ class Session:
         self._commands = CommandStream(
             settings.commands, stop=board.stop(), emergency_stop=board.emergency_stop()
         )
-        self._odometry = Odometry(settings.noise, axis_signs)
+        self._odometry = Odometry(settings.odometry, axis_signs)
         self._axis_signs = axis_signs
         self._limits = settings.limits
         self._heard_at = self._came_at = -math.inf
@@ -124,12 +125,12 @@ class Session:
         """New settings, from the next command and frame on."""
         self._limits = settings.limits
         self._commands.settings = settings.commands
-        self._odometry.noise = settings.noise
+        self._odometry.settings = settings.odometry
 
     def opened(self, now: float) -> None:
         """The port is open."""
         self._board.connect()
-        self._start_anew()
+        self._commands.discard()
         self._silent, self._heard_at, self._came_at = False, now, -math.inf
         self._supervisor.opened(now)
         if self.estop_active:
@@ -156,7 +157,6 @@ class Session:
             self._events.append(Notice(self._why_silent()))
             if self._board.mode is not Mode.UNKNOWN:
                 self._board.silence()
-                self._start_anew()
                 self._commands.halt(now)
                 self._supervisor.heard_nothing(now)
         self._supervisor.tick(now)
@@ -244,11 +244,6 @@ class Session:
     def _closed(self) -> bool:
         return self._supervisor.phase is Phase.CLOSED
 
-    def _start_anew(self) -> None:
-        """Whatever the board does from here on has nothing to do with what it did before."""
-        self._commands.discard()
-        self._odometry.attach()
-
     def _take_in(self, readings: list[Reading], now: float) -> None:
         if not readings:
             return
@@ -260,10 +255,11 @@ class Session:
                 case DisplacementReading(lost=lost):
                     self._count_lost(lost, now)
                     self._events += self._odometry.displace(reading, now)
-                case PoseReading():
-                    self._events += self._odometry.learn_heading(reading)
+                case PoseReading(lost=lost):
+                    self._count_lost(lost, now)
+                    self._events += self._odometry.settle(reading)
                 case PausedReading(continues):
-                    self._start_anew()
+                    self._commands.discard()
                     self._supervisor.heard_paused(now, continues=continues)
         if self._odometry.heading_assumed and not self._heading_assumed:
             self._heading_assumed = True

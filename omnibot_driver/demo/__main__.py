@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Final
 
-from omnibot_driver.core.odometry import Pose
+from omnibot_driver.core.se2 import Pose
 from omnibot_driver.demo.display import Drive, introduce, report, show
 from omnibot_driver.demo.program import PATIENCE_S, DemoFailed, Program
 

@@ -9,7 +9,7 @@ from itertools import zip_longest
 from typing import Final
 
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.odometry import Pose
+from omnibot_driver.core.se2 import Pose
 from omnibot_driver.demo.square import SIDE_M
 
 HEADING: Final = """\

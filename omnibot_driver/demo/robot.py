@@ -14,7 +14,7 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, String
 
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.odometry import Pose
+from omnibot_driver.core.se2 import Pose
 from omnibot_driver.demo.display import status_row
 from omnibot_driver.demo.square import HALT, steer
 

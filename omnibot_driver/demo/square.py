@@ -5,7 +5,7 @@ from typing import Final
 
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import shorten
-from omnibot_driver.core.odometry import Pose
+from omnibot_driver.core.se2 import Pose
 
 SIDE_M: Final = 1.0
 SPEED_MPS: Final = 0.3

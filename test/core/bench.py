@@ -3,7 +3,7 @@
 from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits
-from omnibot_driver.core.odometry import OdometryEstimate, OdometryNoise
+from omnibot_driver.core.odometry import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.session import Event, Notice, Session, SessionSettings
 from omnibot_driver.core.supervisor import Request, RequestDone
@@ -30,7 +30,7 @@ class Bench:
         self.session = Session(
             OmniBot(OmniBotSettings(delta_frame=frame)),
             SessionSettings(
-                limits=SpeedLimits(), commands=CommandSettings(), noise=OdometryNoise()
+                limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
             ),
             run=run,
             axis_signs=axis_signs,

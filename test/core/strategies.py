@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.odometry import Pose
 from omnibot_driver.core.omnibot import (
     CommandFrame,
     DeltaFrame,
@@ -16,6 +15,7 @@ from omnibot_driver.core.omnibot import (
     PoseFrame,
 )
 from omnibot_driver.core.omnibot.frames import Frame
+from omnibot_driver.core.se2 import Pose
 
 # Words the board's bytes are hard to tell apart by: header look-alikes, FF in either byte, edges.
 TREACHEROUS_WORDS = [-6, -5, -4, -1, 0, 255, -256, 0x5061, 32767, -32768]

@@ -118,10 +118,14 @@ def lost(board: OmniBot, *sent: Frame) -> list[int]:
     return [reading.lost for reading in found if isinstance(reading, DisplacementReading)]
 
 
-@given(st.integers(0, 255), st.integers(0, 255))
-def test_missing_counts_are_lost_frames_across_the_wrap(start: int, gap: int) -> None:
-    """SEQ is one byte."""
-    assert lost(bot(), moved(start), moved((start + 1 + gap) % 256)) == [0, gap]
+@given(st.integers(0, 255), st.integers(0, 2000))
+def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, gap: int) -> None:
+    """SEQ is one byte; arrival times tell how often it has wrapped."""
+    board = bot()
+    readings(board, moved(start))
+    (reading,) = board.receive(encode(moved((start + 1 + gap) % 256)) + b"\xff", 0.04 * (gap + 1))
+    assert isinstance(reading, DisplacementReading)
+    assert (reading.lost, reading.duration_s, reading.restarted) == (gap, 0.04, False)
 
 
 def test_a_regular_sequence_has_no_losses() -> None:

@@ -48,6 +48,8 @@ DECISIONS = {
     "linear_scale",
     "angular_scale",
     "wheel_radius",
+    "base_radius",
+    "counts_per_revolution",
     "axis_signs",
     "delta_frame",
     "pose_byte_order",

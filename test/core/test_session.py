@@ -594,3 +594,22 @@ def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
     assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx((0.37, 0.43, 0.95), abs=0.06)
     assert (twist.vx_mps, twist.vy_mps) == pytest.approx((0.3, 0.1), abs=0.03)
     assert bench.written[-1][1][3] == (0 if signs[0] > 0 else 0xFF)
+
+
+def test_a_robot_that_drove_on_unheard_is_where_it_is_once_it_is_heard_again() -> None:
+    """The cable is out for three seconds while the board carries out its last command."""
+    bench = Bench(BoardSettings(initial_pose=BoardPose(4000.0, 0.0, 1571.0), running=True))
+    bench.open()
+    bench.run(1.0)
+    bench.drive(0.3, 0.0, 0.4)
+    bench.run(0.3)
+    bench.speaks = bench.hears = False
+    bench.close()
+    bench.run(3.0)
+    bench.speaks = bench.hears = True
+    bench.open()
+    bench.run(2.0)
+    truth, pose = bench.board.truth, bench.odometry[-1].pose
+    assert math.hypot(truth.x_m, truth.y_m) > 0.7
+    assert math.hypot(pose.x_m - truth.x_m, pose.y_m - truth.y_m) < 0.005
+    assert pose.yaw_rad == pytest.approx(truth.yaw_rad, abs=0.005)

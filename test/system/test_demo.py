@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 import omnibot_driver
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.odometry import Pose
+from omnibot_driver.core.se2 import Pose
 from omnibot_driver.demo import display, square
 
 PATIENCE_S = 60.0

@@ -5,6 +5,7 @@ poses mm and mrad; velocity and wheel commands in the firmware's own unit, which
 ``linear_scale`` and ``angular_scale`` translate (70 and 500 are the vendor's, found by hand).
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Final, Literal
 
@@ -18,7 +19,7 @@ from omnibot_driver.core.board import (
     Vector3,
 )
 from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, ImuScale
-from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
 from omnibot_driver.core.limits import to_words
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.decoder import FrameDecoder
@@ -30,12 +31,13 @@ from omnibot_driver.core.omnibot.frames import (
     ImuFrame,
     PausedFrame,
     PoseFrame,
+    Words,
 )
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
+from omnibot_driver.core.omnibot.sequence import Sequence
 
-DELTA_PERIOD_S: Final = 0.04
-DELTA_LSB_M: Final = 1e-4
-DELTA_LSB_RAD: Final = 1e-4
+DELTA_LSB: Final = (1e-4, 1e-4, 1e-4)
+"""m, m, rad."""
 POSE_LSB_M: Final = 1e-3
 POSE_LSB_RAD: Final = 1e-3
 
@@ -50,13 +52,16 @@ class OmniBotSettings:
     """What cannot be known from the wire.
 
     ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per rad/s; ``delta_frame``: whether deltas
-    are differences of positions in the board's earth frame or motion along its own axes.
+    are differences of positions in the board's earth frame, motion along its own axes, or (older
+    firmware) encoder counts of the wheels A, B, C.
     """
 
     linear_scale: float = 70.0
     angular_scale: float = 500.0
     wheel_radius_m: float = 0.029
-    delta_frame: Literal["earth", "body"] = "earth"
+    base_radius_m: float = 0.143
+    counts_per_revolution: int = 1560
+    delta_frame: Literal["earth", "body", "wheel_counts"] = "earth"
     pose_byte_order: ByteOrder = "big"
     imu: ImuScale = field(default_factory=ImuScale)
 
@@ -66,17 +71,17 @@ class OmniBot:
 
     def __init__(self, settings: OmniBotSettings) -> None:
         self.settings = settings
+        self._sequence = Sequence()
         self.connect()
 
     def connect(self) -> None:
-        """A new line: a new decoder, and no belief."""
+        """A new line: a new decoder, and no belief but in the board's counters."""
         self._decoder = FrameDecoder(
             self.settings.pose_byte_order, ACCEL_COUNTS_PER_G[self.settings.imu.accel_range_g]
         )
         self._modes = ModeTracker()
-        self._seq: int | None = None
-        self._paused = False
-        self._paused_count = 0
+        self._sequence.reconnect()
+        self._paused_count: int | None = None
 
     @property
     def mode(self) -> Mode:
@@ -85,11 +90,11 @@ class OmniBot:
 
     def receive(self, data: bytes, now: float) -> list[Reading]:
         """The readings that these bytes complete, in the order of the line."""
-        return [self._read(frame) for frame in self._decoder.feed(data, now)]
+        return [self._read(frame, now) for frame in self._decoder.feed(data, now)]
 
     def flush(self, now: float) -> list[Reading]:
         """The line is closed: what was held is all there will be."""
-        return [self._read(frame) for frame in self._decoder.flush(now)]
+        return [self._read(frame, now) for frame in self._decoder.flush(now)]
 
     def silence(self) -> None:
         """Nothing was understood for so long that the mode is unknown again."""
@@ -144,29 +149,50 @@ class OmniBot:
         a, b, c = to_words(counts)
         return frames.encode(CommandFrame(mode, (a, b, c))) if (a, b, c) != (0, 0, 0) else STOP
 
-    def _read(self, frame: Frame) -> Reading:
+    def _read(self, frame: Frame, now: float) -> Reading:
         self._modes.hear(frame)
         match frame:
             case ImuFrame(accel, gyro):
                 scale = self.settings.imu
                 return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro))
-            case DeltaFrame(dx, dy, dtheta, seq):
-                after_pause, self._paused = self._paused, False
-                return DisplacementReading(
-                    dx_m=dx * DELTA_LSB_M,
-                    dy_m=dy * DELTA_LSB_M,
-                    dyaw_rad=dtheta * DELTA_LSB_RAD,
-                    frame=self.settings.delta_frame,
-                    duration_s=None if after_pause else DELTA_PERIOD_S,
-                    lost=self._count_lost(seq),
+            case DeltaFrame():
+                return self._displacement(frame, now)
+            case PoseFrame(x, y, theta, seq):
+                step = self._sequence.pose(seq, now)
+                return PoseReading(
+                    x * POSE_LSB_M,
+                    y * POSE_LSB_M,
+                    theta * POSE_LSB_RAD,
+                    lost=step.lost,
+                    restarted=step.restarted,
                 )
-            case PoseFrame(x, y, theta, _):
-                return PoseReading(x * POSE_LSB_M, y * POSE_LSB_M, theta * POSE_LSB_RAD)
             case PausedFrame(count):
-                continues = self._paused and count == (self._paused_count + 1) % 256
-                self._seq, self._paused, self._paused_count = None, True, count
-                return PausedReading(continues)
+                before, self._paused_count = self._paused_count, count
+                self._sequence.pause()
+                return PausedReading(continues=before is not None and count == (before + 1) % 256)
 
-    def _count_lost(self, seq: int) -> int:
-        before, self._seq = self._seq, seq
-        return 0 if before is None else (seq - before - 1) % 256
+    def _displacement(self, frame: DeltaFrame, now: float) -> DisplacementReading:
+        self._paused_count = None
+        step = self._sequence.delta(frame.seq, now)
+        words = (frame.dx, frame.dy, frame.dtheta)
+        if self.settings.delta_frame == "wheel_counts":
+            dx, dy, dyaw = self._rolled(words)
+        else:
+            dx, dy, dyaw = (word * unit for word, unit in zip(words, DELTA_LSB, strict=True))
+        return DisplacementReading(
+            dx,
+            dy,
+            dyaw,
+            frame="earth" if self.settings.delta_frame == "earth" else "body",
+            duration_s=step.duration_s,
+            lost=step.lost,
+            restarted=step.restarted,
+        )
+
+    def _rolled(self, counts: Words) -> Vector3:
+        """The body's displacement from the wheels' counts (manual, "Odometry equation")."""
+        settings = self.settings
+        a, b, c = (count * math.tau / settings.counts_per_revolution for count in counts)
+        wheels = OmniKinematics(settings.wheel_radius_m, settings.base_radius_m)
+        rolled = wheels.body_twist((a, b, c))
+        return rolled.vx_mps, rolled.vy_mps, rolled.yaw_rate_radps

@@ -1,0 +1,60 @@
+"""The pose that is given out: moves with the robot, and nears the truth no faster than it could.
+
+Knows poses and speeds; not how the truth is found.
+"""
+
+from typing import Final
+
+from omnibot_driver.core.se2 import Pose
+
+SPREAD_S: Final = 0.2
+"""Time over which a correction is spread: that from one pose of the board to the next."""
+
+
+class Follower:
+    """``pose`` follows ``target``. What the robot could have moved and did not is kept as room."""
+
+    def __init__(self) -> None:
+        self.pose = self.target = Pose()
+        self._settling_s = 0.0
+        self._room_m = self._room_rad = 0.0
+
+    @property
+    def wrong(self) -> Pose:
+        """By how much ``pose`` is known to be off."""
+        return self.target - self.pose
+
+    def correct(self, chord: Pose) -> None:
+        """The target is elsewhere: this displacement away, in its own axes."""
+        self.target = self.target.moved(chord)
+        self._settling_s = SPREAD_S
+
+    def move(self, chord: Pose, room_m: float, room_rad: float) -> None:
+        """The robot moved so, in its own axes, and could have moved as far as the room."""
+        self.target = self.target.moved(chord)
+        self.pose = self.pose.moved(chord)
+        self._room_m += room_m - chord.way_m
+        self._room_rad += room_rad - abs(chord.yaw_rad)
+
+    def follow(self, seconds: float, *, keep_room: bool) -> None:
+        """Approach the target by this step's share.
+
+        Room is kept while something is wrong, or will be: what the robot could have moved in a gap
+        and did not by the bridge is left for the correction.
+        """
+        wrong = self.wrong
+        share = seconds / self._settling_s if self._settling_s > seconds else 1.0
+        self._settling_s = max(0.0, self._settling_s - seconds)
+        linear = min(share, _part(wrong.way_m, self._room_m))
+        angular = min(share, _part(abs(wrong.yaw_rad), self._room_rad))
+        step = wrong.times(linear, linear, angular)
+        self.pose += step
+        self._room_m -= step.way_m
+        self._room_rad -= abs(step.yaw_rad)
+        if not keep_room and self.wrong.tiny:
+            self._room_m = self._room_rad = 0.0
+
+
+def _part(wanted: float, room: float) -> float:
+    """How much of what is wanted there is room for."""
+    return min(1.0, max(0.0, room) / wanted) if wanted else 1.0

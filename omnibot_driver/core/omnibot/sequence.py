@@ -1,0 +1,94 @@
+"""The board's counters: how many deltas are missing, and whether it has begun to count anew.
+
+SEQ is one byte and wraps every 10.24 s; arrival times tell how often. A pose comes with every fifth
+delta and has a counter of its own, so it can tell of losses before the next delta does. This module
+knows nothing of what is in a frame.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+DELTA_PERIOD_S: Final = 0.04
+DELTAS_PER_POSE: Final = 5
+WRAP: Final = 256
+
+LATE_S: Final = 0.5
+"""Arrival may differ so much from the board's count: beyond, the count did not simply go on."""
+EARLY_S: Final = 0.2
+"""More than this cannot have been sent since the last delta came in, than has passed since then."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """From one delta to the next: ``lost`` between them that no pose has told of.
+
+    ``duration_s`` is None where the time is not known; ``restarted``: the counter seems to begin
+    anew, which only the board's pose can prove.
+    """
+
+    lost: int
+    duration_s: float | None = DELTA_PERIOD_S
+    restarted: bool = False
+
+
+class Sequence:
+    """The counters of one board, over any number of connections."""
+
+    def __init__(self) -> None:
+        self._delta: int | None = None
+        self._delta_at = 0.0
+        self._pose: int | None = None
+        self._since_pose = 0
+        self._told = 0
+        self._regular = False
+        """Five deltas to a pose were seen; only then is a sixth missed."""
+        self._paused = self._reconnected = False
+
+    def pause(self) -> None:
+        """The board said that it is paused: what comes next takes up the count, or begins anew."""
+        self._paused, self._pose = True, None
+
+    def reconnect(self) -> None:
+        """The line is new."""
+        self._reconnected, self._pose = True, None
+
+    def delta(self, count: int, now: float) -> Step:
+        """A delta with this count came in."""
+        before, self._delta = self._delta, count
+        elapsed_s, self._delta_at = now - self._delta_at, now
+        paused, self._paused = self._paused, False
+        reconnected, self._reconnected = self._reconnected, False
+        told, self._told = self._told, 0
+        if before is None:
+            return Step(0, None if paused else DELTA_PERIOD_S)
+        lost = (count - before - 1) % WRAP
+        if paused:
+            return Step(0, None, restarted=count <= lost)
+        wraps = max(0, round((elapsed_s / DELTA_PERIOD_S - lost - 1) / WRAP))
+        lost += wraps * WRAP
+        late_s = abs((lost + 1) * DELTA_PERIOD_S - elapsed_s)
+        from_zero = count * DELTA_PERIOD_S <= elapsed_s + EARLY_S
+        if lost and late_s > LATE_S and (from_zero or reconnected):
+            self._pose = None
+            return Step(0, None, restarted=True)
+        lost -= min(lost, told)
+        self._since_pose += lost + 1
+        return Step(lost)
+
+    def pose(self, count: int, now: float) -> Step:
+        """A pose with this count came in: what is missing of the deltas that it includes."""
+        before, self._pose = self._pose, count
+        counted, self._since_pose = self._since_pose, 0
+        if before is None or self._delta is None:
+            return Step(0)
+        passed = (count - before) % WRAP * DELTAS_PER_POSE
+        self._regular = self._regular or 0 < passed == counted
+        if not self._regular:
+            return Step(0)
+        from_zero = abs(count * DELTAS_PER_POSE - self._delta) <= DELTAS_PER_POSE
+        if from_zero and abs(passed - counted) > 2 * DELTAS_PER_POSE:
+            return Step(0, None, restarted=True)
+        missing = max(0, passed - counted)
+        in_time = missing * DELTA_PERIOD_S <= now - self._delta_at + EARLY_S
+        self._told = missing if in_time else 0
+        return Step(self._told)

@@ -1,0 +1,78 @@
+"""The plane: poses, and the way from one to another. Knows geometry, nothing that moves in it."""
+
+import math
+from dataclasses import dataclass
+
+from omnibot_driver.core.kinematics import BodyTwist
+
+Signs = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Position in m and unwrapped yaw in rad; also a displacement, or a tangent (twist x time)."""
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    yaw_rad: float = 0.0
+
+    def __add__(self, other: "Pose") -> "Pose":
+        """Component by component, as differences in one frame add up."""
+        return Pose(self.x_m + other.x_m, self.y_m + other.y_m, self.yaw_rad + other.yaw_rad)
+
+    def __sub__(self, other: "Pose") -> "Pose":
+        """Component by component."""
+        return self + other.times(-1.0, -1.0, -1.0)
+
+    def times(self, x: float, y: float, yaw: float) -> "Pose":
+        """Component by component."""
+        return Pose(x * self.x_m, y * self.y_m, yaw * self.yaw_rad)
+
+    @property
+    def way_m(self) -> float:
+        """Length of the position."""
+        return math.hypot(self.x_m, self.y_m)
+
+    @property
+    def finite(self) -> bool:
+        """No NaN and no infinity in it."""
+        return all(map(math.isfinite, (self.x_m, self.y_m, self.yaw_rad)))
+
+    @property
+    def tiny(self) -> bool:
+        """Nothing but the rounding of floats."""
+        return self.way_m < 1e-9 and abs(self.yaw_rad) < 1e-9
+
+    def turned(self, angle_rad: float) -> "Pose":
+        """The same displacement seen from axes turned by ``-angle_rad``; yaw stays."""
+        cos, sin = math.cos(angle_rad), math.sin(angle_rad)
+        return Pose(cos * self.x_m - sin * self.y_m, sin * self.x_m + cos * self.y_m, self.yaw_rad)
+
+    def moved(self, displacement: "Pose") -> "Pose":
+        """The pose after a displacement given in this pose's own axes."""
+        return self + displacement.turned(self.yaw_rad)
+
+    def way_to(self, other: "Pose") -> "Pose":
+        """The displacement in this pose's own axes that leads there, the shorter turn of both."""
+        way = (other - self).turned(-self.yaw_rad)
+        return Pose(way.x_m, way.y_m, math.remainder(way.yaw_rad, math.tau))
+
+    def over(self, duration_s: float) -> BodyTwist:
+        """The constant twist that makes this tangent in this time."""
+        return BodyTwist(self.x_m / duration_s, self.y_m / duration_s, self.yaw_rad / duration_s)
+
+
+def unroll(chord: Pose) -> Pose:
+    """The constant twist times duration (the SE(2) logarithm) whose result is this displacement."""
+    half = chord.yaw_rad / 2
+    stretch = half / math.sin(half) if half else 1.0
+    along = chord.turned(-half)
+    return Pose(stretch * along.x_m, stretch * along.y_m, chord.yaw_rad)
+
+
+def roll(tangent: Pose) -> Pose:
+    """The displacement that a constant twist times duration makes (the SE(2) exponential)."""
+    half = tangent.yaw_rad / 2
+    shrink = math.sin(half) / half if half else 1.0
+    along = tangent.turned(half)
+    return Pose(shrink * along.x_m, shrink * along.y_m, tangent.yaw_rad)

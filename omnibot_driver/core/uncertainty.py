@@ -1,0 +1,157 @@
+"""How far the odometry may be off: what it does not know, kept apart by where it comes from.
+
+* What the wheels do not tell: the slip of every metre (a random walk), and wheels that are larger
+  or smaller than believed or slip all the time (the same error in every turn of a wheel, so it
+  grows with the way itself, and a way back undoes it).
+* ``gap`` is the motion that nobody reported; a pose of the board tells it after all.
+* What is known to be wrong and still being put right counts in full.
+
+Knows covariances and the wheels' geometry; no time, no frames, no board.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+from omnibot_driver.core.kinematics import OmniKinematics
+from omnibot_driver.core.se2 import Pose
+
+INITIAL_VARIANCE: Final = 1e-6
+"""(1 mm)² and (1 mrad)²: about the resolution of the board's own poses."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometryNoise:
+    """How uncertainty grows. Each wheel goes wrong by itself, and the body with it.
+
+    ``wheel_drift``: standard deviation in m of a random walk after 1 m of rim; ``wheel_scale``: of
+    a wheel's relative size error; ``wheel_slip``: the mean part of the way that slip takes from all
+    wheels alike; ``unheard_mps2``, ``unheard_radps2``: acceleration of a robot that nobody hears.
+    """
+
+    wheel_drift: float = 0.0035
+    wheel_scale: float = 0.01
+    wheel_slip: float = 0.02
+    base_radius_m: float = 0.143
+    unheard_mps2: float = 1.0
+    unheard_radps2: float = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Covariance:
+    """Of (x, y, yaw) in the odometry frame: m², m·rad, rad²; symmetric."""
+
+    xx: float = INITIAL_VARIANCE
+    xy: float = 0.0
+    x_yaw: float = 0.0
+    yy: float = INITIAL_VARIANCE
+    y_yaw: float = 0.0
+    yaw_yaw: float = INITIAL_VARIANCE
+
+    @classmethod
+    def diagonal(cls, m2: float, rad2: float) -> "Covariance":
+        """Of independent errors."""
+        return cls(m2, 0.0, 0.0, m2, 0.0, rad2)
+
+    @classmethod
+    def of(cls, error: Pose, factor: float = 1.0) -> "Covariance":
+        """Of an error along one line in (x, y, yaw)."""
+        x, y, yaw = error.x_m, error.y_m, error.yaw_rad
+        return cls(
+            *(factor * value for value in (x * x, x * y, x * yaw, y * y, y * yaw, yaw * yaw))
+        )
+
+    def __add__(self, other: "Covariance") -> "Covariance":
+        """Of the sum of two independent errors."""
+        return Covariance(
+            self.xx + other.xx,
+            self.xy + other.xy,
+            self.x_yaw + other.x_yaw,
+            self.yy + other.yy,
+            self.y_yaw + other.y_yaw,
+            self.yaw_yaw + other.yaw_yaw,
+        )
+
+    def carried(self, way: Pose) -> "Covariance":
+        """After a displacement given in the odometry frame: a wrong yaw makes a wrong way."""
+        dx_m, dy_m = way.x_m, way.y_m
+        return Covariance(
+            xx=self.xx - 2 * dy_m * self.x_yaw + dy_m**2 * self.yaw_yaw,
+            xy=self.xy + dx_m * self.x_yaw - dy_m * self.y_yaw - dx_m * dy_m * self.yaw_yaw,
+            x_yaw=self.x_yaw - dy_m * self.yaw_yaw,
+            yy=self.yy + 2 * dx_m * self.y_yaw + dx_m**2 * self.yaw_yaw,
+            y_yaw=self.y_yaw + dx_m * self.yaw_yaw,
+            yaw_yaw=self.yaw_yaw,
+        )
+
+
+NOTHING: Final = Covariance.diagonal(0.0, 0.0)
+
+
+class Uncertainty:
+    """``noise`` may be replaced at any time."""
+
+    def __init__(self, noise: OdometryNoise) -> None:
+        self.noise = noise
+        self.gap = NOTHING
+        self._walk = Covariance()
+        self._levers = (Pose(), Pose(), Pose())
+        """What the pose is off by, per relative size error of wheel A, B, C."""
+
+    def move(self, heading_rad: float, tangent: Pose) -> None:
+        """The body moved along this tangent from this heading."""
+        heading_rad += tangent.yaw_rad / 2
+        way = tangent.turned(heading_rad)
+        self._walk = self._walk.carried(way)
+        self.gap = self.gap.carried(way)
+        levers = []
+        for lever, (rim_m, part) in zip(self._levers, self._by_wheel(tangent), strict=True):
+            along = part.turned(heading_rad)
+            turned = Pose(-way.y_m * lever.yaw_rad, way.x_m * lever.yaw_rad)
+            levers.append(lever + turned + along.times(rim_m, rim_m, rim_m))
+            self._walk += Covariance.of(along, self.noise.wheel_drift**2 * abs(rim_m))
+        self._levers = (levers[0], levers[1], levers[2])
+
+    def _by_wheel(self, tangent: Pose) -> Iterator[tuple[float, Pose]]:
+        """For wheels A, B, C: how far the rim rolled, and what a metre of it alone does."""
+        wheels = _wheels(self.noise.base_radius_m)
+        return zip(wheels.wheel_rates(tangent.over(1.0)), _alone(wheels), strict=True)
+
+    def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
+        """Nobody reported the motion of this time; the speeds before and after it are known.
+
+        A robot that speeds up and brakes again meanwhile is a quarter of a·t² away from the even
+        way, and never further than its speed allows.
+        """
+        square = duration_s * duration_s / 4
+        self.gap += Covariance.diagonal(
+            min(self.noise.unheard_mps2 * square, fastest_mps * duration_s) ** 2,
+            min(self.noise.unheard_radps2 * square, fastest_radps * duration_s) ** 2,
+        )
+
+    def settle(self) -> None:
+        """The motion in all gaps is known now."""
+        self.gap = NOTHING
+
+    def give_up(self) -> None:
+        """The motion in all gaps will never be known."""
+        self._walk, self.gap = self._walk + self.gap, NOTHING
+
+    def total(self, open_error: Pose) -> Covariance:
+        """Of a pose that is known to be off by ``open_error`` and otherwise at its best."""
+        covariance = self._walk + self.gap + Covariance.of(open_error)
+        for lever in self._levers:
+            covariance += Covariance.of(lever, self.noise.wheel_scale**2)
+        return covariance + Covariance.of(sum(self._levers, Pose()), self.noise.wheel_slip**2)
+
+
+@cache
+def _wheels(base_radius_m: float) -> OmniKinematics:
+    return OmniKinematics(wheel_radius_m=1.0, base_radius_m=base_radius_m)
+
+
+@cache
+def _alone(wheels: OmniKinematics) -> tuple[Pose, ...]:
+    alone = map(wheels.body_twist, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    return tuple(Pose(twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps) for twist in alone)

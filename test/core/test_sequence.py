@@ -1,0 +1,109 @@
+"""What the board's counters tell: losses, wraps, pauses, restarts."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.core.omnibot.sequence import Sequence, Step
+
+counts = st.integers(0, 255)
+
+
+def begun(count: int) -> Sequence:
+    """Half a minute under way, the last delta with this count at 100 s, no pose since."""
+    sequence = Sequence()
+    sequence.delta(count, 100.0)
+    return sequence
+
+
+@given(counts, st.integers(0, 1000), st.floats(-0.4, 0.4))
+def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
+    count: int, lost: int, late_s: float
+) -> None:
+    """By up to half a second."""
+    step = begun(count).delta((count + 1 + lost) % 256, 100.0 + 0.04 * (lost + 1) + late_s)
+    assert step == Step(lost)
+
+
+@given(counts, st.floats(0.0, 5.0))
+def test_the_next_count_is_no_gap_however_late_it_comes(count: int, late_s: float) -> None:
+    """A host that hangs loses nothing by that."""
+    assert begun(count).delta((count + 1) % 256, 100.04 + late_s) == Step(0)
+
+
+@given(counts, st.floats(0.0, 1000.0))
+def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
+    """The time is not known; only at the very wrap it may as well be a restart."""
+    sequence = begun(count)
+    sequence.pause()
+    step = sequence.delta((count + 1) % 256, 100.0 + paused_s)
+    assert step == Step(0, None, restarted=count == 255)
+
+
+@given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
+def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
+    """Also when the first deltas are lost; unless the old count goes on as well."""
+    sequence = begun(count)
+    sequence.pause()
+    goes_on = (lost - count - 1) % 256
+    step = sequence.delta(lost, 100.0 + after_s)
+    assert step == Step(0, None, restarted=lost <= goes_on)
+
+
+@pytest.mark.parametrize("count", [20, 77, 150, 240])
+def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
+    """Zero after two seconds is no gap of (255 - count) x 40 ms."""
+    assert begun(count).delta(0, 102.0).restarted
+
+
+def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
+    """They are not lost a second time with the next delta."""
+    sequence = Sequence()
+    for count in range(10):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            assert sequence.pose(count // 5, count * 0.04) == Step(0)
+    for count in (10, 11):
+        sequence.delta(count, count * 0.04)
+    assert sequence.pose(2, 14 * 0.04) == Step(3)
+    assert sequence.delta(16, 16 * 0.04) == Step(1)
+
+
+def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
+    """Two seconds after 205 the count is at zero anyway, but not that of the poses."""
+    sequence = Sequence()
+    for count in range(206):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    after_s = 205 * 0.04 + 2.0
+    assert sequence.delta(0, after_s) == Step(50)
+    for count in range(1, 5):
+        assert sequence.delta(count, after_s + count * 0.04) == Step(0)
+    assert sequence.pose(0, after_s + 0.16).restarted
+
+
+def test_a_pose_of_another_rhythm_tells_nothing() -> None:
+    """Two deltas to a pose, say."""
+    sequence = Sequence()
+    for count in range(20):
+        assert sequence.delta(count, count * 0.04) == Step(0)
+        if count % 2:
+            assert sequence.pose(count // 2, count * 0.04) == Step(0)
+
+
+def test_a_pose_counter_that_begins_anew_is_no_gap() -> None:
+    """It would be longer than the time since the last delta."""
+    sequence = Sequence()
+    for count in range(25):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    assert sequence.pose(0, 25 * 0.04 + 1.0) == Step(0)
+
+
+def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
+    """Its count fits neither."""
+    sequence = begun(7)
+    sequence.reconnect()
+    assert sequence.delta(200, 103.0) == Step(0, None, restarted=True)
