@@ -15,7 +15,7 @@ from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits
-from omnibot_driver.core.odometry import OdometryNoise
+from omnibot_driver.core.odometry import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.session import Event, ImuEstimate, Session, SessionSettings
 from omnibot_driver.link import Link
@@ -61,7 +61,7 @@ class Listener:
 
 def session() -> Session:
     settings = SessionSettings(
-        limits=SpeedLimits(), commands=CommandSettings(), noise=OdometryNoise()
+        limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
     )
     return Session(OmniBot(OmniBotSettings()), settings, run=True)
 
