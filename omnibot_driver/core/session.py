@@ -21,6 +21,7 @@ from omnibot_driver.core.board import (
     Vector3,
 )
 from omnibot_driver.core.commands import CommandSettings, CommandStream
+from omnibot_driver.core.device_clock import DeviceClock
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits, require_finite
@@ -88,6 +89,7 @@ class Session:
             settings.commands, stop=board.stop(), emergency_stop=board.emergency_stop()
         )
         self._odometry = Odometry(settings.noise, axis_signs)
+        self._clock = DeviceClock(board.tick_s)
         self._axis_signs = axis_signs
         self._limits = settings.limits
         self._heard_at = -math.inf
@@ -239,18 +241,20 @@ class Session:
         """Whatever the board does from here on has nothing to do with what it did before."""
         self._commands.discard()
         self._odometry.attach()
+        self._clock.restart()
 
     def _take_in(self, readings: list[Reading], now: float) -> None:
+        stamps_s = self._clock.stamps(readings, now, self._board.missing_s)
         if not readings:
             return
         self._heard_at = now
-        for reading in readings:
+        for reading, stamp_s in zip(readings, stamps_s, strict=True):
             match reading:
                 case ImuReading(force, rate):
-                    self._events.append(ImuEstimate(now, force, rate))
+                    self._events.append(ImuEstimate(stamp_s, force, rate))
                 case DisplacementReading(lost=lost):
                     self._count_lost(lost, now)
-                    self._events += self._odometry.displace(reading, now)
+                    self._events += self._odometry.displace(reading, stamp_s)
                 case PoseReading():
                     self._events += self._odometry.learn_heading(reading)
                 case PausedReading():
