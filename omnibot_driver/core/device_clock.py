@@ -26,10 +26,11 @@ from omnibot_driver.core.board import DisplacementReading, ImuReading, Reading
 
 BLOCK_TICKS: Final = 100
 """The least delayed arrival of so many ticks is kept: of one second."""
-BLOCKS_KEPT: Final = 45
+BLOCKS_KEPT: Final = 75
 """An adapter's timer and the board's tick beat against each other, within 100 ppm, every 20 s."""
-LARGEST_SKEW: Final = 1.5e-4
+LARGEST_SKEW: Final = 1.2e-4
 """Of the board's crystal against the host's; 100 ppm each."""
+SUPPORT: Final = 0.75
 LARGEST_LOSS_TICKS: Final = 25
 """If more are missing that no counter has told, then nothing that was known holds any more."""
 BEAT_READS: Final = 40
@@ -83,12 +84,12 @@ class DeviceClock:
         """
         kinds = [type(reading) for reading in readings]
         ticks = self._count(readings)
-        displaced = DisplacementReading in kinds
+        displaced, alone = DisplacementReading in kinds, kinds.count(ImuReading) <= 1
         short = 0
         if missing_s is not None:
-            short = self._compare(self._tick + 1, now + missing_s, displaced=displaced)
+            short = self._compare(self._tick + 1, now + missing_s, displaced=displaced, alone=alone)
         elif displaced or ImuReading in kinds:
-            short = self._compare(self._tick, now, displaced=displaced)
+            short = self._compare(self._tick, now, displaced=displaced, alone=alone)
         stamps = []
         for left, tick, kind in zip(range(len(ticks), 0, -1), ticks, kinds, strict=True):
             if kind is ImuReading or (kind is DisplacementReading and tick != self._stamped_tick):
@@ -121,7 +122,7 @@ class DeviceClock:
         passed = round(reading.duration_s / self._period_s) * (reading.lost + 1)
         return self._displaced_tick + passed - self._tick
 
-    def _compare(self, tick: int, arrival: float, *, displaced: bool) -> int:
+    def _compare(self, tick: int, arrival: float, *, displaced: bool, alone: bool) -> int:
         """Hold the last tick against its arrival; by how many the count was found to be short."""
         if tick == self._seen_tick:
             return 0  # its beginning has been seen before, and told more
@@ -129,14 +130,15 @@ class DeviceClock:
             self._anchor = (tick, arrival)
         lag_s = arrival - self._line(tick)
         short = 0
-        if lag_s > self._usual_lag_s + 0.5 * self._period_s:
+        usual_s = self._usual_lag_s if alone and not displaced else self._period_s
+        if lag_s > usual_s + 0.5 * self._period_s:
             short = max(1, math.floor(lag_s / self._period_s) - 1)
         elif lag_s < -0.5 * self._period_s and self._settled:
             short = round(lag_s / self._period_s)
             self._usual_lag_s = self._period_s
         if short > LARGEST_LOSS_TICKS:
             self.restart()
-            return self._compare(tick, arrival, displaced=displaced)
+            return self._compare(tick, arrival, displaced=displaced, alone=alone)
         if short:
             self._recount(short, counter_too=displaced)
         else:
@@ -196,7 +198,7 @@ class DeviceClock:
             while len(hull) > 1 and _slope(hull[-2], point) <= _slope(hull[-2], hull[-1]):
                 hull.pop()
             hull.append(point)
-        middle = (hull[0][0] + hull[-1][0]) / 2
+        middle = hull[0][0] + SUPPORT * (hull[-1][0] - hull[0][0])
         for before, after in pairwise(hull):
             if after[0] >= middle:
                 skew = _slope(before, after) / self._period_s - 1.0
