@@ -130,7 +130,7 @@ class DeviceClock:
             self._anchor = (tick, arrival)
         lag_s = arrival - self._line(tick)
         short = 0
-        usual_s = self._usual_lag_s if alone and not displaced else self._period_s
+        usual_s = self._usual_lag_s if alone and not displaced else 2 * self._period_s
         if lag_s > usual_s + 0.5 * self._period_s:
             short = max(1, math.floor(lag_s / self._period_s) - 1)
         elif lag_s < -0.5 * self._period_s and self._settled:
