@@ -9,9 +9,9 @@ all that has come, so the last tick in it is hardly older than one period.
 
 *When was it?* Drawn over their ticks, arrivals lie on or above a straight line whose slope is the
 true period. The least delayed arrival of every second is kept, and the line is laid under those of
-the last while as close as it goes: it is the edge of their lower convex hull over their middle. An
-arrival below the line moves it at once. Bursts, stalls and losses only make points above the line.
-What stays in the stamps is the least delay that ever happens: one constant.
+the last while as close as it goes: it is an edge of their lower convex hull. An arrival below the
+line moves it at once. Bursts, stalls and losses only make points above the line. What stays in the
+stamps is the least delay that ever happens: one constant.
 
 This module knows readings and times. It reads no clock and knows no board's bytes.
 """
@@ -29,12 +29,14 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """An adapter's timer and the board's tick beat against each other, within 100 ppm, every 20 s."""
 LARGEST_SKEW: Final = 1.2e-4
-"""Of the board's crystal against the host's; 100 ppm each."""
+"""Of the board's crystal against the host's: 100 ppm, and a little."""
 SUPPORT: Final = 0.75
+"""The line touches the points on both sides of this part of their span: late enough to follow what
+has lately been found out, early enough not to follow the last second's jitter."""
 LARGEST_LOSS_TICKS: Final = 25
 """If more are missing that no counter has told, then nothing that was known holds any more."""
-BEAT_READS: Final = 40
-"""Among so many reads one is little delayed, however they are cut."""
+BEAT_READS: Final = 12
+"""Among so many reads one is little delayed: a 16 ms adapter's cuts recur after five."""
 LARGEST_RISE: Final = 0.02
 """By this part of a period a stamp follows, each tick, a line that was laid later."""
 SMALLEST_STEP_S: Final = 1e-6
@@ -92,8 +94,10 @@ class DeviceClock:
             short = self._compare(self._tick, now, displaced=displaced, alone=alone)
         stamps = []
         for left, tick, kind in zip(range(len(ticks), 0, -1), ticks, kinds, strict=True):
-            if kind is ImuReading or (kind is DisplacementReading and tick != self._stamped_tick):
-                self._stamp(tick + short, now, left)
+            own = tick + short != self._stamped_tick
+            if kind is ImuReading or (kind is DisplacementReading and own):
+                latest_s = now - max(0, ticks[-1] - tick) * self._period_s
+                self._stamp(tick + short, latest_s, (now - self._stamp_s) / (left + 1))
             stamps.append(self._stamp_s)
         return stamps
 
@@ -170,7 +174,8 @@ class DeviceClock:
             ):
                 self._best = (tick, arrival)
             if tick - self._block_from >= BLOCK_TICKS:
-                self._points.append(self._best)
+                if not self._points or self._points[-1][0] < self._best[0]:
+                    self._points.append(self._best)
                 self._lay_line()
                 self._best, self._block_from = None, tick
         if self._beat_reads == BEAT_READS:
@@ -207,17 +212,17 @@ class DeviceClock:
                 break
         self._anchor = min(hull, key=lambda point: point[1] - self._slope_s * point[0])
 
-    def _stamp(self, tick: int, now: float, left: int) -> None:
-        """The line's time, reached without a jump backwards, and forwards only little by little.
+    def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
+        """The line's time, but no jump backwards, and forwards only little by little.
 
-        ``left``: at most so many stamps must find room before ``now``, this one included.
+        ``room_s``: by so much it may go forward and leave as much to each that comes after it.
         """
-        stamp_s = min(self._line(tick), now - (self._tick - tick) * self._period_s)
+        stamp_s = min(self._line(tick), latest_s)
         if self._stamped_tick is not None:
             passed = max(1, tick - self._stamped_tick)
             stamp_s = min(stamp_s, self._stamp_s + passed * self._period_s * (1 + LARGEST_RISE))
-        room_s = min(self._period_s / 2, (now - self._stamp_s) / (left + 1))
-        self._stamp_s = max(stamp_s, self._stamp_s + max(SMALLEST_STEP_S, room_s))
+        step_s = max(SMALLEST_STEP_S, min(self._period_s / 2, room_s))
+        self._stamp_s = max(stamp_s, self._stamp_s + step_s)
         self._stamped_tick = tick
 
 

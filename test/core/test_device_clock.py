@@ -19,6 +19,7 @@ SEEDS = range(3)
 SKEWS = [1e-4, -1e-4]
 JITTER_S = 60e-6
 SETTLED_S = 2.0
+SAMPLE = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 COUNTS = 16384 / STANDARD_GRAVITY
 
 
@@ -210,6 +211,28 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
         assert all(stamp_s == stamp_of[tick] for tick, stamp_s, _ in stamped.displacements)
 
 
+def test_whatever_comes_stamps_increase_and_are_not_later_than_arrival() -> None:
+    """Counters that leap, samples that come twice or not at all, pauses and hasty arrivals."""
+    for seed in range(40):
+        rng = random.Random(seed)
+        clock = DeviceClock(0.01)
+        now, last_s = 1000.0, -math.inf
+        for _ in range(1500):
+            now += rng.choice([0.001, 0.01, 0.01, 0.016, 0.001 + rng.expovariate(20.0)])
+            readings: list[ImuReading | DisplacementReading] = []
+            for _ in range(rng.choice([0, 1, 1, 1, 2, 30])):
+                lost = rng.choice([0] * 20 + [1, 255])
+                readings += [SAMPLE] * rng.choice([3, 4, 4, 4, 5])
+                readings.append(DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, lost))
+            missing_s = rng.choice([None, None, 0.0, 0.001])
+            for reading, stamp_s in zip(
+                readings, clock.stamps(readings, now, missing_s), strict=True
+            ):
+                assert stamp_s <= now
+                assert last_s < stamp_s if reading is SAMPLE else last_s <= stamp_s
+                last_s = stamp_s
+
+
 def test_displacements_alone_are_stamped_forwards() -> None:
     """Should every sample be lost, or a board have none."""
     clock = DeviceClock(0.01)
@@ -222,7 +245,6 @@ def test_displacements_alone_are_stamped_forwards() -> None:
 def test_stamps_increase_even_where_arrival_times_do_not() -> None:
     """By a microsecond each, when a clock as coarse as that hands all of them in at once."""
     clock = DeviceClock(0.01)
-    reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    stamps_s = [clock.stamps([reading], 5.0)[0] for _ in range(100)]
+    stamps_s = [clock.stamps([SAMPLE], 5.0)[0] for _ in range(100)]
     assert all(before < after for before, after in pairwise(stamps_s))
     assert stamps_s[-1] == pytest.approx(5.0, abs=1e-3)
