@@ -36,7 +36,7 @@ _HEADER_BEGIN: Final = IMU_HEADER[0]
 _TEXT_BEGIN: Final = _PAUSED_WORD[0]
 IMU_LENGTH: Final = _IMU.size
 BYTE_S: Final = 10 / 115200
-"""Eight data bits, a start and a stop bit."""
+"""One byte on the line: eight data bits, a start and a stop bit, at the board's 115200 baud."""
 _LENGTH_BY_TYPE: Final[dict[int, int]] = {
     IMU_HEADER[1]: _IMU.size,
     DELTA_HEADER[1]: _DELTA.size,
