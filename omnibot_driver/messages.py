@@ -109,6 +109,15 @@ def time_message(nanoseconds: int) -> Time:
     return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
 
 
+def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
+    """Wall clock less steady clock, where the wall clock was read between two steady readings.
+
+    ``known_ns``, the offset so far, stands unless that contradicts it: a thread put to sleep
+    between the readings makes no jitter, and a step of the wall clock is followed at once.
+    """
+    return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
+
+
 def yaw_quaternion(yaw_rad: float) -> Quaternion:
     """A rotation about z."""
     return Quaternion(x=0.0, y=0.0, z=math.sin(yaw_rad / 2), w=math.cos(yaw_rad / 2))

@@ -66,6 +66,7 @@ class OmniBotDriver(Node):
         )
         self._state_lock = threading.Lock()
         self._told: set[str] = set()
+        self._clock_offset_ns = 0
         self._handlers: dict[type, Callable[[Any, int], None]] = {
             ImuEstimate: self._publish_imu,
             OdometryEstimate: self._publish_odometry,
@@ -149,9 +150,13 @@ class OmniBotDriver(Node):
     def _deliver(self, events: Sequence[Event]) -> None:
         if not events or not self.context.ok():
             return
-        clock_offset_ns = self.get_clock().now().nanoseconds - time.monotonic_ns()
+        before_ns = time.monotonic_ns()
+        wall_ns = self.get_clock().now().nanoseconds
+        self._clock_offset_ns = messages.clock_offset(
+            self._clock_offset_ns, before_ns, wall_ns, time.monotonic_ns()
+        )
         for event in events:
-            self._handlers[type(event)](event, clock_offset_ns)
+            self._handlers[type(event)](event, self._clock_offset_ns)
 
     def _publish_imu(self, estimate: ImuEstimate, clock_offset_ns: int) -> None:
         stamp = messages.time_message(round(estimate.stamp_s * 1e9) + clock_offset_ns)

@@ -24,6 +24,15 @@ def test_a_stamp_is_seconds_and_nanoseconds() -> None:
     assert (STAMP.sec, STAMP.nanosec) == (1_700_000_000, 123_456_789)
 
 
+def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
+    """Readings that only took long contradict nothing; a step either way does."""
+    offset = messages.clock_offset(0, 1_000, 500_001_002, 1_004)
+    assert 500_000_000 - 2 <= offset <= 500_000_002
+    assert messages.clock_offset(offset, 2_000, 500_002_900, 903_000) == offset
+    assert messages.clock_offset(offset, 3_000, 900_003_002, 3_004) == 899_999_998
+    assert messages.clock_offset(offset, 3_000, 100_003_002, 3_004) == 100_000_002
+
+
 def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
     """Pose in odom, twist in base_link, covariances row-major over x, y, z, roll, pitch, yaw."""
     estimate = OdometryEstimate(

@@ -89,6 +89,17 @@ class Board(Protocol):
     def mode(self) -> Mode:
         """The present belief."""
 
+    @property
+    def tick_s(self) -> float:
+        """The nominal time from one ImuReading to the next."""
+
+    @property
+    def missing_s(self) -> float | None:
+        """How long the line needs for the rest of an ImuReading that has begun; None if none has.
+
+        The beginning tells when the reading was sampled better than an end that is delivered late.
+        """
+
     def connect(self) -> None:
         """The line is new: nothing that was held or believed is worth anything any more."""
 

@@ -21,6 +21,7 @@ from omnibot_driver.core.board import (
     Vector3,
 )
 from omnibot_driver.core.commands import CommandSettings, CommandStream
+from omnibot_driver.core.device_clock import DeviceClock
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits, require_finite
@@ -89,6 +90,7 @@ class Session:
             settings.commands, stop=board.stop(), emergency_stop=board.emergency_stop()
         )
         self._odometry = Odometry(settings.odometry, axis_signs)
+        self._clock = DeviceClock(board.tick_s)
         self._axis_signs = axis_signs
         self._limits = settings.limits
         self._heard_at = self._came_at = -math.inf
@@ -131,6 +133,7 @@ class Session:
         """The port is open."""
         self._board.connect()
         self._commands.discard()
+        self._clock.restart()
         self._silent, self._heard_at, self._came_at = False, now, -math.inf
         self._supervisor.opened(now)
         if self.estop_active:
@@ -157,6 +160,7 @@ class Session:
             self._events.append(Notice(self._why_silent()))
             if self._board.mode is not Mode.UNKNOWN:
                 self._board.silence()
+                self._clock.restart()
                 self._commands.halt(now)
                 self._supervisor.heard_nothing(now)
         self._supervisor.tick(now)
@@ -245,21 +249,23 @@ class Session:
         return self._supervisor.phase is Phase.CLOSED
 
     def _take_in(self, readings: list[Reading], now: float) -> None:
+        stamps_s = self._clock.stamps(readings, now, self._board.missing_s)
         if not readings:
             return
         self._heard_at, self._silent = now, False
-        for reading in readings:
+        for reading, stamp_s in zip(readings, stamps_s, strict=True):
             match reading:
                 case ImuReading(force, rate):
-                    self._events.append(ImuEstimate(now, force, rate))
+                    self._events.append(ImuEstimate(stamp_s, force, rate))
                 case DisplacementReading(lost=lost):
                     self._count_lost(lost, now)
-                    self._events += self._odometry.displace(reading, now)
+                    self._events += self._odometry.displace(reading, stamp_s)
                 case PoseReading(lost=lost):
                     self._count_lost(lost, now)
                     self._events += self._odometry.settle(reading)
                 case PausedReading(continues):
                     self._commands.discard()
+                    self._clock.restart()
                     self._supervisor.heard_paused(now, continues=continues)
         if self._odometry.heading_assumed and not self._heading_assumed:
             self._heading_assumed = True

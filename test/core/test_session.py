@@ -521,7 +521,7 @@ def test_attaching_to_a_board_that_has_driven_does_not_rotate_the_odometry(frame
     assert pose.y_m == pytest.approx(0.0, abs=2e-3)
 
 
-def test_imu_estimates_come_at_their_arrival_and_in_si_units(bench: Bench) -> None:
+def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
     """Upside down and at rest: minus one g on z."""
     start = bench.now
     bench.run(1.0)
@@ -531,6 +531,30 @@ def test_imu_estimates_come_at_their_arrival_and_in_si_units(bench: Bench) -> No
     assert 98 <= len(imu) <= 100
     mean = sum(estimate.specific_force[2] for estimate in imu) / len(imu)
     assert mean == pytest.approx(-9.8, abs=0.1)
+
+
+def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
+    """Also the displacements that waited for the first pose."""
+    stamps = {event.stamp_s for event in bench.events if isinstance(event, ImuEstimate)}
+    assert len(bench.odometry) > 30
+    assert {estimate.stamp_s for estimate in bench.odometry} <= stamps
+
+
+def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
+    """And after both, a tick is 10 ms again."""
+    bench.board.reboot()
+    bench.run_until_state("paused")
+    bench.run_until_state("nominal")
+    bench.run(1.0)
+    bench.close()
+    bench.run(0.5)
+    bench.open()
+    bench.run(1.0)
+    stamps = [event.stamp_s for event in bench.events if isinstance(event, ImuEstimate)]
+    assert all(before < after for before, after in itertools.pairwise(stamps))
+    assert stamps[-1] <= bench.now
+    ends = zip(stamps[-50:], stamps[-49:], strict=False)
+    assert all(after - before == pytest.approx(0.01, abs=1e-6) for before, after in ends)
 
 
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:

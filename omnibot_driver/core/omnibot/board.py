@@ -36,6 +36,7 @@ from omnibot_driver.core.omnibot.frames import (
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
 from omnibot_driver.core.omnibot.sequence import Sequence
 
+TICK_S: Final = 0.01
 DELTA_LSB: Final = (1e-4, 1e-4, 1e-4)
 """m, m, rad."""
 POSE_LSB_M: Final = 1e-3
@@ -87,6 +88,19 @@ class OmniBot:
     def mode(self) -> Mode:
         """The present belief."""
         return self._modes.mode
+
+    @property
+    def tick_s(self) -> float:
+        """Of the control loop, which samples the IMU."""
+        return TICK_S
+
+    @property
+    def missing_s(self) -> float | None:
+        """The line's time for the rest of an IMU frame in hand."""
+        begun = self._decoder.begun
+        if not begun.startswith(frames.IMU_HEADER):
+            return None
+        return max(0, frames.IMU_LENGTH - len(begun)) * frames.BYTE_S
 
     def receive(self, data: bytes, now: float) -> list[Reading]:
         """The readings that these bytes complete, in the order of the line."""

@@ -117,6 +117,11 @@ class FrameDecoder:
         self._held.clear()
         return found
 
+    @property
+    def begun(self) -> bytes:
+        """What has come of the next frame; nothing while out of step."""
+        return bytes(self._held) if self._in_step else b""
+
     def _settle_idle(self, arrived: int, now: float) -> list[Frame]:
         """After a real silence nothing that is held can be continued by what comes now."""
         last = self._last_arrival_s

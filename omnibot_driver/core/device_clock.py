@@ -1,0 +1,234 @@
+"""From arrival times to sampling times: the board's clock, as it is seen from the host's.
+
+The board samples once a tick by a crystal of its own. Its bytes reach us with a delay that is
+unknown and ever changing, but never before they were sent. Two questions follow.
+
+*Which tick is it?* IMU readings are counted. What is lost between them is told exactly by the
+counter that displacements carry; until the next of those, or without any, by arrival: a read takes
+all that has come, so the last tick in it is hardly older than one period.
+
+*When was it?* Drawn over their ticks, arrivals lie on or above a straight line whose slope is the
+true period. The least delayed arrival of every second is kept, and the line is laid under those of
+the last while as close as it goes: it is an edge of their lower convex hull. An arrival below the
+line moves it at once. Bursts, stalls and losses only make points above the line. What stays in the
+stamps is the least delay that ever happens: one constant.
+
+This module knows readings and times. It reads no clock and knows no board's bytes.
+"""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Final
+
+from omnibot_driver.core.board import DisplacementReading, ImuReading, PoseReading, Reading
+
+BLOCK_TICKS: Final = 100
+"""The least delayed arrival of so many ticks is kept: of one second."""
+BLOCKS_KEPT: Final = 75
+"""An adapter's timer and the board's tick beat against each other, within 100 ppm, every 20 s."""
+LARGEST_SKEW: Final = 1.2e-4
+"""Of the board's crystal against the host's: 100 ppm, and a little."""
+SUPPORT: Final = 0.75
+"""The line touches the points on both sides of this part of their span: late enough to follow what
+has lately been found out, early enough not to follow the last second's jitter."""
+LARGEST_LOSS_TICKS: Final = 25
+"""If more are missing that no counter has told, then nothing that was known holds any more."""
+BEAT_READS: Final = 12
+"""Among so many reads one is little delayed: a 16 ms adapter's cuts recur after five."""
+LARGEST_RISE: Final = 0.02
+"""By this part of a period a stamp follows, each tick, a line that was laid later."""
+SMALLEST_STEP_S: Final = 1e-6
+"""Between two stamps for which even their arrivals leave no room."""
+
+Point = tuple[int, float]
+"""A tick and the time of its arrival."""
+
+
+class DeviceClock:
+    """``period_s``: the board's nominal tick; each brings one ImuReading."""
+
+    _beat_least_s: float
+    _beat_most_s: float
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._tick = 0
+        self._stamp_s = -math.inf
+        self.restart()
+
+    def restart(self) -> None:
+        """What the board does from here on has nothing to do with what it did before.
+
+        Stamps go forward all the same.
+        """
+        self._stamped_tick: int | None = None
+        self._displaced_tick: int | None = None
+        self._displacement_ticks = 0
+        self._anchor: Point | None = None
+        self._slope_s = self._period_s
+        self._points: deque[Point] = deque(maxlen=BLOCKS_KEPT)
+        self._best: Point | None = None
+        self._block_from = self._tick
+        self._settled = False
+        self._seen_tick: int | None = None
+        self._usual_lag_s = self._period_s
+        self._begin_beat(trusted=True)
+
+    def stamps(
+        self, readings: Sequence[Reading], now: float, missing_s: float | None = None
+    ) -> list[float]:
+        """When each of these readings, all that one read at ``now`` completed, was sampled.
+
+        ``missing_s``: how long the line still needs for a sample of which the read brought the
+        beginning. From tick to tick stamps increase, and none is later than ``now``; a displacement
+        has the stamp of its tick's ImuReading.
+        """
+        kinds = [type(reading) for reading in readings]
+        ticks = self._count(readings)
+        displaced, alone = DisplacementReading in kinds, kinds.count(ImuReading) <= 1
+        short = 0
+        if missing_s is not None:
+            short = self._compare(self._tick + 1, now + missing_s, displaced=displaced, alone=alone)
+        elif displaced or ImuReading in kinds:
+            short = self._compare(self._tick, now, displaced=displaced, alone=alone)
+        stamps = []
+        for left, tick, kind in zip(range(len(ticks), 0, -1), ticks, kinds, strict=True):
+            own = tick + short != self._stamped_tick
+            if kind is ImuReading or (kind is DisplacementReading and own):
+                latest_s = now - max(0, ticks[-1] - tick) * self._period_s
+                self._stamp(tick + short, latest_s, (now - self._stamp_s) / (left + 1))
+            stamps.append(self._stamp_s)
+        return stamps
+
+    def _count(self, readings: Sequence[Reading]) -> list[int]:
+        """The ticks of the readings; a counter corrects what came since the displacement before."""
+        ticks: list[int] = []
+        settled = 0
+        for reading in readings:
+            if isinstance(reading, ImuReading):
+                self._tick += 1
+            elif isinstance(reading, DisplacementReading):
+                missing = self._missing(reading)
+                if missing < 0:
+                    self._doubt(overcounted=True)
+                ticks[settled:] = [tick + missing for tick in ticks[settled:]]
+                settled = len(ticks) + 1
+                self._tick += missing
+                self._displaced_tick = self._tick
+            elif isinstance(reading, PoseReading) and self._displaced_tick is not None:
+                self._displaced_tick += reading.lost * self._displacement_ticks
+            ticks.append(self._tick)
+        return ticks
+
+    def _missing(self, reading: DisplacementReading) -> int:
+        """How many ticks the counter is ahead of the count."""
+        if self._displaced_tick is None or reading.duration_s is None:
+            return 0
+        self._displacement_ticks = round(reading.duration_s / self._period_s)
+        passed = self._displacement_ticks * (reading.lost + 1)
+        return self._displaced_tick + passed - self._tick
+
+    def _compare(self, tick: int, arrival: float, *, displaced: bool, alone: bool) -> int:
+        """Hold the last tick against its arrival; by how many the count was found to be short."""
+        if tick == self._seen_tick:
+            return 0  # its beginning has been seen before, and told more
+        if self._anchor is None:
+            self._anchor = (tick, arrival)
+        lag_s = arrival - self._line(tick)
+        short = 0
+        usual_s = self._usual_lag_s if alone and not displaced else 2 * self._period_s
+        if lag_s > usual_s + 0.5 * self._period_s:
+            short = max(1, math.floor(lag_s / self._period_s) - 1)
+        elif lag_s < -0.5 * self._period_s and self._settled:
+            short = round(lag_s / self._period_s)
+            self._usual_lag_s = self._period_s
+        if short > LARGEST_LOSS_TICKS:
+            self.restart()
+            return self._compare(tick, arrival, displaced=displaced, alone=alone)
+        if short:
+            self._recount(short, counter_too=displaced)
+        else:
+            self._learn(tick, arrival, lag_s)
+        self._seen_tick = tick + short
+        return short
+
+    def _recount(self, short: int, *, counter_too: bool) -> None:
+        self._tick += short
+        if counter_too and self._displaced_tick is not None:
+            self._displaced_tick += short
+        self._doubt(overcounted=short < 0)
+
+    def _doubt(self, *, overcounted: bool) -> None:
+        """The next beat teaches nothing, and neither does this block if its ticks came too soon."""
+        self._begin_beat(trusted=False)
+        if overcounted:
+            self._best = None
+
+    def _learn(self, tick: int, arrival: float, lag_s: float) -> None:
+        self._beat_reads += 1
+        self._beat_least_s = min(self._beat_least_s, lag_s)
+        self._beat_most_s = max(self._beat_most_s, lag_s)
+        if self._beat_trusted:
+            if lag_s < 0.0:
+                self._anchor = (tick, arrival)
+            if self._best is None or arrival < self._best[1] + self._slope_s * (
+                tick - self._best[0]
+            ):
+                self._best = (tick, arrival)
+            if tick - self._block_from >= BLOCK_TICKS:
+                if not self._points or self._points[-1][0] < self._best[0]:
+                    self._points.append(self._best)
+                self._lay_line()
+                self._best, self._block_from = None, tick
+        if self._beat_reads == BEAT_READS:
+            self._settled = True
+            short = round(self._beat_least_s / self._period_s)
+            self._usual_lag_s = min(self._period_s, self._beat_most_s)
+            self._begin_beat(trusted=True)
+            if short > 0:
+                self._recount(short, counter_too=True)
+
+    def _begin_beat(self, *, trusted: bool) -> None:
+        self._beat_trusted = trusted
+        self._beat_reads = 0
+        self._beat_least_s = math.inf
+        self._beat_most_s = 0.0
+
+    def _line(self, tick: int) -> float:
+        assert self._anchor is not None
+        return self._anchor[1] + self._slope_s * (tick - self._anchor[0])
+
+    def _lay_line(self) -> None:
+        """Under all points, as high as it goes over their middle, within the crystals' skew."""
+        hull: list[Point] = []
+        for point in self._points:
+            while len(hull) > 1 and _slope(hull[-2], point) <= _slope(hull[-2], hull[-1]):
+                hull.pop()
+            hull.append(point)
+        middle = hull[0][0] + SUPPORT * (hull[-1][0] - hull[0][0])
+        for before, after in pairwise(hull):
+            if after[0] >= middle:
+                skew = _slope(before, after) / self._period_s - 1.0
+                skew = min(max(skew, -LARGEST_SKEW), LARGEST_SKEW)
+                self._slope_s = self._period_s * (1.0 + skew)
+                break
+        self._anchor = min(hull, key=lambda point: point[1] - self._slope_s * point[0])
+
+    def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
+        """The line's time, but no jump backwards, and forwards only little by little.
+
+        ``room_s``: by so much it may go forward and leave as much to each that comes after it.
+        """
+        stamp_s = min(self._line(tick), latest_s)
+        if self._stamped_tick is not None:
+            passed = max(1, tick - self._stamped_tick)
+            stamp_s = min(stamp_s, self._stamp_s + passed * self._period_s * (1 + LARGEST_RISE))
+        step_s = max(SMALLEST_STEP_S, min(self._period_s / 2, room_s))
+        self._stamp_s = max(stamp_s, self._stamp_s + step_s)
+        self._stamped_tick = tick
+
+
+def _slope(before: Point, after: Point) -> float:
+    return (after[1] - before[1]) / (after[0] - before[0])
