@@ -93,7 +93,9 @@ def main() -> int:
             print(f"\r{done} of {len(jobs)} streams", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     lines, all_hold = table(totals["driver"], totals["plain"])
-    streams = f"{chosen.seeds} streams of {chosen.seconds:g} s for each scenario, fault and chunking:"
+    streams = (
+        f"{chosen.seeds} streams of {chosen.seconds:g} s for each scenario, fault and chunking:"
+    )
     figures = "\n".join([streams, "", *lines])
     print(figures)
     text = DOCUMENT.read_text()
