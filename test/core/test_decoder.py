@@ -472,10 +472,10 @@ def work(monkeypatch: pytest.MonkeyPatch, stream: bytes, chunk_length: int) -> t
         looked_at += 1
         return measure(data, at)
 
-    def reading(data: bytes, **evidence: Any) -> list[Piece]:
+    def reading(data: bytes, *state: Any, **more: Any) -> list[Piece]:
         nonlocal looked_at
         looked_at += len(data)
-        return read(data, **evidence)
+        return read(data, *state, **more)
 
     most = 0
     with monkeypatch.context() as patch:

@@ -18,14 +18,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from omnibot_driver.core.omnibot.evidence import (
-    GAP,
-    KNOWN_GAP,
-    LOOK_ALIKE,
-    NOTHING_KNOWN,
-    Context,
-    Expectation,
-)
+from omnibot_driver.core.omnibot import evidence
+from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Context, Expectation
 from omnibot_driver.core.omnibot.frames import (
     INCOMPLETE,
     NO_FRAME,
@@ -132,11 +126,10 @@ class FrameDecoder:
             sharp = self._sharp >= PAUSES_TO_TRUST
             if pause_s > TICK_S:
                 sharp = sharp or known  # bytes were lost here, and hardly whole frames
-                self._sharp = _trust(self._sharp, False)
-                self._between = _trust(self._between, False)
+                self._trust(sharp=False, between=False)
             place = len(self._held)
             width = 1 if sharp else arrived
-            price = KNOWN_GAP if known else GAP
+            price = evidence.KNOWN_GAP if known else evidence.GAP
             self._gaps.append((place, place + width, price))
 
     def _settle(self, found: list[Frame], *, closed: bool) -> None:
@@ -172,7 +165,9 @@ class FrameDecoder:
                 break
             frame = decode_measured(held[at:end], order)
             cost, after = weigh(frame, context)
-            if cost >= SPOKEN_AGAINST and (cost >= LOOK_ALIKE or not self._goes_on(end, closed)):
+            if cost >= SPOKEN_AGAINST and (
+                cost >= evidence.LOOK_ALIKE or not self._goes_on(end, closed)
+            ):
                 break
             lent = end == size and _may_end_in_a_header(frame, context)
             if lent and not closed:
@@ -221,15 +216,8 @@ class FrameDecoder:
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
         """In doubt: take what is sure, drop what stays doubtful. Whether anything was settled."""
-        pieces = read(
-            stretch,
-            in_step=self._in_step,
-            closed=closed,
-            context=self._context,
-            expectation=self._expectation,
-            gaps=self._gaps,
-            pose_byte_order=self._pose_byte_order,
-        )
+        state = self._context, self._expectation, self._gaps, self._pose_byte_order
+        pieces = read(stretch, *state, in_step=self._in_step, closed=closed)
         half = len(stretch) // 2 if len(stretch) == DOUBT_BYTES else 0
         at = 0
         for piece, sure in self._settled(pieces, len(stretch), half, closed):
@@ -294,12 +282,12 @@ class FrameDecoder:
         """Do pauses end where frames begin? Then they are the line's, not the adapter's."""
         for first, before, _ in self._gaps:
             if start <= first < end:
-                self._sharp = _trust(self._sharp, first == start)
-                self._between = _trust(self._between, first == start or end < before)
+                self._trust(sharp=first == start, between=first == start or end < before)
 
-
-def _trust(trust: int, confirmed: bool) -> int:
-    return min(trust + 1, 2 * PAUSES_TO_TRUST) if confirmed else max(trust - 4, 0)
+    def _trust(self, *, sharp: bool, between: bool) -> None:
+        most = 2 * PAUSES_TO_TRUST
+        self._sharp = min(self._sharp + 1, most) if sharp else max(self._sharp - 4, 0)
+        self._between = min(self._between + 1, most) if between else max(self._between - 4, 0)
 
 
 def _may_end_in_a_header(frame: Frame, before: Context) -> bool:

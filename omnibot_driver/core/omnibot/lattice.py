@@ -57,13 +57,13 @@ _Edge = tuple[int, int, float, Frame | None, Context]
 
 def read(
     data: bytes,
-    *,
-    in_step: bool,
-    closed: bool,
     context: Context,
     expectation: Expectation,
     gaps: Sequence[Gap],
     pose_byte_order: ByteOrder,
+    *,
+    in_step: bool,
+    closed: bool,
 ) -> list[Piece]:
     """The whole frames of the best reading of ``data``.
 
@@ -97,7 +97,7 @@ class _Search:
 
     def forward(self, in_step: bool, closed: bool) -> None:
         data, cost, size = self._data, self._cost, len(self._data)
-        cost[0], cost[1] = (inf, 0.0) if in_step else (0.0, 0.0)
+        cost[0], cost[1] = inf if in_step else evidence.UNKNOWN_START, 0.0
         for at in range(size):
             byte = data[at]
             bad, boundary = 2 * at, 2 * at + 1
@@ -112,7 +112,8 @@ class _Search:
             if cost[bad] < inf:
                 self._edge(bad, bad + 2, price)
             if cost[boundary] < inf:
-                self._edge(boundary, bad + 2, evidence.BAD_RUN + price)
+                price += evidence.BAD_RUN
+                self._edge(boundary, bad + 2, price, None, _after_damage(self._contexts[boundary]))
                 self._frames_from(at, closed)
         for node in (2 * size, 2 * size + 1):
             if cost[node] < inf:
@@ -139,6 +140,9 @@ class _Search:
                 else:
                     self._open(at, evidence.CUT_SHORT if closed else 0.0)
                 followed = data[at + length : at + length + 2] in _HEADERS
+                for end in range(at + 2, min(at + length - 2, size - 1)):
+                    if data[end] == _HEADER and data[end + 1] in _LENGTHS:
+                        self._damaged(node, at, end, evidence.BROKEN_OFF)
                 for more, price in _MISFITS:
                     if followed and more > 0:
                         price += evidence.HEADER_IN_PLACE
@@ -165,7 +169,8 @@ class _Search:
         self._edge(2 * at + 1, 2 * (at + length) + 1, price, frame, after)
 
     def _damaged(self, node: int, at: int, end: int, price: float) -> None:
-        self._edge(node, 2 * end + 1, price + self._idle_within(at, end))
+        price += self._idle_within(at, end)
+        self._edge(node, 2 * end + 1, price, None, _after_damage(self._contexts[node]))
 
     def _open(self, at: int, price: float) -> None:
         """A frame, whole or damaged, whose end has not come yet."""
@@ -233,3 +238,8 @@ class _Search:
             margin = others[number] - best
             found.append(Piece(start >> 1, end >> 1, frame, before, after, margin))
         return found
+
+
+def _after_damage(context: Context) -> Context:
+    """Nobody knows how much was lost."""
+    return Context(context.imu, deltas=context.deltas, shaken=context.shaken)
