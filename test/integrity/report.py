@@ -17,6 +17,9 @@ from truth import CHUNKERS, FAULTS, SCENARIOS
 DOCUMENT = Path(__file__).parents[2] / "docs" / "integrity.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 
+SEEDS_OF_THE_PLAIN_PARSER = 4
+"""It is wrong so often that a few streams tell."""
+
 Job = tuple[str, int, str]
 
 
@@ -83,6 +86,7 @@ def main() -> int:
         for seed in range(chosen.seeds)
         for scenario in SCENARIOS
         for parser in ("driver", "plain")
+        if parser == "driver" or seed < SEEDS_OF_THE_PLAIN_PARSER
     ]
     totals: dict[str, Scores] = {"driver": {}, "plain": {}}
     with Pool(os.cpu_count()) as pool:
