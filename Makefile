@@ -26,17 +26,20 @@ unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WH
 ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export ROS_AUTOMATIC_DISCOVERY_RANGE
 
-.PHONY: help demo test lint format clean
+.PHONY: help demo test integrity lint format clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1: /p' Makefile | while IFS= read -r line; do \
-	  printf '  make %-8s %s\n' "$${line%%: *}" "$${line#*: }"; done
+	  printf '  make %-9s %s\n' "$${line%%: *}" "$${line#*: }"; done
 
 demo: $(VENV)/.runtime  ## drive a square on a simulated board, until ctrl-C or for DEMO_SECONDS
 	@$(PY) -m omnibot_driver.demo
 
 test: lint  ## run every check and test
 	$(PY) -m pytest
+
+integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), into docs/integrity.md
+	$(PY) test/integrity/report.py
 
 lint: $(VENV)/.test  ## check formatting, style and types
 	$(PY) -m ruff format --check

@@ -522,13 +522,13 @@ def test_attaching_to_a_board_that_has_driven_does_not_rotate_the_odometry(frame
 
 
 def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
-    """Upside down and at rest: minus one g on z."""
+    """Upside down and at rest: minus one g on z. One may have been in doubt before."""
     start = bench.now
     bench.run(1.0)
     imu = [
         event for event in bench.events if isinstance(event, ImuEstimate) and event.stamp_s > start
     ]
-    assert 98 <= len(imu) <= 100
+    assert 98 <= len(imu) <= 101
     mean = sum(estimate.specific_force[2] for estimate in imu) / len(imu)
     assert mean == pytest.approx(-9.8, abs=0.1)
 

@@ -1,52 +1,63 @@
 """From a stream of bytes to frames: finding where a frame begins, and proving it.
 
 The protocol has no checksum and its header words are the commonest readings of a gyro at rest, so
-a header alone proves nothing. A frame is believed for what stands around it:
+a header alone proves nothing. A frame is believed for what stands around it, in two ways:
 
-* *In step* (the byte before it ended a believed frame) a frame comes out with its last byte, unless
-  what follows in hand is no beginning of a frame; then it lost or gained bytes, is dropped, and the
-  decoder is out of step. One doubt is worth waiting for: a frame that ends in FF may have lost a
-  byte and been completed by the FF of the next header, so it waits for one byte more.
-* *Out of step* the decoder tries every place, and believes the first from which two whole plausible
-  frames stand in a row with nothing after them that contradicts, or one whole text.
+* *In step* (the byte before it ended a believed frame) a frame comes out with its last byte while
+  nothing speaks against it: what follows in hand begins like a frame, its content is no leap, the
+  line was not idle within it, and its last byte is not one that the next header may have lent.
+* *In doubt* all readings of the bytes in hand compete (``lattice``), priced by all the evidence
+  (``evidence``). A frame of the cheapest reading comes out when every reading without it is dearer
+  by ``SURE``; where two are close, nothing is said. A doubt waits for ``DOUBT_BYTES`` at the most.
 
-This module reads no clock and never raises on input. It holds at most ``HELD_BYTES`` between calls
-and looks at each byte a bounded number of times.
+This module reads no clock and never raises on input. It holds less than ``DOUBT_BYTES`` between
+calls, and looks at each byte a bounded number of times.
 """
 
-import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from omnibot_driver.core.omnibot import evidence
+from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Context, Expectation
 from omnibot_driver.core.omnibot.frames import (
     INCOMPLETE,
     NO_FRAME,
     ByteOrder,
-    DeltaFrame,
     Frame,
     ImuFrame,
     PausedFrame,
-    PoseFrame,
-    Words,
     decode_measured,
     measure,
 )
+from omnibot_driver.core.omnibot.lattice import Gap, Piece, read
 
+SURE: Final = 4.0
+"""One reading in fifty as likely as the best is too many."""
+SPOKEN_AGAINST: Final = 3.0
+"""A content of this cost waits for what follows."""
+DOUBT_BYTES: Final = 170
+"""100 ms of the nominal stream."""
 FRAMES_TO_STEP_IN: Final = 2
-HELD_BYTES: Final = FRAMES_TO_STEP_IN * 15
+FRAMES_TO_SETTLE: Final = 3
+"""So many sure frames behind a doubtful one, and nothing more will be learnt about it."""
+FRAMES_TO_RECONSIDER: Final = 2
+"""Where a chain of frames breaks, its last ones are in doubt."""
 
 IDLE_S: Final = 0.1
 """Longer than any adapter keeps a byte back (16 ms), and ten times the board's 10 ms tick."""
+TICK_S: Final = 0.011
+"""While the board runs its line is never idle for longer, unless bytes were lost; an adapter that
+collects bytes for longer shows pauses of its own."""
+GAP_S: Final = 4e-3
+"""No frame is sent with such a pause in it."""
+BYTE_S: Final = 10 / 115200
 TICK_BYTES: Final = 14 + 9 + 15
 """All that one tick can bring. More at once after a pause means that we were late, not the line."""
+PAUSES_TO_TRUST: Final = 16
+"""So many pauses that stood where they should, and they are taken for the line's own."""
 
-FARTHEST_POSE: Final = 1e7
-"""Poses are in mm and mrad: beyond 10 km, or 1600 turns, a pose is other bytes misread."""
-IMU_HEADER_WORD: Final = -6
-"""FF FA, read as a signed word."""
-DEAD_SENSOR: Final = (0, 0, 0)
-LARGEST_DELTA: Final = 4000
-"""Deltas are in 0.1 mm and 0.1 mrad: 10 m/s or 10 rad/s."""
+LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
 
 
 @dataclass(slots=True)
@@ -56,7 +67,7 @@ class DecoderStatistics:
     frames: int = 0
     discarded_bytes: int = 0
     faults: int = 0
-    """How often the decoder fell out of step."""
+    """How often bytes in step were no frames."""
 
 
 class FrameDecoder:
@@ -67,9 +78,13 @@ class FrameDecoder:
     ) -> None:
         self.statistics = DecoderStatistics()
         self._pose_byte_order: ByteOrder = pose_byte_order
-        self._half_g_counts = accel_counts_per_g / 2
+        self._expectation = Expectation(accel_counts_per_g)
+        self._context = NOTHING_KNOWN
         self._held = bytearray()
         self._in_step = False
+        self._gaps: list[Gap] = []
+        self._sharp = self._between = 0  # how often pauses ended where a frame began, or before
+        self._wait_for = 0
         self._last_arrival_s: float | None = None
 
     def feed(self, data: bytes, now: float) -> list[Frame]:
@@ -77,125 +92,214 @@ class FrameDecoder:
 
         ``now``: arrival time of ``data`` in seconds, of any steady clock.
         """
+        found: list[Frame] = []
         if not data:
-            return []
-        found = self._settle_idle(len(data), now)
-        self._last_arrival_s = now
+            return found
+        last, self._last_arrival_s = self._last_arrival_s, now
+        if last is not None and now - last > GAP_S:
+            self._pause(now - last, len(data), found)
         self._held += data
-        at = 0
-        while at < len(self._held):
-            if not self._in_step:
-                start, self._in_step = self._find_step(at)
-                self.statistics.discarded_bytes += start - at
-                at = start
-                if not self._in_step:
-                    break
-            length = self._trusted_length(at)
-            if length == INCOMPLETE:
-                break
-            if length == NO_FRAME:
-                self._in_step = False
-                self.statistics.faults += 1
-                self.statistics.discarded_bytes += 1
-                at += 1
-            else:
-                found.append(self._take(at, length))
-                at += length
-        del self._held[:at]
+        self._settle(found, closed=False)
         return found
 
     def flush(self, now: float) -> list[Frame]:
         """The line is closed, or was silent: what can still be told from what is held."""
         self._last_arrival_s = now
         found: list[Frame] = []
-        if self._in_step and self._held and measure(self._held, 0) == len(self._held):
-            found.append(self._take(0, len(self._held)))
-        elif self._held:
-            self.statistics.discarded_bytes += len(self._held)
-            self.statistics.faults += self._in_step
-            self._in_step = False
-        self._held.clear()
+        self._close(found)
         return found
 
     @property
     def begun(self) -> bytes:
-        """What has come of the next frame; nothing while out of step."""
-        return bytes(self._held) if self._in_step else b""
+        """What has come of the next frame; nothing while in doubt."""
+        sure = self._in_step and len(self._held) <= TICK_BYTES // 2
+        return bytes(self._held) if sure else b""
 
-    def _settle_idle(self, arrived: int, now: float) -> list[Frame]:
-        """After a real silence nothing that is held can be continued by what comes now."""
-        last = self._last_arrival_s
-        if not self._held or last is None or now - last < IDLE_S or arrived > TICK_BYTES:
-            return []
-        return self.flush(now)
+    def _close(self, found: list[Frame]) -> None:
+        if self._held:
+            self._settle(found, closed=True)
+            self._drop(len(self._held))
+        self._context = NOTHING_KNOWN
 
-    def _trusted_length(self, at: int) -> int:
-        """In step: length of the frame here, INCOMPLETE also while a doubt stands."""
-        length = measure(self._held, at)
-        end = at + length
-        if length <= 0:
-            return length
-        if self._look_alike(self._decode(at, length)):
-            return NO_FRAME
-        if end < len(self._held):
-            return length if measure(self._held, end) != NO_FRAME else NO_FRAME
-        return INCOMPLETE if self._held[-1] == 0xFF else length
+    def _pause(self, pause_s: float, arrived: int, found: list[Frame]) -> None:
+        """The line was idle; or we were late, and then there is more than one tick to read."""
+        if arrived > TICK_BYTES:
+            return
+        if pause_s >= IDLE_S:
+            self._close(found)
+        elif pause_s - arrived * BYTE_S > GAP_S:
+            known = self._between >= PAUSES_TO_TRUST
+            sharp = self._sharp >= PAUSES_TO_TRUST
+            if pause_s > TICK_S:
+                sharp = sharp or known  # bytes were lost here, and hardly whole frames
+                self._trust(sharp=False, between=False)
+            place = len(self._held)
+            width = 1 if sharp else arrived
+            price = evidence.KNOWN_GAP if known else evidence.GAP
+            self._gaps.append((place, place + width, price))
 
-    def _find_step(self, at: int) -> tuple[int, bool]:
-        """Out of step: the first place that is proved, or that may still come to be proved."""
-        for start in range(at, len(self._held)):
-            proof = self._proof(start)
-            if proof is not False:
-                return start, proof is True
-        return len(self._held), False
+    def _settle(self, found: list[Frame], *, closed: bool) -> None:
+        """Take frames from what is held, until nothing is left or more bytes must tell."""
+        held = self._held
+        while held:
+            if not closed and len(held) < min(self._wait_for, DOUBT_BYTES):
+                return
+            if self._in_step and self._walk(found, closed):
+                return
+            stretch = bytes(held[:DOUBT_BYTES])
+            last = closed and len(stretch) == len(held)
+            if not self._judge(stretch, found, closed=last):
+                self._wait_for = len(held) + 1 + len(held) // 16
+                return
 
-    def _proof(self, start: int) -> bool | None:
-        """Whether frames begin here; None while more bytes must tell."""
-        at = start
-        for _ in range(FRAMES_TO_STEP_IN):
-            length = measure(self._held, at) if at < len(self._held) else INCOMPLETE
-            if length == INCOMPLETE:
-                return None
-            if length == NO_FRAME:
-                return False
-            frame = self._decode(at, length)
-            if isinstance(frame, PausedFrame):
+    def _walk(self, found: list[Frame], closed: bool) -> bool:
+        """In step: take the frames that nothing speaks against. Whether no doubt is left."""
+        held, weigh, order = self._held, self._expectation.weigh, self._pose_byte_order
+        context = self._context
+        at, size = 0, len(held)
+        steps: list[tuple[int, Frame, Context]] = []
+        idle = self._gaps[0][0] if self._gaps else size + 1
+        while at < size:
+            length = measure(held, at)
+            end = at + length
+            if idle < size and self._idle_within(at, end if length > 0 else size):
+                break
+            if length <= 0:
+                if length == INCOMPLETE and not closed:
+                    self._take(steps, context, found)
+                    return True
+                break
+            frame = decode_measured(held[at:end], order)
+            cost, after = weigh(frame, context)
+            if cost >= SPOKEN_AGAINST and (
+                cost >= evidence.LOOK_ALIKE or not self._goes_on(end, closed)
+            ):
+                break
+            lent = end == size and _may_end_in_a_header(frame, context)
+            if lent and not closed:
+                self._take(steps, context, found)
                 return True
-            if not self._convincing(frame):
-                return False
-            at += length
-        return at == len(self._held) or measure(self._held, at) != NO_FRAME
+            steps.append((end, frame, context))
+            context = after
+            at = end
+        else:
+            self._take(steps, context, found)
+            return True
+        if len(steps) > FRAMES_TO_RECONSIDER:
+            context = steps[-FRAMES_TO_RECONSIDER][2]
+            self._take(steps[:-FRAMES_TO_RECONSIDER], context, found)
+        return False
 
-    def _look_alike(self, frame: Frame) -> bool:
-        """Bytes of other frames that can only look like this one.
+    def _goes_on(self, at: int, closed: bool) -> bool:
+        """Whether a whole frame follows, and perhaps one more: then it is a shock, no damage."""
+        held = self._held
+        if at == len(held):
+            return closed
+        length = measure(held, at)
+        if length <= 0:
+            return False
+        at += length
+        return at == len(held) or measure(held, at) != NO_FRAME
 
-        In a run of IMU frames a gyro that reads -6 makes a second, shifted run. Its frames have no
-        weight, since the gyro stands where the accelerometer should, and the true header in it.
+    def _take(
+        self, steps: list[tuple[int, Frame, Context]], after: Context, found: list[Frame]
+    ) -> None:
+        """Believe these frames, which stand in a row from the first byte held."""
+        if not steps:
+            return
+        self.statistics.frames += len(steps)
+        for _, frame, before in steps[::8]:
+            if type(frame) is ImuFrame and before.imu is not None and not before.imus & 3:
+                self._expectation.learn(frame, before.imu)
+        found += [frame for _, frame, _ in steps]
+        self._context = after
+        if self._gaps:
+            start = 0
+            for end, _, _ in steps:
+                self._compare_pauses(start, end)
+                start = end
+        self._forget(steps[-1][0])
+
+    def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
+        """In doubt: take what is sure, drop what stays doubtful. Whether anything was settled."""
+        state = self._context, self._expectation, self._gaps, self._pose_byte_order
+        pieces = read(stretch, *state, in_step=self._in_step, closed=closed)
+        half = len(stretch) // 2 if len(stretch) == DOUBT_BYTES else 0
+        at = 0
+        for piece, sure in self._settled(pieces, len(stretch), half, closed):
+            if sure:
+                self._drop(piece.start - at)
+                step = piece.end - piece.start, piece.frame, piece.before
+                self._take([step], piece.after, found)
+                self._in_step = True
+            else:
+                self._drop(piece.end - at)
+            at = piece.end
+        if half and not at:
+            at = min(half, pieces[0].start) if pieces else half
+            self._drop(at)
+            self._sharp = self._between = 0  # the pauses may have deceived us
+        return at > 0
+
+    def _settled(
+        self, pieces: list[Piece], size: int, until: int, closed: bool
+    ) -> Iterator[tuple[Piece, bool]]:
+        """The first pieces, as far as no more will be learnt about them, and whether to take them.
+
+        What ends before ``until`` has waited long enough.
         """
-        match frame:
-            case ImuFrame(accel, _):
-                return IMU_HEADER_WORD in accel and self._weightless(accel)
-            case PoseFrame(x, y, theta, _):
-                return not all(abs(value) <= FARTHEST_POSE for value in (x, y, theta))
-            case _:
-                return False
+        last_sure = [n for n, piece in enumerate(pieces) if piece.margin >= SURE]
+        settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0
+        in_step, end = self._in_step, -1
+        for number, piece in enumerate(pieces):
+            proved = (
+                in_step
+                or piece.start == end
+                or any(piece.end == after.start for after in pieces[number + 1 : number + 2])
+                or type(piece.frame) is PausedFrame
+            )
+            sure = proved and piece.margin >= SURE
+            if piece.end == size and not closed and _may_end_in_a_header(piece.frame, piece.before):
+                return
+            if not (sure or closed or number < settled_before or piece.end <= until):
+                return
+            end = piece.end if sure else -1
+            yield piece, sure
 
-    def _convincing(self, frame: Frame) -> bool:
-        """Enough to step in with. In step, a shock, a free fall or a dead sensor is delivered."""
-        match frame:
-            case ImuFrame(accel, _):
-                return not self._weightless(accel) or accel == DEAD_SENSOR
-            case DeltaFrame(dx, dy, dtheta, _):
-                return max(abs(dx), abs(dy), abs(dtheta)) <= LARGEST_DELTA
-            case _:
-                return not self._look_alike(frame)
+    def _drop(self, count: int) -> None:
+        """The first bytes held are no frames."""
+        if not count:
+            return
+        self.statistics.discarded_bytes += count
+        self.statistics.faults += self._in_step
+        self._in_step = False
+        self._forget(count)
 
-    def _weightless(self, accel: Words) -> bool:
-        return math.hypot(*accel) < self._half_g_counts
+    def _forget(self, count: int) -> None:
+        del self._held[:count]
+        self._wait_for = 0
+        if self._gaps:
+            self._gaps = [(a - count, b - count, p) for a, b, p in self._gaps if a >= count]
 
-    def _take(self, at: int, length: int) -> Frame:
-        self.statistics.frames += 1
-        return self._decode(at, length)
+    def _idle_within(self, start: int, end: int) -> bool:
+        return any(start < first < end and before <= end for first, before, _ in self._gaps)
 
-    def _decode(self, at: int, length: int) -> Frame:
-        return decode_measured(self._held[at : at + length], self._pose_byte_order)
+    def _compare_pauses(self, start: int, end: int) -> None:
+        """Do pauses end where frames begin? Then they are the line's, not the adapter's."""
+        for first, before, _ in self._gaps:
+            if start <= first < end:
+                self._trust(sharp=first == start, between=first == start or end < before)
+
+    def _trust(self, *, sharp: bool, between: bool) -> None:
+        most = 2 * PAUSES_TO_TRUST
+        self._sharp = min(self._sharp + 1, most) if sharp else max(self._sharp - 4, 0)
+        self._between = min(self._between + 1, most) if between else max(self._between - 4, 0)
+
+
+def _may_end_in_a_header(frame: Frame, before: Context) -> bool:
+    """Its last byte may be the next header's. Not so if it is what the sensor said before."""
+    if isinstance(frame, ImuFrame):
+        lent = frame.gyro[2] & 0xFF in LENT
+        said = before.imu is not None and frame.gyro[2] == before.imu.gyro[2]
+        return lent and (frame.gyro[2] & 0xFF == 0xFF or not said)
+    return not isinstance(frame, PausedFrame) and frame.seq in LENT

@@ -1,0 +1,79 @@
+"""The numbers to reach, and how streams are run to compare with them."""
+
+from dataclasses import dataclass
+from random import Random
+
+import parsers
+from judge import Score, judge
+from truth import CHUNKERS, FAULTS, GAPS_VISIBLE, SCENARIOS, generate, receive
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """At most one wrong frame in so many (None: none at all), at least this share delivered."""
+
+    one_wrong_in_visible: int | None
+    one_wrong_in_hidden: int | None
+    delivered: float
+    chunkers: tuple[str, ...] = tuple(CHUNKERS)
+
+    def one_wrong_in(self, chunker: str) -> int | None:
+        """By whether the chunking carries the line's idle gaps."""
+        visible = chunker in GAPS_VISIBLE
+        return self.one_wrong_in_visible if visible else self.one_wrong_in_hidden
+
+    def holds(self, chunker: str, score: Score) -> bool:
+        """Whether this score reaches the bound."""
+        if chunker not in self.chunkers:
+            return True
+        one_in = self.one_wrong_in(chunker)
+        few = score.wrong == 0 if one_in is None else score.wrong * one_in <= score.out
+        complete = self.delivered < 1.0 or score.missed_beyond_two == 0
+        return few and complete and score.delivered >= min(self.delivered, 0.999) * score.intact
+
+
+BOUNDS: dict[str, Bound] = dict(
+    zip(
+        FAULTS,
+        (
+            Bound(None, None, 1.0),
+            Bound(10_000, 4_000, 0.995),
+            Bound(500, 150, 0.95),
+            Bound(5_000, 5_000, 0.995, ("whole bursts", "FTDI", "4096-byte blocks")),
+            Bound(3_000, 1_000, 0.995),
+        ),
+        strict=True,
+    )
+)
+"""By fault. Added bytes: for reads that show what follows a frame."""
+
+Scores = dict[tuple[str, str, str], Score]
+"""By fault, chunking and scenario."""
+
+
+def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
+    """One stream, with every fault in every chunking."""
+    truth = generate(SCENARIOS[scenario], seed, seconds)
+    scores: Scores = {}
+    for fault_name, fault in FAULTS.items():
+        received = receive(truth, fault, Random(f"{scenario} {seed} {fault_name}"))
+        for chunker_name, chunker in CHUNKERS.items():
+            chunks = chunker(received, Random(seed))
+            feed, flush = getattr(parsers, parser)()
+            score = judge(received, chunks, feed, flush)
+            scores[fault_name, chunker_name, scenario] = score
+    return scores
+
+
+def add(total: Scores, more: Scores) -> None:
+    """Into the total."""
+    for key, score in more.items():
+        total.setdefault(key, Score()).__iadd__(score)
+
+
+def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
+    """The sum of all."""
+    total = Score()
+    for scenario in SCENARIOS:
+        total += scores[fault, chunker, scenario]
+    return total

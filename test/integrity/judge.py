@@ -1,0 +1,70 @@
+"""The judge: which frames that came out were sent there, and which intact ones are missing."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from truth import Chunks, Key, Received
+
+Feed = Callable[[bytes, float], list[Key]]
+
+REACH_BYTES = 600
+"""A frame that comes out was sent within so many bytes before the end of what was handed over,
+or within the read itself."""
+
+
+@dataclass(slots=True)
+class Score:
+    """Counts; they add up."""
+
+    out: int = 0
+    wrong: int = 0
+    intact: int = 0
+    delivered: int = 0
+    missed_beyond_two: int = 0
+    """Streams in which an intact frame after the first two is missing."""
+
+    def __iadd__(self, other: "Score") -> "Score":
+        self.out += other.out
+        self.wrong += other.wrong
+        self.intact += other.intact
+        self.delivered += other.delivered
+        self.missed_beyond_two += other.missed_beyond_two
+        return self
+
+
+def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
+    """Hand over the stream and compare, in order, what comes out with what was sent."""
+    frames, intact = received.truth.frames, received.intact
+    origins, data = received.origins, received.data
+    score = Score(intact=sum(intact))
+    next_frame, start = 0, 0
+    got = bytearray(len(frames))
+    last = (len(data), chunks[-1][1] + 1.0)
+    for end, now in [*chunks, last]:
+        found = feed(data[start:end], now) if end > start else flush(b"", now)
+        if found:
+            horizon = _origin(origins, end - 1)
+            nearest = _origin(origins, max(0, start - REACH_BYTES)) - 300
+            for key in found:
+                at = next_frame
+                while at < len(frames) and frames[at][2] < nearest:
+                    at += 1
+                while at < len(frames) and frames[at][1] <= horizon and frames[at][0] != key:
+                    at += 1
+                score.out += 1
+                if at < len(frames) and frames[at][1] <= horizon:
+                    got[at] = 1
+                    score.delivered += intact[at]
+                    next_frame = at + 1
+                else:
+                    score.wrong += 1
+        start = end
+    whole = [bool(g) for g, i in zip(got, intact, strict=True) if i]
+    score.missed_beyond_two = int(not all(whole[2:]))
+    return score
+
+
+def _origin(origins: list[int], at: int) -> int:
+    while at > 0 and origins[at] < 0:
+        at -= 1
+    return origins[at]

@@ -1,0 +1,61 @@
+"""The two parsers under test, brought to one shape: the driver's, and one that trusts headers."""
+
+import struct
+
+from judge import Feed
+from truth import Key
+
+from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, PoseFrame
+from omnibot_driver.core.omnibot.frames import Frame
+
+
+def key_of(frame: Frame) -> Key:
+    """The content of a decoded frame as the generator of truth writes it."""
+    match frame:
+        case ImuFrame(accel, gyro):
+            return ("imu", accel, gyro)
+        case DeltaFrame(dx, dy, dtheta, seq):
+            return ("delta", dx, dy, dtheta, seq)
+        case PoseFrame(x, y, theta, seq):
+            return ("pose", x, y, theta, seq)
+        case _:
+            return ("text", frame.count)
+
+
+def driver() -> tuple[Feed, Feed]:
+    """The driver's decoder."""
+    decoder = FrameDecoder()
+    return (
+        lambda data, now: [key_of(frame) for frame in decoder.feed(data, now)],
+        lambda data, now: [key_of(frame) for frame in decoder.flush(now)],
+    )
+
+
+def plain() -> tuple[Feed, Feed]:
+    """Scan for a header, take as many bytes as it asks for, believe them."""
+    held = bytearray()
+
+    def feed(data: bytes, now: float) -> list[Key]:
+        held.extend(data)
+        found: list[Key] = []
+        at = 0
+        while at + 1 < len(held):
+            length = {0xFA: 14, 0xFB: 9, 0xFC: 15}.get(held[at + 1], 0) if held[at] == 0xFF else 0
+            if not length:
+                at += 1
+                continue
+            if at + length > len(held):
+                break
+            body = bytes(held[at + 2 : at + length])
+            at += length
+            if length == 14:
+                words = struct.unpack(">6h", body)
+                found.append(("imu", words[:3], words[3:]))
+            elif length == 9:
+                found.append(("delta", *struct.unpack(">3hB", body)))
+            else:
+                found.append(("pose", *struct.unpack(">3fB", body)))
+        del held[:at]
+        return found
+
+    return feed, lambda data, now: []

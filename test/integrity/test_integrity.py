@@ -1,0 +1,51 @@
+"""A part of the integrity report: every bound, on streams long enough for it to mean something."""
+
+import os
+from functools import partial
+from multiprocessing import get_context
+from random import Random
+
+import pytest
+from bounds import BOUNDS, Scores, add, over_scenarios
+from judge import judge
+from parsers import plain
+from report import one
+from truth import CHUNKERS, FAULTS, SCENARIOS, generate, receive
+
+SECONDS, SEEDS = 30.0, 2
+
+
+@pytest.fixture(scope="module")
+def scores() -> Scores:
+    """Every scenario, fault and chunking: some 45,000 frames for each bound."""
+    jobs = [(scenario, seed, "driver") for seed in range(SEEDS) for scenario in SCENARIOS]
+    total: Scores = {}
+    with get_context("spawn").Pool(os.cpu_count()) as pool:
+        for _, found in pool.imap_unordered(partial(one, SECONDS), jobs):
+            add(total, found)
+    return total
+
+
+@pytest.mark.parametrize("chunker", CHUNKERS)
+@pytest.mark.parametrize("fault", FAULTS)
+def test_the_bounds_of_the_integrity_report_hold(fault: str, chunker: str, scores: Scores) -> None:
+    """Wrong frames and frames delivered, over all scenarios."""
+    score = over_scenarios(scores, fault, chunker)
+    assert BOUNDS[fault].holds(chunker, score), score
+    assert score.out > 25_000
+
+
+def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
+    """From the first byte on, even the plain parser makes no mistake."""
+    truth = generate(SCENARIOS["driving"], 1, 10.0)
+    received = receive(truth, lambda length, _: list(range(length)), Random(1))
+    score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())
+    assert (score.wrong, score.delivered, score.missed_beyond_two) == (0, len(truth.frames), 0)
+
+
+def test_the_judge_finds_what_the_plain_parser_makes_up() -> None:
+    """Or it would find nothing with ours."""
+    truth = generate(SCENARIOS["gyro stuck at (-6, -5, -4)"], 1, 20.0)
+    received = receive(truth, FAULTS["1 byte in 1,000 lost"], Random(1))
+    score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())
+    assert score.wrong > 20
