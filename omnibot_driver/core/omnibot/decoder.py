@@ -83,6 +83,7 @@ class FrameDecoder:
         self._held = bytearray()
         self._in_step = False
         self._gaps: list[Gap] = []
+        self._arrived = 0
         self._sharp = self._between = 0  # how often pauses ended where a frame began, or before
         self._wait_for = 0
         self._last_arrival_s: float | None = None
@@ -95,6 +96,7 @@ class FrameDecoder:
         found: list[Frame] = []
         if not data:
             return found
+        self._arrived = len(data)
         last, self._last_arrival_s = self._last_arrival_s, now
         if last is not None and now - last > GAP_S:
             self._pause(now - last, len(data), found)
@@ -175,7 +177,8 @@ class FrameDecoder:
                 cost >= evidence.LOOK_ALIKE or not self._goes_on(end, closed)
             ):
                 break
-            lent = end == size and _may_end_in_a_header(frame, context)
+            whole_burst = self._sharp >= PAUSES_TO_TRUST and self._arrived >= length
+            lent = end == size and not whole_burst and _may_end_in_a_header(frame, context)
             if lent and not closed:
                 self._take(steps, context, found)
                 return True
