@@ -236,6 +236,23 @@ def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
 
 
 @pytest.fixture
+def board(start_board: Callable[..., PtyBoard]) -> PtyBoard:
+    return start_board()
+
+
+@pytest.fixture
+def driver(board: PtyBoard, start_driver: Callable[..., Driver]) -> Driver:
+    return start_driver(board.path)
+
+
+@pytest.fixture
+def probe(driver: Driver, probe_of: Callable[[Driver], Probe]) -> Probe:
+    probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    return probe
+
+
+@pytest.fixture
 def silent_terminal() -> Iterator[tuple[int, str]]:
     """A pseudo-terminal with nobody behind it: the descriptor of its far end, and its name."""
     far, near = os.openpty()

@@ -16,25 +16,6 @@ from omnibot_driver.simulator import BoardMode, PtyBoard, SimulatedBoard
 Start = Callable[..., Any]
 
 
-@pytest.fixture
-def board(start_board: Start) -> PtyBoard:
-    board: PtyBoard = start_board()
-    return board
-
-
-@pytest.fixture
-def driver(board: PtyBoard, start_driver: Start) -> Driver:
-    driver: Driver = start_driver(board.path)
-    return driver
-
-
-@pytest.fixture
-def probe(driver: Driver, probe_of: Start) -> Probe:
-    probe: Probe = probe_of(driver)
-    probe.wait_for_state("nominal")
-    return probe
-
-
 def kinds(board: PtyBoard) -> list[str]:
     with board.lock:
         return [command.kind for command in board.board.commands]

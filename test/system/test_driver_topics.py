@@ -17,25 +17,6 @@ from omnibot_driver.simulator import PtyBoard, ReceivedCommand, SimulatedBoard
 Start = Callable[..., Any]
 
 
-@pytest.fixture
-def board(start_board: Start) -> PtyBoard:
-    board: PtyBoard = start_board()
-    return board
-
-
-@pytest.fixture
-def driver(board: PtyBoard, start_driver: Start) -> Driver:
-    driver: Driver = start_driver(board.path)
-    return driver
-
-
-@pytest.fixture
-def probe(driver: Driver, probe_of: Start) -> Probe:
-    probe: Probe = probe_of(driver)
-    probe.wait_for_state("nominal")
-    return probe
-
-
 def obeyed(board: SimulatedBoard, kind: str, *values: int) -> bool:
     return any((command.kind, command.values) == (kind, values) for command in board.commands)
 
