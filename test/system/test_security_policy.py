@@ -7,7 +7,8 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import pytest
-from conftest import Driver, Probe
+from driver_process import Driver
+from probe import Probe
 
 POLICY: Final = Path(__file__).parents[2] / "config" / "omnibot.policy.xml"
 NODE: Final = "omnibot_driver"
