@@ -5,7 +5,7 @@ orientation).
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -102,6 +102,28 @@ def body_twist(twist: Any) -> BodyTwist:
     values = (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
     require_finite("cmd_vel", values)
     return BodyTwist(twist.linear.x, twist.linear.y, twist.angular.z)
+
+
+def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
+    """What to say of publishers on ``cmd_vel`` whose type is not ours; empty if there are none."""
+    ours, other = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
+    if stamped:
+        ours, other = other, ours
+    unheard = sorted(
+        {publisher.node_name for publisher in publishers if publisher.topic_type != ours}
+    )
+    if not unheard:
+        return ""
+    return (
+        f"{', '.join(unheard)} publishes something else than {ours} on cmd_vel and is not heard:"
+        f" for {other} start the driver with enable_stamped_cmd_vel:={str(not stamped).lower()}"
+    )
+
+
+def age(stamp: Time, now_ns: int) -> float:
+    """Seconds since the stamp by the clock that gave both; 0 for a zero stamp, which is none."""
+    stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+    return (now_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
 
 
 def time_message(nanoseconds: int) -> Time:

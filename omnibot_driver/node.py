@@ -21,6 +21,7 @@ from rcl_interfaces.msg import (
     SetParametersResult,
 )
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
@@ -44,6 +45,7 @@ from omnibot_driver.core.supervisor import Request
 from omnibot_driver.link import Link
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LOOK_EVERY_S = 2.0
 UNHEARD = ("disconnected", "connecting")
 NOT_OURS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..+")
 """Parameters that rclpy itself declares for every node."""
@@ -207,11 +209,11 @@ class OmniBotDriver(Node):
 
     def _create_inputs(self) -> None:
         if self._values["enable_stamped_cmd_vel"]:
-            self.create_subscription(
-                TwistStamped, "cmd_vel", lambda stamped: self._on_twist(stamped.twist), 1
-            )
+            self.create_subscription(TwistStamped, "cmd_vel", self._on_twist_stamped, 1)
         else:
             self.create_subscription(Twist, "cmd_vel", self._on_twist, 1)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._looking = self.create_timer(LOOK_EVERY_S, self._look_for_other_types, clock=steady)
         self.create_subscription(Float32MultiArray, "wheel_cmd", self._on_wheels, 1)
         self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
         self.create_service(SetBool, "~/estop", self._on_estop)
@@ -223,6 +225,24 @@ class OmniBotDriver(Node):
 
     def _on_twist(self, twist: Twist) -> None:
         self._command(lambda session, now: session.command_twist(messages.body_twist(twist), now))
+
+    def _on_twist_stamped(self, stamped: TwistStamped) -> None:
+        age_s = messages.age(stamped.header.stamp, self.get_clock().now().nanoseconds)
+        self._command(
+            lambda session, now: session.command_twist(
+                messages.body_twist(stamped.twist), now, age_s=age_s
+            )
+        )
+
+    def _look_for_other_types(self) -> None:
+        """The middleware says nothing when two types meet on one topic. Told once."""
+        stamped = self._values["enable_stamped_cmd_vel"]
+        warning = messages.type_conflict(
+            self.get_publishers_info_by_topic("cmd_vel"), stamped=stamped
+        )
+        if warning:
+            self.get_logger().warning(warning)
+            self._looking.cancel()
 
     def _on_wheels(self, wheels: Float32MultiArray) -> None:
         self._command(lambda session, now: session.command_wheels(wheels.data, now))

@@ -160,6 +160,23 @@ PARAMETERS: Final = (
         high=200.0,
     ),
     Parameter(
+        "max_linear_acceleration",
+        0.0,
+        "m/s²",
+        "How fast cmd_vel may change the linear velocity, as a vector; 0 is at once. A command to"
+        " stand still is never slowed, wheel_cmd neither.",
+        low=0.0,
+        high=100.0,
+    ),
+    Parameter(
+        "max_angular_acceleration",
+        0.0,
+        "rad/s²",
+        "Likewise, for the yaw rate.",
+        low=0.0,
+        high=1000.0,
+    ),
+    Parameter(
         "cmd_vel_timeout",
         0.5,
         "s",
@@ -386,6 +403,8 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
             linear_mps=values["max_linear_speed"],
             angular_radps=values["max_angular_speed"],
             wheel_radps=values["max_wheel_speed"],
+            linear_mps2=values["max_linear_acceleration"],
+            angular_radps2=values["max_angular_acceleration"],
         ),
         commands=CommandSettings(
             timeout_s=values["cmd_vel_timeout"], rate_hz=values["command_rate"]

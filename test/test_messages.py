@@ -1,8 +1,10 @@
 """Values to ROS messages: where each number goes, by REP-103, REP-105 and REP-145."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,6 +24,34 @@ STAMP = messages.time_message(1_700_000_000_123_456_789)
 def test_a_stamp_is_seconds_and_nanoseconds() -> None:
     """Exactly, without a detour over floating point."""
     assert (STAMP.sec, STAMP.nanosec) == (1_700_000_000, 123_456_789)
+
+
+@pytest.mark.parametrize(("sec", "nanosec", "age_s"), [(98, 0, 2.0), (102, 5 * 10**8, -2.5)])
+def test_a_stamp_has_an_age_by_the_clock_that_gave_it(sec: int, nanosec: int, age_s: float) -> None:
+    """Negative where it is in the future."""
+    assert messages.age(Time(sec=sec, nanosec=nanosec), 100 * 10**9) == pytest.approx(age_s)
+
+
+def test_a_zero_stamp_is_no_stamp() -> None:
+    """Whoever leaves it out is as young as the message."""
+    assert messages.age(Time(), 1_700_000_000 * 10**9) == 0.0
+
+
+def publisher(name: str, kind: str) -> SimpleNamespace:
+    return SimpleNamespace(node_name=name, topic_type=f"geometry_msgs/msg/{kind}")
+
+
+def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
+    """Whichever of the two is ours; nobody is named for nothing."""
+    teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
+    assert messages.type_conflict([teleop], stamped=False) == ""
+    assert messages.type_conflict([nav], stamped=True) == ""
+    text = messages.type_conflict([teleop, nav, nav], stamped=False)
+    assert text.startswith("nav publishes")
+    assert text.endswith("enable_stamped_cmd_vel:=true")
+    text = messages.type_conflict([teleop, nav], stamped=True)
+    assert text.startswith("teleop publishes")
+    assert text.endswith("enable_stamped_cmd_vel:=false")
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:

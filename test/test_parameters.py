@@ -31,6 +31,8 @@ PROMISED: dict[str, object] = {
     "max_linear_speed": 0.5,
     "max_angular_speed": 0.5,
     "max_wheel_speed": 17.0,
+    "max_linear_acceleration": 0.0,
+    "max_angular_acceleration": 0.0,
     "cmd_vel_timeout": 0.5,
     "command_rate": 20.0,
     "enable_stamped_cmd_vel": False,
@@ -254,6 +256,7 @@ def test_values_reach_the_core_under_their_meaning() -> None:
             "linear_scale": 71, "angular_scale": 501, "wheel_radius": 0.03, "delta_frame": "body",
             "pose_byte_order": "little", "accel_range": 8, "gyro_range": 1000,
             "max_linear_speed": 0.6, "max_angular_speed": 0.7, "max_wheel_speed": 18,
+            "max_linear_acceleration": 0.8, "max_angular_acceleration": 0.9,
             "cmd_vel_timeout": 0.4, "command_rate": 25, "odom_wheel_drift": 0.03,
             "odom_wheel_scale": 0.06, "odom_wheel_slip": 0.05,
             "odom_gap_acceleration": 3, "odom_gap_angular_acceleration": 4,
@@ -267,6 +270,7 @@ def test_values_reach_the_core_under_their_meaning() -> None:
     assert (board.imu.accel_range_g, board.imu.gyro_range_dps) == (8, 1000)
     limits = session.limits
     assert (limits.linear_mps, limits.angular_radps, limits.wheel_radps) == (0.6, 0.7, 18.0)
+    assert (limits.linear_mps2, limits.angular_radps2) == (0.8, 0.9)
     assert (session.commands.timeout_s, session.commands.rate_hz) == (0.4, 25.0)
     assert (board.base_radius_m, board.counts_per_revolution) == (0.2, 1000)
     odometry, noise = session.odometry, session.odometry.noise

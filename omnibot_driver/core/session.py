@@ -20,11 +20,12 @@ from omnibot_driver.core.board import (
     Reading,
     Vector3,
 )
-from omnibot_driver.core.commands import CommandSettings, CommandStream
+from omnibot_driver.core.commands import PACE_S, CommandSettings, CommandStream
 from omnibot_driver.core.device_clock import DeviceClock
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.limits import SpeedLimits, require_finite
+from omnibot_driver.core.limits import SpeedLimits, require_finite, require_timely
+from omnibot_driver.core.motion import BaseMotion, wheels_motion
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
 from omnibot_driver.core.se2 import Signs
 from omnibot_driver.core.supervisor import Phase, Request, RequestDone, Supervisor
@@ -167,25 +168,35 @@ class Session:
 
     # What is wanted
 
-    def command_twist(self, twist: BodyTwist, now: float) -> None:
-        """Drive the body. Raises CommandRefused, and then nothing changes."""
+    def command_twist(self, twist: BodyTwist, now: float, *, age_s: float = 0.0) -> None:
+        """Drive the body. Raises CommandRefused, and then nothing changes.
+
+        ``age_s``: how long ago it was sent, by the sender's stamp.
+        """
         require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
         self._require_drivable()
+        timeout_s = self._commands.settings.timeout_s
+        require_timely("cmd_vel", age_s, timeout_s)
         x, y, yaw = self._axis_signs
         limited = self._limits.twist(twist)
-        signed = BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps)
-        self._commands.command(self._board.velocity(signed), now)
+        motion = BaseMotion(
+            BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps),
+            self._limits,
+            self._board.velocity,
+            stop=self._board.stop(),
+            before=self._commands.current,
+            since=now - PACE_S,
+        )
+        self._commands.command(motion, now, expires_at=now - max(0.0, age_s) + timeout_s)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
         """Turn wheels A, B, C. Raises CommandRefused, and then nothing changes."""
-        if len(rates_radps) != 3:
-            raise CommandRefused(
-                f"wheel_cmd refused: it has {len(rates_radps)} values; send exactly 3,"
-                " the rates of wheels A, B, C in rad/s"
-            )
-        require_finite("wheel_cmd", rates_radps)
+        motion = wheels_motion(
+            rates_radps, self._limits, self._board.wheels, stop=self._board.stop()
+        )
         self._require_drivable()
-        self._commands.command(self._board.wheels(self._limits.wheels(rates_radps)), now)
+        timeout_s = self._commands.settings.timeout_s
+        self._commands.command(motion, now, expires_at=now + timeout_s)
 
     def request(self, request: Request, token: object, now: float) -> None:
         """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""

@@ -24,13 +24,16 @@ class Bench:
         *,
         run: bool = True,
         axis_signs: tuple[int, int, int] = (1, 1, 1),
+        limits: SpeedLimits | None = None,
     ) -> None:
         self.board = SimulatedBoard(board or BoardSettings())
         frame = self.board.settings.frame
         self.session = Session(
             OmniBot(OmniBotSettings(delta_frame=frame)),
             SessionSettings(
-                limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
+                limits=limits or SpeedLimits(),
+                commands=CommandSettings(),
+                odometry=OdometrySettings(),
             ),
             run=run,
             axis_signs=axis_signs,
@@ -73,8 +76,14 @@ class Bench:
             assert self.now < end, f"still {self.session.state}, not {state}"
             self.run(TICK_S)
 
-    def drive(self, vx: float = 0.0, vy: float = 0.0, yaw_rate: float = 0.0) -> None:
-        self.session.command_twist(BodyTwist(vx, vy, yaw_rate), self.now)
+    def drive(
+        self, vx: float = 0.0, vy: float = 0.0, yaw_rate: float = 0.0, *, age_s: float = 0.0
+    ) -> None:
+        self.session.command_twist(BodyTwist(vx, vy, yaw_rate), self.now, age_s=age_s)
+        self.settle()
+
+    def turn_wheels(self, a: float, b: float, c: float) -> None:
+        self.session.command_wheels((a, b, c), self.now)
         self.settle()
 
     def ask(self, request: Request, limit_s: float) -> RequestDone:

@@ -9,6 +9,8 @@ import pytest
 from conftest import Driver, Probe
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, Float32MultiArray, String
 
@@ -215,6 +217,42 @@ def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
     stamped.header.stamp = probe.node.get_clock().now().to_msg()
     commands.publish(stamped)
     assert board.wait_for(lambda b: obeyed(b, "velocity", 21, 0, 0), 20.0)
+
+
+def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is_taken(
+    board: PtyBoard, start_driver: Start, probe_of: Start
+) -> None:
+    """Older than cmd_vel_timeout; a zero stamp is none."""
+    driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    commands = probe.publisher(TwistStamped, "cmd_vel")
+    stamped = TwistStamped()
+    stamped.twist.linear.x = 0.3
+    stamped.header.stamp = (probe.node.get_clock().now() - Duration(seconds=60)).to_msg()
+    commands.publish(stamped)
+    driver.wait_for_line(r"cmd_vel refused: it is 60\.\d\d s old")
+    with board.lock:
+        assert not any(command.kind == "velocity" for command in board.board.commands)
+    stamped = TwistStamped()
+    stamped.twist.linear.x = 0.3
+    commands.publish(stamped)
+    assert board.wait_for(lambda b: obeyed(b, "velocity", 21, 0, 0), 20.0)
+
+
+def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver) -> None:
+    """The middleware would leave them unheard in silence."""
+    probe.node.create_publisher(TwistStamped, "cmd_vel", 1)
+    driver.wait_for_line("probe publishes something else.*enable_stamped_cmd_vel:=true")
+
+
+def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
+    probe: Probe, driver: Driver
+) -> None:
+    """Commands are taken reliably; what may be lost on the way is not."""
+    quality = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    probe.node.create_publisher(Twist, "cmd_vel", quality)
+    driver.wait_for_line("incompatible QoS.*RELIABILITY")
 
 
 def test_an_imu_only_board_is_shown_as_such(

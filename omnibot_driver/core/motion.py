@@ -1,0 +1,133 @@
+"""What is commanded: wishes checked, limited, and told as the frame that says them now.
+
+A ``Motion`` is one command. The stream asks it for its frame whenever one goes out, so a set-point
+that nears its target by an acceleration limit needs no timer of its own. Who may command, and when
+a frame goes out, is others' business.
+"""
+
+from collections.abc import Callable, Sequence
+from enum import Enum
+from typing import Final, Protocol
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.limits import SpeedLimits, require_finite
+
+LONGEST_STEP_S: Final = 0.05
+"""A frame that goes out late does not make up for more time than this."""
+AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
+
+PLAIN_MPS: Final = 0.05
+PLAIN_RADPS: Final = 0.15
+PLAIN_WHEEL_RADPS: Final = 3.0
+"""A robot that is commanded to move faster than this is seen to move."""
+
+
+class Authority(Enum):
+    """Who commands; the value is the topic's name. One at a time, the newest."""
+
+    BASE = "cmd_vel"
+    WHEELS = "wheel_cmd"
+    POSE = "cmd_pose"
+
+
+class Motion(Protocol):
+    """One command, current until it expires or another takes its place."""
+
+    @property
+    def authority(self) -> Authority:
+        """Whose command it is."""
+
+    @property
+    def stands(self) -> bool:
+        """Whether it is a wish to stand still, which never waits and is no ramp's business."""
+
+    @property
+    def settled(self) -> bool:
+        """False while each next frame is another one."""
+
+    @property
+    def plain(self) -> bool:
+        """Whether anybody would see the robot move under what is commanded now."""
+
+    def frame(self, now: float) -> bytes:
+        """The frame to write at this time."""
+
+
+class BaseMotion:
+    """A body velocity, approached by the acceleration limits from what was commanded before.
+
+    ``encode`` makes a velocity a frame; what it makes ``stop`` of, stands.
+    """
+
+    authority: Final = Authority.BASE
+
+    def __init__(
+        self,
+        wanted: BodyTwist,
+        limits: SpeedLimits,
+        encode: Callable[[BodyTwist], bytes],
+        *,
+        stop: bytes,
+        before: Motion | None,
+        since: float,
+    ) -> None:
+        self._wanted, self._limits, self._encode = wanted, limits, encode
+        self.stands = encode(wanted) == stop
+        self._setpoint, self._reached_at = AT_REST, since
+        if isinstance(before, BaseMotion):
+            self._setpoint = before._setpoint
+            self._reached_at = max(before._reached_at, since)
+        if self.stands:
+            self._setpoint = wanted
+
+    @property
+    def settled(self) -> bool:
+        """Whether the set-point has arrived."""
+        return self._setpoint == self._wanted
+
+    @property
+    def plain(self) -> bool:
+        """By the set-point, not by what is wanted."""
+        return self._setpoint.faster_than(PLAIN_MPS, PLAIN_RADPS)
+
+    def frame(self, now: float) -> bytes:
+        """The set-point of this time; asking moves it."""
+        duration_s = min(now - self._reached_at, LONGEST_STEP_S)
+        self._setpoint = self._limits.approach(self._setpoint, self._wanted, duration_s)
+        self._reached_at = now
+        return self._encode(self._setpoint)
+
+
+class SteadyMotion:
+    """A command whose frame does not change."""
+
+    settled: Final = True
+
+    def __init__(self, authority: Authority, frame: bytes, *, stands: bool, plain: bool) -> None:
+        self.authority, self.stands, self.plain = authority, stands, plain
+        self._frame = frame
+
+    def frame(self, now: float) -> bytes:
+        """Always the same."""
+        return self._frame
+
+
+def wheels_motion(
+    rates_radps: Sequence[float],
+    limits: SpeedLimits,
+    encode: Callable[[tuple[float, float, float]], bytes],
+    *,
+    stop: bytes,
+) -> SteadyMotion:
+    """The wheels A, B, C in rad/s. Raises CommandRefused."""
+    if len(rates_radps) != 3:
+        raise CommandRefused(
+            f"wheel_cmd refused: it has {len(rates_radps)} values; send exactly 3,"
+            " the rates of wheels A, B, C in rad/s"
+        )
+    require_finite("wheel_cmd", rates_radps)
+    limited = limits.wheels(rates_radps)
+    frame = encode(limited)
+    plain = max(map(abs, limited)) > PLAIN_WHEEL_RADPS
+    return SteadyMotion(Authority.WHEELS, frame, stands=frame == stop, plain=plain)
