@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -65,6 +65,7 @@ class OmniBotDriver(Node):
             parameters.session_settings(self._values),
             run=self._values["auto_start"],
             axis_signs=tuple(self._values["axis_signs"]),
+            control=self._values["control_method"],
         )
         self._state_lock = threading.Lock()
         self._told: set[str] = set()
@@ -215,6 +216,7 @@ class OmniBotDriver(Node):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._looking = self.create_timer(LOOK_EVERY_S, self._look_for_other_types, clock=steady)
         self.create_subscription(Float32MultiArray, "wheel_cmd", self._on_wheels, 1)
+        self.create_subscription(PoseStamped, "cmd_pose", self._on_pose, 1)
         self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
         self.create_service(SetBool, "~/estop", self._on_estop)
         self.create_service(Trigger, "~/reset_odometry", self._on_reset_odometry)
@@ -247,6 +249,12 @@ class OmniBotDriver(Node):
     def _on_wheels(self, wheels: Float32MultiArray) -> None:
         self._command(lambda session, now: session.command_wheels(wheels.data, now))
 
+    def _on_pose(self, goal: PoseStamped) -> None:
+        frame = self._message_settings.odom_frame
+        self._command(
+            lambda session, now: session.command_pose(messages.goal_pose(goal, frame), now)
+        )
+
     def _command(self, action: Callable[[Session, float], None]) -> None:
         try:
             self._link.call(action)
@@ -266,7 +274,7 @@ class OmniBotDriver(Node):
     def _on_reset_odometry(
         self, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        self._link.call(lambda session, _now: session.reset_odometry())
+        self._link.call(lambda session, now: session.reset_odometry(now))
         response.success = True
         response.message = "the odometry begins here"
         return response

@@ -120,6 +120,15 @@ PARAMETERS: Final = (
         high=60.0,
     ),
     Parameter(
+        "control_method",
+        "velocity",
+        "",
+        "Where the board's own switch stands: whether it takes velocities (cmd_vel, wheel_cmd) or"
+        " poses to drive to (cmd_pose).",
+        choices=("velocity", "position"),
+        fixed=True,
+    ),
+    Parameter(
         "linear_scale",
         70.0,
         "LSB/(m/s)",
@@ -132,6 +141,22 @@ PARAMETERS: Final = (
         500.0,
         "LSB/(rad/s)",
         "Command unit of the board for the yaw rate.",
+        low=1.0,
+        high=100_000.0,
+    ),
+    Parameter(
+        "position_scale",
+        1000.0,
+        "LSB/m",
+        "Command unit of the board for a position to drive to.",
+        low=1.0,
+        high=100_000.0,
+    ),
+    Parameter(
+        "heading_scale",
+        1000.0,
+        "LSB/rad",
+        "Command unit of the board for a heading to turn to.",
         low=1.0,
         high=100_000.0,
     ),
@@ -376,10 +401,22 @@ def check_all(given: Mapping[str, object]) -> dict[str, Value]:
                 f"there is no parameter '{name}'; the nearest is '{nearest}'"
                 " (config/driver.yaml has them all)"
             )
-    return {
+    values = {
         parameter.name: parameter.check(given.get(parameter.name, parameter.default))
         for parameter in PARAMETERS
     }
+    _require_a_frame_for_goals(values)
+    return values
+
+
+def _require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
+    """A mirror turns the other way; signs that say otherwise leave positions without meaning."""
+    x, y, yaw = values["axis_signs"]
+    if values["control_method"] == "position" and x * y != yaw:
+        raise ParameterError(
+            f"parameter 'axis_signs' must not be {values['axis_signs']} with control_method"
+            " 'position': the sign of yaw must be that of x times that of y"
+        )
 
 
 def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
@@ -387,6 +424,8 @@ def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
     return OmniBotSettings(
         linear_scale=values["linear_scale"],
         angular_scale=values["angular_scale"],
+        position_scale=values["position_scale"],
+        heading_scale=values["heading_scale"],
         wheel_radius_m=values["wheel_radius"],
         base_radius_m=values["base_radius"],
         counts_per_revolution=values["counts_per_revolution"],

@@ -93,9 +93,12 @@ def slow(values: Sequence[float], limit: float) -> tuple[float, ...]:
 
 def to_words(counts: Sequence[float]) -> tuple[int, ...]:
     """Counts rounded to the nearest (halves away from zero), scaled together to fit 16 bits."""
-    return tuple(
-        int(math.copysign(math.floor(abs(count) + 0.5), count)) for count in slow(counts, MAX_WORD)
-    )
+    return tuple(map(to_nearest, slow(counts, MAX_WORD)))
+
+
+def to_nearest(count: float) -> int:
+    """The nearest whole count; halves away from zero, so that both signs are alike."""
+    return int(math.copysign(math.floor(abs(count) + 0.5), count))
 
 
 def _step(now: Sequence[float], wanted: Sequence[float], longest: float) -> tuple[float, ...]:

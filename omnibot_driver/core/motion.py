@@ -1,17 +1,16 @@
-"""What is commanded: wishes checked, limited, and told as the frame that says them now.
+"""What is commanded, as the frame that says it now.
 
 A ``Motion`` is one command. The stream asks it for its frame whenever one goes out, so a set-point
-that nears its target by an acceleration limit needs no timer of its own. Who may command, and when
-a frame goes out, is others' business.
+that nears its target by an acceleration limit needs no timer of its own. Whether it may be
+commanded, and when a frame goes out, is others' business.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from enum import Enum
 from typing import Final, Protocol
 
-from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.limits import SpeedLimits, require_finite
+from omnibot_driver.core.limits import SpeedLimits
 
 LONGEST_STEP_S: Final = 0.05
 """A frame that goes out late does not make up for more time than this."""
@@ -19,7 +18,6 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
-PLAIN_WHEEL_RADPS: Final = 3.0
 """A robot that is commanded to move faster than this is seen to move."""
 
 
@@ -111,23 +109,3 @@ class SteadyMotion:
     def frame(self, now: float) -> bytes:
         """Always the same."""
         return self._frame
-
-
-def wheels_motion(
-    rates_radps: Sequence[float],
-    limits: SpeedLimits,
-    encode: Callable[[tuple[float, float, float]], bytes],
-    *,
-    stop: bytes,
-) -> SteadyMotion:
-    """The wheels A, B, C in rad/s. Raises CommandRefused."""
-    if len(rates_radps) != 3:
-        raise CommandRefused(
-            f"wheel_cmd refused: it has {len(rates_radps)} values; send exactly 3,"
-            " the rates of wheels A, B, C in rad/s"
-        )
-    require_finite("wheel_cmd", rates_radps)
-    limited = limits.wheels(rates_radps)
-    frame = encode(limited)
-    plain = max(map(abs, limited)) > PLAIN_WHEEL_RADPS
-    return SteadyMotion(Authority.WHEELS, frame, stands=frame == stop, plain=plain)

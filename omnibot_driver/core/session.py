@@ -23,11 +23,12 @@ from omnibot_driver.core.board import (
 from omnibot_driver.core.commands import PACE_S, CommandSettings, CommandStream
 from omnibot_driver.core.device_clock import DeviceClock
 from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.helm import ControlMethod, Helm
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.limits import SpeedLimits, require_finite, require_timely
-from omnibot_driver.core.motion import BaseMotion, wheels_motion
+from omnibot_driver.core.limits import SpeedLimits, require_timely
+from omnibot_driver.core.motion import Authority, Motion
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
-from omnibot_driver.core.se2 import Signs
+from omnibot_driver.core.se2 import Pose, Signs
 from omnibot_driver.core.supervisor import Phase, Request, RequestDone, Supervisor
 
 SILENCE_S: Final = 1.5
@@ -74,7 +75,8 @@ class SessionSettings:
 
 class Session:
     """``run``: whether the board is to be started whenever it is there; ``axis_signs``: 1 or -1 for
-    x, y and yaw where the board's body axes are not REP-103's, for commands and odometry alike.
+    x, y and yaw where the board's body axes are not REP-103's, for commands and odometry alike;
+    ``control``: where the board's switch stands, which no board tells.
     """
 
     def __init__(
@@ -84,6 +86,7 @@ class Session:
         *,
         run: bool,
         axis_signs: Signs = (1, 1, 1),
+        control: ControlMethod = "velocity",
     ) -> None:
         self._board = board
         self._supervisor = Supervisor(board, run=run)
@@ -91,9 +94,9 @@ class Session:
             settings.commands, stop=board.stop(), emergency_stop=board.emergency_stop()
         )
         self._odometry = Odometry(settings.odometry, axis_signs)
+        self._helm = Helm(board, self._odometry, settings.limits, axis_signs, control)
+        self._goal_alignment = 0
         self._clock = DeviceClock(board.tick_s)
-        self._axis_signs = axis_signs
-        self._limits = settings.limits
         self._heard_at = self._came_at = -math.inf
         self._silent = False
         self._heading_assumed = False
@@ -126,7 +129,7 @@ class Session:
 
     def configure(self, settings: SessionSettings) -> None:
         """New settings, from the next command and frame on."""
-        self._limits = settings.limits
+        self._helm.limits = settings.limits
         self._commands.settings = settings.commands
         self._odometry.settings = settings.odometry
 
@@ -173,30 +176,20 @@ class Session:
 
         ``age_s``: how long ago it was sent, by the sender's stamp.
         """
-        require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
-        self._require_drivable()
         timeout_s = self._commands.settings.timeout_s
         require_timely("cmd_vel", age_s, timeout_s)
-        x, y, yaw = self._axis_signs
-        limited = self._limits.twist(twist)
-        motion = BaseMotion(
-            BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps),
-            self._limits,
-            self._board.velocity,
-            stop=self._board.stop(),
-            before=self._commands.current,
-            since=now - PACE_S,
-        )
-        self._commands.command(motion, now, expires_at=now - max(0.0, age_s) + timeout_s)
+        motion = self._helm.base(twist, before=self._commands.current, since=now - PACE_S)
+        self._command(motion, now, expires_at=now - max(0.0, age_s) + timeout_s)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
         """Turn wheels A, B, C. Raises CommandRefused, and then nothing changes."""
-        motion = wheels_motion(
-            rates_radps, self._limits, self._board.wheels, stop=self._board.stop()
-        )
-        self._require_drivable()
-        timeout_s = self._commands.settings.timeout_s
-        self._commands.command(motion, now, expires_at=now + timeout_s)
+        motion = self._helm.wheels(rates_radps)
+        self._command(motion, now, expires_at=now + self._commands.settings.timeout_s)
+
+    def command_pose(self, goal: Pose, now: float) -> None:
+        """Drive to a pose in the odometry frame. Raises CommandRefused; then nothing changes."""
+        self._command(self._helm.pose(goal), now, expires_at=math.inf)
+        self._goal_alignment = self._odometry.alignments
 
     def request(self, request: Request, token: object, now: float) -> None:
         """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""
@@ -215,9 +208,10 @@ class Session:
         self._commands.release(now)
         return "e-stop released; the robot stands still until a new command comes"
 
-    def reset_odometry(self) -> None:
-        """The odometry frame begins where the robot stands."""
+    def reset_odometry(self, now: float) -> None:
+        """The odometry frame begins where the robot stands; a goal in the old one is dropped."""
         self._odometry.reset()
+        self._drop_goal_of_another_frame(now)
 
     def farewell(self, on_exit: OnExit) -> bytes:
         """The last bytes to write before the port is closed."""
@@ -278,6 +272,7 @@ class Session:
                     self._commands.discard()
                     self._clock.restart()
                     self._supervisor.heard_paused(now, continues=continues)
+        self._drop_goal_of_another_frame(now)
         if self._odometry.heading_assumed and not self._heading_assumed:
             self._heading_assumed = True
             self._events.append(
@@ -285,6 +280,15 @@ class Session:
             )
         if self._board.mode.running and not isinstance(readings[-1], PausedReading):
             self._supervisor.heard_data(now)
+
+    def _drop_goal_of_another_frame(self, now: float) -> None:
+        """A goal was said in the board's frame; if that lies otherwise, it is another place."""
+        current = self._commands.current
+        if current is None or current.authority is not Authority.POSE:
+            return
+        if self._odometry.alignments != self._goal_alignment:
+            self._commands.halt(now)
+            self._events.append(Notice("the goal of cmd_pose is discarded: odom begins anew"))
 
     def _why_silent(self) -> str:
         if self._came_at > self._heard_at:
@@ -305,7 +309,7 @@ class Session:
             )
             self._lost, self._lost_told_at = 0, now
 
-    def _require_drivable(self) -> None:
+    def _command(self, motion: Motion, now: float, *, expires_at: float) -> None:
         phase, mode = self._supervisor.phase, self._board.mode
         if self.estop_active:
             reason = "the e-stop is latched; release it with the service ~/estop (data: false)"
@@ -314,5 +318,6 @@ class Session:
         elif not mode.running:
             reason = f"the board is {mode.value}; the service ~/start makes it run"
         else:
+            self._commands.command(motion, now, expires_at=expires_at)
             return
         raise CommandRefused(f"motion command refused: {reason}")

@@ -5,6 +5,7 @@ from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.se2 import Pose
 from omnibot_driver.core.session import Event, Notice, Session, SessionSettings
 from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
@@ -25,6 +26,7 @@ class Bench:
         run: bool = True,
         axis_signs: tuple[int, int, int] = (1, 1, 1),
         limits: SpeedLimits | None = None,
+        use_board_pose: bool = True,
     ) -> None:
         self.board = SimulatedBoard(board or BoardSettings())
         frame = self.board.settings.frame
@@ -33,10 +35,11 @@ class Bench:
             SessionSettings(
                 limits=limits or SpeedLimits(),
                 commands=CommandSettings(),
-                odometry=OdometrySettings(),
+                odometry=OdometrySettings(use_board_pose=use_board_pose),
             ),
             run=run,
             axis_signs=axis_signs,
+            control=self.board.settings.control,
         )
         self.now = 1000.0
         self.hears = self.speaks = True
@@ -106,6 +109,10 @@ class Bench:
     def still(self) -> bool:
         truth = self.board.truth
         return max(abs(truth.vx_mps), abs(truth.vy_mps), abs(truth.yaw_rate)) < 0.01
+
+    def go_to(self, x_m: float, y_m: float, yaw_rad: float) -> None:
+        self.session.command_pose(Pose(x_m, y_m, yaw_rad), self.now)
+        self.settle()
 
     @property
     def notices(self) -> list[str]:

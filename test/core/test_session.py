@@ -563,7 +563,7 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
         bench.drive(0.5)
         bench.run(0.1)
     way_before = bench.board.truth.x_m
-    bench.session.reset_odometry()
+    bench.session.reset_odometry(bench.now)
     for _ in range(10):
         bench.drive(0.5)
         bench.run(0.1)

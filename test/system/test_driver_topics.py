@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 from conftest import Driver, Probe
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, Float32MultiArray, String
 
-from omnibot_driver.simulator import PtyBoard, ReceivedCommand, SimulatedBoard
+from omnibot_driver.simulator import BoardPose, PtyBoard, ReceivedCommand, SimulatedBoard
 
 Start = Callable[..., Any]
 
@@ -255,6 +255,30 @@ def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
     driver.wait_for_line("incompatible QoS.*RELIABILITY")
 
 
+def test_a_goal_is_driven_to_with_the_switch_on_position_and_velocities_are_refused(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """A quarter of a metre ahead, in odom; the board has a frame of its own."""
+    board = start_board(
+        control="position", running=True, initial_pose=BoardPose(1000.0, 2000.0, 1570.8)
+    )
+    driver: Driver = start_driver(board.path, control_method="position")
+    probe: Probe = probe_of(driver)
+    odometry = probe.listen(Odometry, "odom")
+    probe.wait_for_state("nominal")
+    probe.wait_for(lambda: len(odometry) > 10)
+    goal = PoseStamped()
+    goal.header.frame_id = "odom"
+    goal.pose.position.x = 0.25
+    goal.pose.orientation.w = 1.0
+    probe.publisher(PoseStamped, "cmd_pose").publish(goal)
+    assert board.wait_for(lambda b: newest(b).kind == "pose", 20.0)
+    probe.wait_for(lambda: odometry[-1].pose.pose.position.x == pytest.approx(0.25, abs=0.005))
+    assert odometry[-1].pose.pose.position.y == pytest.approx(0.0, abs=0.005)
+    probe.publisher(Twist, "cmd_vel").publish(Twist())
+    driver.wait_for_line("cmd_vel refused.*control_method.*position")
+
+
 def test_an_imu_only_board_is_shown_as_such(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
@@ -272,8 +296,6 @@ def test_frames_of_a_board_that_has_driven_before_begin_at_the_identity(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
     """Its heading is a quarter turn; driving forward is still x in odom."""
-    from omnibot_driver.simulator import BoardPose
-
     board = start_board(initial_pose=BoardPose(1000.0, 2000.0, 1570.8), running=True)
     probe: Probe = probe_of(start_driver(board.path))
     odometry = probe.listen(Odometry, "odom")
