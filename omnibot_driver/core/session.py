@@ -30,9 +30,12 @@ from omnibot_driver.core.motion import Authority, Motion
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
 from omnibot_driver.core.se2 import Pose, Signs
 from omnibot_driver.core.supervisor import Phase, Request, RequestDone, Supervisor
+from omnibot_driver.core.watch import Finding, Watch
 
 SILENCE_S: Final = 1.5
 """The board says something at least once a second; after this it is not known to be there."""
+UNHEARD_S: Final = 0.3
+"""A robot that is not heard for so long is driven no further: it may be restarting."""
 LOSS_NOTICE_S: Final = 10.0
 """Lost frames are counted and told no more often than this."""
 DISCONNECTED: Final = "disconnected"
@@ -100,6 +103,9 @@ class Session:
         self._heard_at = self._came_at = -math.inf
         self._silent = False
         self._heading_assumed = False
+        self._watch = Watch()
+        self._found: set[Finding] = set()
+        self._released = False
         self._lost = 0
         self._lost_told_at = -math.inf
         self._events: list[Event] = []
@@ -110,7 +116,10 @@ class Session:
     @property
     def state(self) -> str:
         """The public name of the link's and the board's state."""
-        return DISCONNECTED if self._closed else self._board.mode.value
+        if self._closed:
+            return DISCONNECTED
+        resetting = self._supervisor.phase is Phase.RESETTING
+        return (Mode.UNKNOWN if resetting else self._board.mode).value
 
     @property
     def estop_active(self) -> bool:
@@ -123,7 +132,8 @@ class Session:
         if self._closed:
             return math.inf
         silent_at = math.inf if self._silent else self._heard_at + SILENCE_S
-        return min(silent_at, self._supervisor.wake_at, self._commands.wake_at)
+        unheard_at = self._heard_at + UNHEARD_S if self._commands.current else math.inf
+        return min(silent_at, unheard_at, self._supervisor.wake_at, self._commands.wake_at)
 
     # What happens
 
@@ -137,6 +147,7 @@ class Session:
         """The port is open."""
         self._board.connect()
         self._commands.discard()
+        self._watch.begin()
         self._clock.restart()
         self._silent, self._heard_at, self._came_at = False, now, -math.inf
         self._supervisor.opened(now)
@@ -159,6 +170,8 @@ class Session:
 
     def tick(self, now: float) -> None:
         """Time passed."""
+        if self._commands.current and now - self._heard_at >= UNHEARD_S:
+            self._commands.halt(now)
         if not self._silent and now - self._heard_at >= SILENCE_S:
             self._silent = True
             self._events.append(Notice(self._why_silent()))
@@ -206,6 +219,7 @@ class Session:
         if not self.estop_active:
             return "the e-stop was not latched"
         self._commands.release(now)
+        self._released = True
         return "e-stop released; the robot stands still until a new command comes"
 
     def reset_odometry(self, now: float) -> None:
@@ -262,14 +276,20 @@ class Session:
             match reading:
                 case ImuReading(force, rate):
                     self._events.append(ImuEstimate(stamp_s, force, rate))
-                case DisplacementReading(lost=lost):
+                case DisplacementReading(lost=lost, restarted=restarted):
                     self._count_lost(lost, now)
+                    self._look(reading, now)
                     self._events += self._odometry.displace(reading, stamp_s)
-                case PoseReading(lost=lost):
+                    if restarted:
+                        self._commands.halt(now)
+                case PoseReading(lost=lost, restarted=restarted):
                     self._count_lost(lost, now)
                     self._events += self._odometry.settle(reading)
+                    if restarted:
+                        self._commands.halt(now)
                 case PausedReading(continues):
                     self._commands.discard()
+                    self._watch.begin()
                     self._clock.restart()
                     self._supervisor.heard_paused(now, continues=continues)
         self._drop_goal_of_another_frame(now)
@@ -280,6 +300,33 @@ class Session:
             )
         if self._board.mode.running and not isinstance(readings[-1], PausedReading):
             self._supervisor.heard_data(now)
+
+    def _look(self, reading: DisplacementReading, now: float) -> None:
+        finding = self._watch.look(reading, self._commands.current)
+        if self._watch.obeys:
+            self._found.clear()
+            self._released = False
+        if finding is Finding.ASTRAY:
+            self._commands.halt(now)
+        if finding and finding not in self._found:
+            self._found.add(finding)
+            self._events.append(Notice(self._why(finding)))
+
+    def _why(self, finding: Finding) -> str:
+        if finding is Finding.ASTRAY:
+            return (
+                "the robot moves although it is to stand: if nobody pushes it, the board does not"
+                " hear us; Stop is repeated. Switch the motors off by hand, and check the cable"
+            )
+        if self._released:
+            return (
+                "the e-stop is released and the robot is commanded, but does not move: the board"
+                " seems to hold the stop itself; call ~/reset"
+            )
+        return (
+            "the robot is commanded and does not move: check motor power, whether the wheels are"
+            " blocked, and that `control_method` says where the board's switch stands"
+        )
 
     def _drop_goal_of_another_frame(self, now: float) -> None:
         """A goal was said in the board's frame; if that lies otherwise, it is another place."""
@@ -314,9 +361,12 @@ class Session:
         if self.estop_active:
             reason = "the e-stop is latched; release it with the service ~/estop (data: false)"
         elif phase is not Phase.SETTLED:
-            reason = f"the board is {phase.value}"
+            hint = "; the service ~/start makes it run" if phase is Phase.PAUSING else ""
+            reason = f"the board is {phase.value}{hint}"
         elif not mode.running:
             reason = f"the board is {mode.value}; the service ~/start makes it run"
+        elif now - self._heard_at >= UNHEARD_S and not motion.stands:
+            reason = f"nothing was heard from the board for {UNHEARD_S:g} s"
         else:
             self._commands.command(motion, now, expires_at=expires_at)
             return

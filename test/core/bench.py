@@ -1,6 +1,7 @@
 """A session and a simulated board on one workbench, wired to each other in simulated time."""
 
 from omnibot_driver.core.commands import CommandSettings
+from omnibot_driver.core.helm import ControlMethod
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometryEstimate, OdometrySettings
@@ -27,6 +28,7 @@ class Bench:
         axis_signs: tuple[int, int, int] = (1, 1, 1),
         limits: SpeedLimits | None = None,
         use_board_pose: bool = True,
+        control: ControlMethod | None = None,
     ) -> None:
         self.board = SimulatedBoard(board or BoardSettings())
         frame = self.board.settings.frame
@@ -39,7 +41,7 @@ class Bench:
             ),
             run=run,
             axis_signs=axis_signs,
-            control=self.board.settings.control,
+            control=control or self.board.settings.control,
         )
         self.now = 1000.0
         self.hears = self.speaks = True
