@@ -104,8 +104,6 @@ class Session:
         self._silent = False
         self._heading_assumed = False
         self._watch = Watch()
-        self._found: set[Finding] = set()
-        self._released = False
         self._lost = 0
         self._lost_told_at = -math.inf
         self._events: list[Event] = []
@@ -219,7 +217,7 @@ class Session:
         if not self.estop_active:
             return "the e-stop was not latched"
         self._commands.release(now)
-        self._released = True
+        self._watch.release()
         return "e-stop released; the robot stands still until a new command comes"
 
     def reset_odometry(self, now: float) -> None:
@@ -303,30 +301,10 @@ class Session:
 
     def _look(self, reading: DisplacementReading, now: float) -> None:
         finding = self._watch.look(reading, self._commands.current)
-        if self._watch.obeys:
-            self._found.clear()
-            self._released = False
         if finding is Finding.ASTRAY:
             self._commands.halt(now)
-        if finding and finding not in self._found:
-            self._found.add(finding)
-            self._events.append(Notice(self._why(finding)))
-
-    def _why(self, finding: Finding) -> str:
-        if finding is Finding.ASTRAY:
-            return (
-                "the robot moves although it is to stand: if nobody pushes it, the board does not"
-                " hear us; Stop is repeated. Switch the motors off by hand, and check the cable"
-            )
-        if self._released:
-            return (
-                "the e-stop is released and the robot is commanded, but does not move: the board"
-                " seems to hold the stop itself; call ~/reset"
-            )
-        return (
-            "the robot is commanded and does not move: check motor power, whether the wheels are"
-            " blocked, and that `control_method` says where the board's switch stands"
-        )
+        if finding and self._watch.is_news(finding):
+            self._events.append(Notice(finding.value))
 
     def _drop_goal_of_another_frame(self, now: float) -> None:
         """A goal was said in the board's frame; if that lies otherwise, it is another place."""

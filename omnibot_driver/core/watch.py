@@ -19,30 +19,49 @@ STUCK_S: Final = 1.0
 ASTRAY_S: Final = 0.2
 ROLLED_OUT_S: Final = 1.5
 """After this a robot that was told to stand stands, the second of Stops included."""
+AGAIN_S: Final = 1.0
 
 
 class Finding(Enum):
-    """What is wrong."""
+    """What is wrong, as a sentence that says what to do."""
 
-    STUCK = "it is commanded, and does not move"
-    ASTRAY = "it is to stand, and moves"
+    HELD = (
+        "the e-stop is released and the robot is commanded, but does not move: the board seems to"
+        " hold the stop itself; call ~/reset"
+    )
+    STUCK = (
+        "the robot is commanded and does not move: check motor power, whether the wheels are"
+        " blocked, and that `control_method` says where the board's switch stands"
+    )
+    ASTRAY = (
+        "the robot moves although it is to stand: if nobody pushes it, the board does not hear us;"
+        " Stop is repeated. Switch the motors off by hand, and check the cable"
+    )
 
 
 class Watch:
     """Looks at every displacement, together with what was commanded then."""
 
     def __init__(self) -> None:
-        self.obeys = False
-        """Whether the robot moved when it was last looked at, as it was told to."""
-        self._stuck_s = self._standing_s = self._moving_s = 0.0
+        self._released = False
+        self._told: set[Finding] = set()
+        self.begin()
 
     def begin(self) -> None:
         """What was seen so far says nothing of what comes."""
-        self.obeys = False
         self._stuck_s = self._standing_s = self._moving_s = 0.0
 
+    def release(self) -> None:
+        """The e-stop is released; the robot has not moved since."""
+        self._released = True
+
+    def is_news(self, finding: Finding) -> bool:
+        """Once, until the robot has obeyed again."""
+        told, self._told = self._told, self._told | {finding}
+        return finding not in told
+
     def look(self, reading: DisplacementReading, commanded: Motion | None) -> Finding | None:
-        """What this displacement proves; again while it goes on, but once a second at most."""
+        """What this displacement proves; again while it goes on, once a second."""
         if not reading.duration_s:
             self.begin()
             return None
@@ -51,16 +70,18 @@ class Watch:
             math.hypot(reading.dx_m, reading.dy_m) > MOVING_MPS * seconds
             or abs(reading.dyaw_rad) > MOVING_RADPS * seconds
         )
-        stands = commanded is None or commanded.stands
         plain = commanded is not None and commanded.plain
-        self.obeys = plain and moves
+        stands = commanded is None or commanded.stands
         self._stuck_s = self._stuck_s + seconds if plain and not moves else 0.0
         self._standing_s = self._standing_s + seconds if stands else 0.0
         self._moving_s = self._moving_s + seconds if moves else 0.0
+        if plain and moves:
+            self._released = False
+            self._told = set()
         if self._stuck_s > STUCK_S:
-            self._stuck_s = 0.0
-            return Finding.STUCK
+            self._stuck_s = STUCK_S - AGAIN_S
+            return Finding.HELD if self._released else Finding.STUCK
         if self._standing_s > ROLLED_OUT_S and self._moving_s > ASTRAY_S:
-            self._standing_s = ROLLED_OUT_S - 1.0
+            self._standing_s = ROLLED_OUT_S - AGAIN_S
             return Finding.ASTRAY
         return None
