@@ -35,7 +35,7 @@ class CommandStream:
         self._current: Motion | None = None
         self._expires_at = -math.inf
         self._stopping_until = -math.inf
-        self._written_at = -math.inf
+        self._written_at = self._said_at = -math.inf
         self._last_written = b""
         self._urgent = False
         self._fresh = self._switching = False
@@ -93,6 +93,7 @@ class CommandStream:
         frame = self._frame(next_write, now)
         self._fresh, self._urgent, self._switching = self._switching, False, False
         if frame:
+            self._said_at = now
             self.wrote(frame, now)
         return frame
 
@@ -110,8 +111,10 @@ class CommandStream:
     def _next_write(self) -> float:
         if self._urgent:
             return -math.inf
-        hurried = self._fresh or (self._current is not None and not self._current.settled)
-        return self._written_at + (PACE_S if hurried else 1.0 / self.settings.rate_hz)
+        paced_at = self._written_at + PACE_S
+        if self._fresh or (self._current is not None and not self._current.settled):
+            return paced_at
+        return max(paced_at, self._said_at + 1.0 / self.settings.rate_hz)
 
     def _frame(self, due_at: float, now: float) -> bytes:
         if self.latched:

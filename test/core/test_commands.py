@@ -176,6 +176,20 @@ def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Comm
     assert len(written) == pytest.approx(2000, abs=2)
 
 
+def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
+    stream: CommandStream,
+) -> None:
+    """Letters at 50 Hz, and the stop still goes out at 20 Hz."""
+    stream.latch(1.0)
+    written = 0
+    for step in range(1000):
+        now = 1.0 + step * 0.001
+        if step % 20 == 7:
+            stream.wrote(b"S", now)
+        written += stream.due(now) == ESTOP
+    assert written >= 15
+
+
 def test_a_flood_of_emergency_stops_keeps_the_pace(stream: CommandStream) -> None:
     """A button node may publish as fast as it likes; the line has to take other things too."""
     written = []
