@@ -4,6 +4,7 @@ Nothing is computed here. Measurements are published by the link's reader thread
 the executor sleeps unless a message, a service call or a parameter wakes it.
 """
 
+import math
 import re
 import threading
 import time
@@ -45,7 +46,7 @@ from omnibot_driver.core.supervisor import Request
 from omnibot_driver.link import Link
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-LOOK_EVERY_S = 2.0
+LOOK_EVERY_S = WARN_EVERY_S = 2.0
 UNHEARD = ("disconnected", "connecting")
 NOT_OURS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..+")
 """Parameters that rclpy itself declares for every node."""
@@ -69,6 +70,7 @@ class OmniBotDriver(Node):
         )
         self._state_lock = threading.Lock()
         self._told: set[str] = set()
+        self._refused_at_s: dict[str, float] = {}
         self._clock_offset_ns = 0
         self._handlers: dict[type, Callable[[Any, int], None]] = {
             ImuEstimate: self._publish_imu,
@@ -259,7 +261,14 @@ class OmniBotDriver(Node):
         try:
             self._link.call(action)
         except CommandRefused as error:
-            self.get_logger().warning(str(error), throttle_duration_sec=2.0)
+            self._warn_of_refusal(str(error))
+
+    def _warn_of_refusal(self, text: str) -> None:
+        """Each kind now and then: a flood of one does not hide another."""
+        kind, now_s = text.partition(":")[0], time.monotonic()
+        if now_s - self._refused_at_s.get(kind, -math.inf) >= WARN_EVERY_S:
+            self._refused_at_s[kind] = now_s
+            self.get_logger().warning(text)
 
     def _on_estop_topic(self, message: Bool) -> None:
         if message.data:

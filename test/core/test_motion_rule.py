@@ -84,6 +84,37 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     assert not bench.still()
 
 
+def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench) -> None:
+    """It booted and was started within a moment, and no notice was heard."""
+    bench = driving(boot_time_s=0.05)
+    bench.drive(0.4)
+    bench.speaks = False
+    bench.board.reboot()
+    bench.run(0.07)
+    bench.board.receive(b"\0\0\0S")
+    assert bench.board.mode is BoardMode.NOMINAL
+    bench.speaks = True
+    bench.run(0.15)
+    assert bench.written[-1][1] == STOP
+    start = len(bench.written)
+    bench.run(1.0)
+    assert b"\xff\xfe\x01" not in bench.written_since(start)
+    drive_on(bench)
+    assert not bench.still()
+
+
+@pytest.mark.parametrize("request_", [Request.PAUSE, Request.RESET])
+def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
+    """Also where the board does not hear it and drives on."""
+    bench.drive(0.4)
+    start = len(bench.written)
+    bench.hears = False
+    bench.session.request(request_, object(), bench.now)
+    bench.settle()
+    bench.run(1.0)
+    assert b"\xff\xfe\x01" not in bench.written_since(start)
+
+
 # E-stop
 
 

@@ -277,6 +277,9 @@ def test_a_goal_is_driven_to_with_the_switch_on_position_and_velocities_are_refu
     assert odometry[-1].pose.pose.position.y == pytest.approx(0.0, abs=0.005)
     probe.publisher(Twist, "cmd_vel").publish(Twist())
     driver.wait_for_line("cmd_vel refused.*control_method.*position")
+    goal.header.frame_id = "map"
+    probe.publisher(PoseStamped, "cmd_pose").publish(goal)
+    driver.wait_for_line("cmd_pose refused.*'map'.*transform it")
 
 
 def test_an_imu_only_board_is_shown_as_such(
