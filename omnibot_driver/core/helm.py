@@ -11,7 +11,7 @@ from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits, require_finite
-from omnibot_driver.core.motion import Authority, BaseMotion, Motion, SteadyMotion
+from omnibot_driver.core.motion import Authority, BaseMotion, GoalMotion, Motion, SteadyMotion
 from omnibot_driver.core.odometry import Odometry
 from omnibot_driver.core.se2 import Pose, Signs
 
@@ -79,8 +79,7 @@ class Helm:
                 "cmd_pose refused: where the board believes to be is not known; this needs its"
                 " poses (nominal mode) and `use_board_pose`. After a restart, wait a second"
             )
-        frame = self._board.drive_to(place)
-        return SteadyMotion(Authority.POSE, frame, stands=False, plain=False)
+        return GoalMotion(goal, self._board.drive_to(place), self._odometry.alignments)
 
     def _require_switch(self, authority: Authority) -> None:
         if (authority is Authority.POSE) is not (self._control == "position"):

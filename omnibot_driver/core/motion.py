@@ -5,12 +5,14 @@ that nears its target by an acceleration limit needs no timer of its own. Whethe
 commanded, and when a frame goes out, is others' business.
 """
 
+import math
 from collections.abc import Callable
 from enum import Enum
 from typing import Final, Protocol
 
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits
+from omnibot_driver.core.se2 import Pose
 
 LONGEST_STEP_S: Final = 0.05
 """A frame that goes out late does not make up for more time than this."""
@@ -19,6 +21,9 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
 """A robot that is commanded to move faster than this is seen to move."""
+LEAVING_M: Final = 0.3
+LEAVING_RAD: Final = 2.0
+"""No controller that drives to a goal overshoots by so much."""
 
 
 class Authority(Enum):
@@ -109,3 +114,31 @@ class SteadyMotion:
     def frame(self, now: float) -> bytes:
         """Always the same."""
         return self._frame
+
+
+class GoalMotion:
+    """A pose to drive to: ``place`` in the odometry frame, as that lay at this ``alignment``."""
+
+    authority: Final = Authority.POSE
+    stands: Final = False
+    settled: Final = True
+    plain: Final = False
+
+    def __init__(self, place: Pose, frame: bytes, alignment: int) -> None:
+        self.alignment = alignment
+        self._place, self._frame = place, frame
+        self._nearest_m = self._nearest_rad = math.inf
+
+    def frame(self, now: float) -> bytes:
+        """Always the same."""
+        return self._frame
+
+    def is_left_by(self, pose: Pose) -> bool:
+        """Whether a robot that is here now has been plainly nearer before."""
+        way = pose.way_to(self._place)
+        self._nearest_m = min(self._nearest_m, way.way_m)
+        self._nearest_rad = min(self._nearest_rad, abs(way.yaw_rad))
+        return (
+            way.way_m > self._nearest_m + LEAVING_M
+            or abs(way.yaw_rad) > self._nearest_rad + LEAVING_RAD
+        )

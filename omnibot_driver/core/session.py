@@ -26,7 +26,7 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.helm import ControlMethod, Helm
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits, require_timely
-from omnibot_driver.core.motion import Authority, Motion
+from omnibot_driver.core.motion import GoalMotion, Motion
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
 from omnibot_driver.core.se2 import Pose, Signs
 from omnibot_driver.core.supervisor import Phase, Request, RequestDone, Supervisor
@@ -98,7 +98,6 @@ class Session:
         )
         self._odometry = Odometry(settings.odometry, axis_signs)
         self._helm = Helm(board, self._odometry, settings.limits, axis_signs, control)
-        self._goal_alignment = 0
         self._clock = DeviceClock(board.tick_s)
         self._heard_at = self._came_at = -math.inf
         self._silent = False
@@ -200,7 +199,6 @@ class Session:
     def command_pose(self, goal: Pose, now: float) -> None:
         """Drive to a pose in the odometry frame. Raises CommandRefused; then nothing changes."""
         self._command(self._helm.pose(goal), now, expires_at=math.inf)
-        self._goal_alignment = self._odometry.alignments
 
     def request(self, request: Request, token: object, now: float) -> None:
         """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""
@@ -223,7 +221,7 @@ class Session:
     def reset_odometry(self, now: float) -> None:
         """The odometry frame begins where the robot stands; a goal in the old one is dropped."""
         self._odometry.reset()
-        self._drop_goal_of_another_frame(now)
+        self._check_goal([], now)
 
     def farewell(self, on_exit: OnExit) -> bytes:
         """The last bytes to write before the port is closed."""
@@ -277,7 +275,9 @@ class Session:
                 case DisplacementReading(lost=lost, restarted=restarted):
                     self._count_lost(lost, now)
                     self._look(reading, now)
-                    self._events += self._odometry.displace(reading, stamp_s)
+                    estimates = self._odometry.displace(reading, stamp_s)
+                    self._events += estimates
+                    self._check_goal(estimates, now)
                     if restarted:
                         self._commands.halt(now)
                 case PoseReading(lost=lost, restarted=restarted):
@@ -290,7 +290,7 @@ class Session:
                     self._watch.begin()
                     self._clock.restart()
                     self._supervisor.heard_paused(now, continues=continues)
-        self._drop_goal_of_another_frame(now)
+        self._check_goal([], now)
         if self._odometry.heading_assumed and not self._heading_assumed:
             self._heading_assumed = True
             self._events.append(
@@ -306,14 +306,19 @@ class Session:
         if finding and self._watch.is_news(finding):
             self._events.append(Notice(finding.value))
 
-    def _drop_goal_of_another_frame(self, now: float) -> None:
-        """A goal was said in the board's frame; if that lies otherwise, it is another place."""
-        current = self._commands.current
-        if current is None or current.authority is not Authority.POSE:
+    def _check_goal(self, estimates: Sequence[OdometryEstimate], now: float) -> None:
+        """Drop a goal that is another place by now, or that the robot drives away from."""
+        goal = self._commands.current
+        if not isinstance(goal, GoalMotion):
             return
-        if self._odometry.alignments != self._goal_alignment:
-            self._commands.halt(now)
-            self._events.append(Notice("the goal of cmd_pose is discarded: odom begins anew"))
+        if goal.alignment != self._odometry.alignments:
+            why = "odom begins anew"
+        elif any(goal.is_left_by(estimate.pose) for estimate in estimates):
+            why = "the robot drives away from it: does the board's switch stand on position?"
+        else:
+            return
+        self._commands.halt(now)
+        self._events.append(Notice(f"the goal of cmd_pose is discarded: {why}"))
 
     def _why_silent(self) -> str:
         if self._came_at > self._heard_at:

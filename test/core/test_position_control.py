@@ -198,3 +198,28 @@ def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Be
     bench.run(0.5)
     assert {data for _, data in bench.written[start:]} == {STOP}
     assert [text for text in bench.notices if "goal" in text]
+
+
+@pytest.mark.parametrize("goal", [(1.0, 0.0, 0.0), (0.3, -0.3, 0.0), (0.0, 0.0, 1.0)])
+def test_a_robot_that_drives_away_from_its_goal_is_stopped(
+    goal: tuple[float, float, float],
+) -> None:
+    """The switch stands on velocity, whatever the parameter says."""
+    bench = Bench(BoardSettings(running=True), control="position")
+    bench.open()
+    bench.run(1.5)
+    bench.go_to(*goal)
+    bench.run(4.0)
+    assert bench.still()
+    assert len([text for text in bench.notices if "switch" in text]) == 1
+
+
+def test_a_robot_that_is_pushed_a_little_keeps_its_goal(bench: Bench) -> None:
+    """It is held there, as it was asked to."""
+    bench.go_to(0.3, 0.0, 0.0)
+    bench.run(3.0)
+    pushed = bench.board.odometry
+    bench.board._pose = bench.board._pose.moved(-0.2, 0.0, 0.3)
+    bench.run(3.0)
+    assert bench.board.odometry.x_mm == pytest.approx(pushed.x_mm, abs=2.0)
+    assert bench.notices == []
