@@ -154,6 +154,11 @@ class SimulatedBoard:
         """The board's own pose, in the units of the 5 Hz frame."""
         return BoardPose(*(1000 * value for value in self._pose))
 
+    @property
+    def driven(self) -> bool:
+        """Whether the motors have been told to turn, and not to stop since."""
+        return self._goal is not None or self._targets != _ALL_ZERO
+
     def receive(self, data: bytes) -> None:
         """Take bytes off the line, in any chunking; each command acts at once."""
         self.received += data

@@ -20,6 +20,7 @@ SHARED_FILES = [
     f"ament_index/resource_index/packages/{PACKAGE}",
     f"{PACKAGE}/package.xml",
     f"{PACKAGE}/config/driver.yaml",
+    f"{PACKAGE}/config/omnibot.policy.xml",
     f"{PACKAGE}/launch/driver.launch.py",
     f"{PACKAGE}/launch/simulation.launch.py",
 ]

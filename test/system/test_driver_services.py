@@ -5,9 +5,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from conftest import Driver, Probe
+from driver_process import Driver
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
+from probe import Probe
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 

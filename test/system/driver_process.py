@@ -1,0 +1,85 @@
+"""The driver as a process of its own, with its output and its end."""
+
+import itertools
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+from typing import Self
+
+PATIENCE_S = 20.0
+"""How long an event is awaited before a test gives up; nobody asserts how long it took."""
+
+_namespaces = (f"robot{number}" for number in itertools.count())
+
+
+class Driver:
+    """``python -m omnibot_driver.driver`` as a process of its own, in a namespace of its own."""
+
+    def __init__(self, *, port: str, **parameters: object) -> None:
+        self.namespace = next(_namespaces)
+        arguments = ["--ros-args", "-r", f"__ns:=/{self.namespace}"]
+        for name, value in {"port": port, **parameters}.items():
+            arguments += ["-p", f"{name}:={value}"]
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "omnibot_driver.driver", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env={**os.environ, "PYTHONUNBUFFERED": "1", "RCUTILS_LOGGING_USE_STDOUT": "1"},
+        )
+        self.lines: list[str] = []
+        self._said = threading.Condition()
+        self._listener = threading.Thread(target=self._listen)
+        self._listener.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            self.process.wait(PATIENCE_S)
+        finally:
+            self.process.kill()
+            self._listener.join()
+            assert self.process.stdout is not None
+            self.process.stdout.close()
+
+    @property
+    def output(self) -> str:
+        return "".join(self.lines)
+
+    def wait_for_line(self, pattern: str) -> str:
+        """The first line of the output in which the pattern is found."""
+
+        def find() -> str | None:
+            return next((line for line in self.lines if re.search(pattern, line)), None)
+
+        with self._said:
+            if not self._said.wait_for(lambda: find() or self._ended(), PATIENCE_S):
+                raise AssertionError(f"no line matches {pattern!r} in:\n{self.output}")
+            line = find()
+        assert line is not None, f"the driver ended without {pattern!r}:\n{self.output}"
+        return line
+
+    def end(self, *signals: signal.Signals) -> int:
+        """Send the signals, one after the other, and return the exit code."""
+        for number in signals:
+            self.process.send_signal(number)
+        return self.process.wait(PATIENCE_S)
+
+    def _ended(self) -> bool:
+        return not self._listener.is_alive()
+
+    def _listen(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            with self._said:
+                self.lines.append(line)
+                self._said.notify_all()
+        with self._said:
+            self._said.notify_all()

@@ -1,0 +1,114 @@
+"""Another ROS process's view of one driver."""
+
+import threading
+from collections.abc import Callable
+from typing import Any, Self
+
+from driver_process import PATIENCE_S
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
+from std_msgs.msg import String
+
+
+class Probe:
+    """Subscribes, publishes and calls."""
+
+    def __init__(self, namespace: str) -> None:
+        self.node = Node("probe", namespace=namespace)
+        self._received: dict[str, list[Any]] = {}
+        self._changed = threading.Condition()
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        self._stopping = Future()
+        self._spinner = threading.Thread(
+            target=self._executor.spin_until_future_complete, args=(self._stopping,)
+        )
+
+    def __enter__(self) -> Self:
+        self._spinner.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set_result(None)
+        self._executor.wake()
+        self._spinner.join()
+        self._executor.shutdown()
+        self.node.destroy_node()
+
+    def listen(self, kind: type, topic: str, *, latched: bool = False) -> list[Any]:
+        """The list that messages of this topic are appended to as they come."""
+        messages = self._received.setdefault(topic, [])
+        qos = QoSProfile(depth=1000)
+        if latched:
+            qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
+
+        def append(message: Any) -> None:
+            with self._changed:
+                messages.append(message)
+                self._changed.notify_all()
+
+        self.node.create_subscription(kind, topic, append, qos)
+        self._executor.wake()
+        return messages
+
+    def wait_for(self, predicate: Callable[[], object]) -> None:
+        """Until the predicate holds; it is asked again whenever a message comes in."""
+        with self._changed:
+            assert self._changed.wait_for(predicate, PATIENCE_S), "it did not come about"
+
+    def wait_for_state(self, state: str) -> None:
+        if "omnibot_driver/state" not in self._received:
+            self.listen(String, "omnibot_driver/state", latched=True)
+        states = self._received["omnibot_driver/state"]
+        self.wait_for(lambda: states and states[-1].data == state)
+
+    def publisher(self, kind: type, topic: str) -> Any:
+        """A publisher that the driver already listens to."""
+        publisher = self.node.create_publisher(kind, topic, 1)
+        matched = threading.Event()
+
+        def look() -> None:
+            if publisher.get_subscription_count():
+                matched.set()
+
+        timer = self.node.create_timer(0.02, look)
+        self._executor.wake()
+        assert matched.wait(PATIENCE_S), f"nobody subscribes {topic}"
+        self.node.destroy_timer(timer)
+        return publisher
+
+    def client(self, kind: type, service: str) -> Any:
+        client = self.node.create_client(kind, f"omnibot_driver/{service}")
+        self._executor.wake()
+        assert client.wait_for_service(PATIENCE_S), f"nobody offers {service}"
+        return client
+
+    def call_async(self, kind: type, service: str, **request: object) -> "Answer":
+        return Answer(self.client(kind, service), kind.Request(**request))  # type: ignore[attr-defined]
+
+    def wait_for_future(self, future: Any) -> None:
+        done = threading.Event()
+        future.add_done_callback(lambda _: done.set())
+        assert done.wait(PATIENCE_S), "no answer"
+
+    def call(self, kind: type, service: str, **request: object) -> Any:
+        return self.call_async(kind, service, **request).wait()
+
+
+class Answer:
+    """A service call under way."""
+
+    def __init__(self, client: Any, request: Any) -> None:
+        self._done = threading.Event()
+        self._future = client.call_async(request)
+        self._future.add_done_callback(lambda _: self._done.set())
+
+    @property
+    def arrived(self) -> bool:
+        return self._done.is_set()
+
+    def wait(self) -> Any:
+        assert self._done.wait(PATIENCE_S), "no answer"
+        return self._future.result()

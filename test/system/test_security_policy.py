@@ -1,0 +1,123 @@
+"""config/omnibot.policy.xml against SROS2's schema 0.2.0, and against the node as it really is."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import pytest
+from driver_process import Driver
+from probe import Probe
+
+POLICY: Final = Path(__file__).parents[2] / "config" / "omnibot.policy.xml"
+NODE: Final = "omnibot_driver"
+
+CHILDREN: Final = {
+    "policy": ("enclaves",),
+    "enclaves": ("enclave",),
+    "enclave": ("profiles",),
+    "profiles": ("profile",),
+    "profile": ("topics", "services", "actions"),
+    "topics": ("topic",),
+    "services": ("service",),
+    "actions": ("action",),
+}
+REQUIRED: Final = {"policy": ("version",), "enclave": ("path",), "profile": ("ns", "node")}
+QUALIFIERS: Final = {
+    "topics": ("publish", "subscribe"),
+    "services": ("reply", "request"),
+    "actions": ("call", "execute"),
+}
+MOVES_OR_STOPS: Final = ("/cmd_vel", "/wheel_cmd", "/cmd_pose", "/estop")
+
+Rules = dict[str, set[str]]
+"""The names that a profile allows, by qualifier."""
+
+
+def profiles() -> dict[str, Element]:
+    """The one profile of each enclave, by the enclave's path."""
+    enclaves = ElementTree.parse(POLICY).getroot().iter("enclave")
+    return {enclave.attrib["path"]: next(enclave.iter("profile")) for enclave in enclaves}
+
+
+def allowed(profile: Element) -> Rules:
+    """Expanded as SROS2 does it: ~ is the node, a relative name stands in the namespace."""
+    namespace = profile.attrib["ns"].rstrip("/")
+    found: Rules = {"publish": set(), "subscribe": set(), "reply": set(), "request": set()}
+    for group in profile:
+        for name in (item.text or "" for item in group):
+            if name.startswith("~"):
+                name = f"{namespace}/{profile.attrib['node']}{name[1:]}"
+            elif not name.startswith("/"):
+                name = f"{namespace}/{name}"
+            for qualifier in group.attrib:
+                found[qualifier].add(name)
+    return found
+
+
+def test_the_policy_keeps_to_the_schema() -> None:
+    """Elements where they may stand, with the attributes that they need and no others."""
+    root = ElementTree.parse(POLICY).getroot()
+    assert root.tag == "policy"
+    assert root.attrib == {"version": "0.2.0"}
+    for element in root.iter():
+        if (children := CHILDREN.get(element.tag)) is not None:
+            assert {child.tag for child in element} <= set(children), element.tag
+            assert len(element) > 0, f"{element.tag} is empty"
+        else:
+            assert element.text, f"an empty {element.tag}"
+            assert element.text == element.text.strip()
+        qualifiers = QUALIFIERS.get(element.tag, ())
+        required = REQUIRED.get(element.tag, ())
+        assert set(required) <= set(element.attrib) <= {*required, *qualifiers}, element.tag
+        given = [element.attrib[name] for name in qualifiers if name in element.attrib]
+        assert bool(given) == bool(qualifiers), f"{element.tag} allows nothing"
+        assert set(given) <= {"ALLOW", "DENY"}
+
+
+def test_the_driver_may_do_what_it_does_and_nothing_else(
+    probe_of: Callable[[Driver], Probe], driver: Driver
+) -> None:
+    """The node's own topics and services, as the graph shows them."""
+    probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    graph, home = probe.node, f"/{driver.namespace}"
+
+    def names(found: list[tuple[str, list[str]]]) -> set[str]:
+        return {name.removeprefix(home) for name, _ in found}
+
+    rules = allowed(profiles()["/omnibot/driver"])
+    assert rules["request"] == set()
+    assert rules["publish"] == names(graph.get_publisher_names_and_types_by_node(NODE, home))
+    assert rules["reply"] == names(graph.get_service_names_and_types_by_node(NODE, home))
+    subscribed = names(graph.get_subscriber_names_and_types_by_node(NODE, home))
+    assert rules["subscribe"] == subscribed | {"/clock"}, "/clock: with use_sim_time"
+
+
+@pytest.mark.parametrize("enclave", sorted(set(profiles()) - {"/omnibot/driver"}))
+def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: str) -> None:
+    """A name that has gone from the driver must go from the policy."""
+    driver, other = allowed(profiles()["/omnibot/driver"]), allowed(profiles()[enclave])
+    everywhere = {"/rosout", "/parameter_events", "/clock"}
+    assert other["publish"] <= driver["subscribe"] | everywhere
+    assert other["subscribe"] <= driver["publish"] | everywhere
+    assert other["request"] <= driver["reply"]
+    assert other["reply"] == set()
+
+
+def test_only_named_enclaves_may_move_stop_or_release_the_robot() -> None:
+    """A table of who is who."""
+    rules = {path: allowed(profile) for path, profile in profiles().items()}
+    who = {
+        name: {path for path, rule in rules.items() if name in rule["publish"]}
+        for name in MOVES_OR_STOPS
+    }
+    assert who == {
+        "/cmd_vel": {"/omnibot/operator", "/omnibot/navigation"},
+        "/wheel_cmd": {"/omnibot/operator"},
+        "/cmd_pose": {"/omnibot/operator", "/omnibot/navigation"},
+        "/estop": {"/omnibot/operator", "/omnibot/navigation", "/omnibot/estop_button"},
+    }
+    callers = {path for path, rule in rules.items() if rule["request"]}
+    assert callers == {"/omnibot/operator"}
