@@ -65,7 +65,7 @@ class CommandStream:
         """Discard the command, Stop at once, and repeat it for ``STOPPING_S``."""
         self.discard()
         self._stopping_until = now + STOPPING_S
-        self._urgent = True
+        self._urgent = not self._just_written(self._stop, now)
 
     def latch(self, now: float) -> None:
         """E-stop: nothing but emergency-stop frames from now on, the first at once."""

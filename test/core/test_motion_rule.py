@@ -245,6 +245,20 @@ def test_the_stops_for_a_robot_that_moves_unbidden_do_not_hinder_the_next_comman
     assert bench.written[-1][1] != STOP
 
 
+def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Bench) -> None:
+    """A thousand zeros a second are still no more than one Stop per control tick."""
+    bench.speaks = False
+    bench.run(0.5)
+    start = len(bench.written)
+    for _ in range(200):
+        bench.now += 0.001
+        bench.drive()
+        if bench.now >= bench.session.wake_at:
+            bench.session.tick(bench.now)
+            bench.settle()
+    assert 15 <= len(bench.written) - start <= 22
+
+
 # Failures
 
 
