@@ -5,7 +5,7 @@ orientation).
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -15,13 +15,17 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Header
 
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import require_finite
 from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.se2 import Pose
 from omnibot_driver.core.session import ImuEstimate
 
 UNMEASURED_VARIANCE: Final = 1e6
 """For z, roll and pitch, of which a planar odometry says nothing, and for a twist not known."""
+SHORTEST_QUATERNION: Final = 1e-3
+MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 
 
@@ -102,6 +106,59 @@ def body_twist(twist: Any) -> BodyTwist:
     values = (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
     require_finite("cmd_vel", values)
     return BodyTwist(twist.linear.x, twist.linear.y, twist.angular.z)
+
+
+def goal_pose(stamped: Any, odom_frame: str) -> Pose:
+    """The planar pose of a geometry_msgs/PoseStamped; z is not looked at.
+
+    Raises CommandRefused for another frame than ``odom_frame`` (or none), for what is not finite,
+    and for an orientation that is none or that does not stand upright.
+    """
+    frame, position, turn = stamped.header.frame_id, stamped.pose.position, stamped.pose.orientation
+    if frame not in ("", odom_frame):
+        raise CommandRefused(
+            f"cmd_pose refused: it is given in '{frame}'; transform it to '{odom_frame}' first"
+        )
+    quaternion = (turn.x, turn.y, turn.z, turn.w)
+    require_finite("cmd_pose", (position.x, position.y, position.z, *quaternion))
+    length = math.hypot(*quaternion)
+    if not SHORTEST_QUATERNION < length < 1.0 / SHORTEST_QUATERNION:
+        raise CommandRefused(
+            f"cmd_pose refused: its orientation is no rotation (a quaternion of length {length:g});"
+            " for no turn at all set w to 1"
+        )
+    x, y, z, w = (part / length for part in quaternion)
+    upright = 1.0 - 2.0 * (x * x + y * y)
+    if upright < math.cos(MOST_TILT_RAD):
+        tilt_deg = math.degrees(math.acos(max(-1.0, upright)))
+        raise CommandRefused(
+            f"cmd_pose refused: its orientation is tilted by {tilt_deg:.0f}°; this robot turns"
+            " about z alone"
+        )
+    yaw_rad = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return Pose(position.x, position.y, yaw_rad)
+
+
+def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
+    """What to say of publishers on ``cmd_vel`` whose type is not ours; empty if there are none."""
+    ours, other = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
+    if stamped:
+        ours, other = other, ours
+    unheard = sorted(
+        {publisher.node_name for publisher in publishers if publisher.topic_type != ours}
+    )
+    if not unheard:
+        return ""
+    return (
+        f"{', '.join(unheard)} publishes something else than {ours} on cmd_vel and is not heard:"
+        f" for {other} start the driver with enable_stamped_cmd_vel:={str(not stamped).lower()}"
+    )
+
+
+def age(stamp: Time, now_ns: int) -> float:
+    """Seconds since the stamp by the clock that gave both; 0 for a zero stamp, which is none."""
+    stamp_ns = stamp.sec * 10**9 + stamp.nanosec
+    return (now_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
 
 
 def time_message(nanoseconds: int) -> Time:

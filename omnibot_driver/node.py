@@ -4,6 +4,7 @@ Nothing is computed here. Measurements are published by the link's reader thread
 the executor sleeps unless a message, a service call or a parameter wakes it.
 """
 
+import math
 import re
 import threading
 import time
@@ -12,7 +13,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -21,6 +22,7 @@ from rcl_interfaces.msg import (
     SetParametersResult,
 )
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
@@ -44,6 +46,7 @@ from omnibot_driver.core.supervisor import Request
 from omnibot_driver.link import Link
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LOOK_EVERY_S = WARN_EVERY_S = 2.0
 UNHEARD = ("disconnected", "connecting")
 NOT_OURS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..+")
 """Parameters that rclpy itself declares for every node."""
@@ -63,9 +66,11 @@ class OmniBotDriver(Node):
             parameters.session_settings(self._values),
             run=self._values["auto_start"],
             axis_signs=tuple(self._values["axis_signs"]),
+            control=self._values["control_method"],
         )
         self._state_lock = threading.Lock()
         self._told: set[str] = set()
+        self._refused_at_s: dict[str, float] = {}
         self._clock_offset_ns = 0
         self._handlers: dict[type, Callable[[Any, int], None]] = {
             ImuEstimate: self._publish_imu,
@@ -207,12 +212,13 @@ class OmniBotDriver(Node):
 
     def _create_inputs(self) -> None:
         if self._values["enable_stamped_cmd_vel"]:
-            self.create_subscription(
-                TwistStamped, "cmd_vel", lambda stamped: self._on_twist(stamped.twist), 1
-            )
+            self.create_subscription(TwistStamped, "cmd_vel", self._on_twist_stamped, 1)
         else:
             self.create_subscription(Twist, "cmd_vel", self._on_twist, 1)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._looking = self.create_timer(LOOK_EVERY_S, self._look_for_other_types, clock=steady)
         self.create_subscription(Float32MultiArray, "wheel_cmd", self._on_wheels, 1)
+        self.create_subscription(PoseStamped, "cmd_pose", self._on_pose, 1)
         self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
         self.create_service(SetBool, "~/estop", self._on_estop)
         self.create_service(Trigger, "~/reset_odometry", self._on_reset_odometry)
@@ -224,14 +230,45 @@ class OmniBotDriver(Node):
     def _on_twist(self, twist: Twist) -> None:
         self._command(lambda session, now: session.command_twist(messages.body_twist(twist), now))
 
+    def _on_twist_stamped(self, stamped: TwistStamped) -> None:
+        age_s = messages.age(stamped.header.stamp, self.get_clock().now().nanoseconds)
+        self._command(
+            lambda session, now: session.command_twist(
+                messages.body_twist(stamped.twist), now, age_s=age_s
+            )
+        )
+
+    def _look_for_other_types(self) -> None:
+        """The middleware says nothing when two types meet on one topic. Told once."""
+        stamped = self._values["enable_stamped_cmd_vel"]
+        warning = messages.type_conflict(
+            self.get_publishers_info_by_topic("cmd_vel"), stamped=stamped
+        )
+        if warning:
+            self.get_logger().warning(warning)
+            self._looking.cancel()
+
     def _on_wheels(self, wheels: Float32MultiArray) -> None:
         self._command(lambda session, now: session.command_wheels(wheels.data, now))
+
+    def _on_pose(self, goal: PoseStamped) -> None:
+        frame = self._message_settings.odom_frame
+        self._command(
+            lambda session, now: session.command_pose(messages.goal_pose(goal, frame), now)
+        )
 
     def _command(self, action: Callable[[Session, float], None]) -> None:
         try:
             self._link.call(action)
         except CommandRefused as error:
-            self.get_logger().warning(str(error), throttle_duration_sec=2.0)
+            self._warn_of_refusal(str(error))
+
+    def _warn_of_refusal(self, text: str) -> None:
+        """Each kind now and then: a flood of one does not hide another."""
+        kind, now_s = text.partition(":")[0], time.monotonic()
+        if now_s - self._refused_at_s.get(kind, -math.inf) >= WARN_EVERY_S:
+            self._refused_at_s[kind] = now_s
+            self.get_logger().warning(text)
 
     def _on_estop_topic(self, message: Bool) -> None:
         if message.data:
@@ -246,7 +283,7 @@ class OmniBotDriver(Node):
     def _on_reset_odometry(
         self, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        self._link.call(lambda session, _now: session.reset_odometry())
+        self._link.call(lambda session, now: session.reset_odometry(now))
         response.success = True
         response.message = "the odometry begins here"
         return response

@@ -120,6 +120,15 @@ PARAMETERS: Final = (
         high=60.0,
     ),
     Parameter(
+        "control_method",
+        "velocity",
+        "",
+        "Where the board's own switch stands: whether it takes velocities (cmd_vel, wheel_cmd) or"
+        " poses to drive to (cmd_pose).",
+        choices=("velocity", "position"),
+        fixed=True,
+    ),
+    Parameter(
         "linear_scale",
         70.0,
         "LSB/(m/s)",
@@ -132,6 +141,22 @@ PARAMETERS: Final = (
         500.0,
         "LSB/(rad/s)",
         "Command unit of the board for the yaw rate.",
+        low=1.0,
+        high=100_000.0,
+    ),
+    Parameter(
+        "position_scale",
+        1000.0,
+        "LSB/m",
+        "Command unit of the board for a position to drive to.",
+        low=1.0,
+        high=100_000.0,
+    ),
+    Parameter(
+        "heading_scale",
+        1000.0,
+        "LSB/rad",
+        "Command unit of the board for a heading to turn to.",
         low=1.0,
         high=100_000.0,
     ),
@@ -158,6 +183,23 @@ PARAMETERS: Final = (
         "Rate of the fastest wheel that wheel_cmd may command; the others keep their ratio.",
         low=0.0,
         high=200.0,
+    ),
+    Parameter(
+        "max_linear_acceleration",
+        0.0,
+        "m/s²",
+        "How fast cmd_vel may change the linear velocity, as a vector; 0 is at once. A command to"
+        " stand still is never slowed, wheel_cmd neither.",
+        low=0.0,
+        high=100.0,
+    ),
+    Parameter(
+        "max_angular_acceleration",
+        0.0,
+        "rad/s²",
+        "Likewise, for the yaw rate.",
+        low=0.0,
+        high=1000.0,
     ),
     Parameter(
         "cmd_vel_timeout",
@@ -359,10 +401,22 @@ def check_all(given: Mapping[str, object]) -> dict[str, Value]:
                 f"there is no parameter '{name}'; the nearest is '{nearest}'"
                 " (config/driver.yaml has them all)"
             )
-    return {
+    values = {
         parameter.name: parameter.check(given.get(parameter.name, parameter.default))
         for parameter in PARAMETERS
     }
+    _require_a_frame_for_goals(values)
+    return values
+
+
+def _require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
+    """A mirror turns the other way; signs that say otherwise leave positions without meaning."""
+    x, y, yaw = values["axis_signs"]
+    if values["control_method"] == "position" and x * y != yaw:
+        raise ParameterError(
+            f"parameter 'axis_signs' must not be {values['axis_signs']} with control_method"
+            " 'position': the sign of yaw must be that of x times that of y"
+        )
 
 
 def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
@@ -370,6 +424,8 @@ def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
     return OmniBotSettings(
         linear_scale=values["linear_scale"],
         angular_scale=values["angular_scale"],
+        position_scale=values["position_scale"],
+        heading_scale=values["heading_scale"],
         wheel_radius_m=values["wheel_radius"],
         base_radius_m=values["base_radius"],
         counts_per_revolution=values["counts_per_revolution"],
@@ -386,6 +442,8 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
             linear_mps=values["max_linear_speed"],
             angular_radps=values["max_angular_speed"],
             wheel_radps=values["max_wheel_speed"],
+            linear_mps2=values["max_linear_acceleration"],
+            angular_radps2=values["max_angular_acceleration"],
         ),
         commands=CommandSettings(
             timeout_s=values["cmd_vel_timeout"], rate_hz=values["command_rate"]

@@ -1,9 +1,11 @@
 """Values to ROS messages: where each number goes, by REP-103, REP-105 and REP-145."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
-from geometry_msgs.msg import Twist
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseStamped, Twist
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,6 +24,83 @@ STAMP = messages.time_message(1_700_000_000_123_456_789)
 def test_a_stamp_is_seconds_and_nanoseconds() -> None:
     """Exactly, without a detour over floating point."""
     assert (STAMP.sec, STAMP.nanosec) == (1_700_000_000, 123_456_789)
+
+
+@pytest.mark.parametrize(("sec", "nanosec", "age_s"), [(98, 0, 2.0), (102, 5 * 10**8, -2.5)])
+def test_a_stamp_has_an_age_by_the_clock_that_gave_it(sec: int, nanosec: int, age_s: float) -> None:
+    """Negative where it is in the future."""
+    assert messages.age(Time(sec=sec, nanosec=nanosec), 100 * 10**9) == pytest.approx(age_s)
+
+
+def test_a_zero_stamp_is_no_stamp() -> None:
+    """Whoever leaves it out is as young as the message."""
+    assert messages.age(Time(), 1_700_000_000 * 10**9) == 0.0
+
+
+def goal(
+    x: float = 0.0, y: float = 0.0, turn: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0), frame: str = ""
+) -> PoseStamped:
+    message = PoseStamped()
+    message.header.frame_id = frame
+    message.pose.position.x, message.pose.position.y = x, y
+    orientation = message.pose.orientation
+    orientation.x, orientation.y, orientation.z, orientation.w = turn
+    return message
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(0.01, 100.0))
+def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
+    yaw_rad: float, length: float
+) -> None:
+    """Not everybody normalises."""
+    turn = (0.0, 0.0, length * math.sin(yaw_rad / 2), length * math.cos(yaw_rad / 2))
+    pose = messages.goal_pose(goal(1.0, -2.0, turn), "odom")
+    assert (pose.x_m, pose.y_m) == (1.0, -2.0)
+    assert math.remainder(pose.yaw_rad - yaw_rad, math.tau) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("frame", ["", "odom"])
+def test_a_goal_is_in_the_odometry_frame_or_in_none(frame: str) -> None:
+    """None is taken for the odometry frame."""
+    assert messages.goal_pose(goal(1.0, frame=frame), "odom") == Pose(1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (goal(frame="map"), "in 'map'; transform it to 'odom'"),
+        (goal(frame="/odom"), "in '/odom'"),
+        (goal(math.nan), "not finite"),
+        (goal(turn=(0.0, 0.0, math.inf, 1.0)), "not finite"),
+        (goal(turn=(0.0, 0.0, 0.0, 0.0)), "set w to 1"),
+        (goal(turn=(1e300, 0.0, 0.0, 0.0)), "no rotation"),
+        (goal(turn=(1.0, 0.0, 0.0, 0.0)), "tilted by 180°"),
+        (goal(turn=(0.0, math.sin(0.25), 0.0, math.cos(0.25))), "tilted by 29°"),
+    ],
+)
+def test_a_goal_that_is_no_place_on_the_floor_is_refused_with_a_reason(
+    wrong: PoseStamped, said: str
+) -> None:
+    """Wrong frame, no number, no rotation, not upright."""
+    with pytest.raises(CommandRefused, match=f"cmd_pose refused.*{said}"):
+        messages.goal_pose(wrong, "odom")
+
+
+def publisher(name: str, kind: str) -> SimpleNamespace:
+    return SimpleNamespace(node_name=name, topic_type=f"geometry_msgs/msg/{kind}")
+
+
+def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
+    """Whichever of the two is ours; nobody is named for nothing."""
+    teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
+    assert messages.type_conflict([teleop], stamped=False) == ""
+    assert messages.type_conflict([nav], stamped=True) == ""
+    text = messages.type_conflict([teleop, nav, nav], stamped=False)
+    assert text.startswith("nav publishes")
+    assert text.endswith("enable_stamped_cmd_vel:=true")
+    text = messages.type_conflict([teleop, nav], stamped=True)
+    assert text.startswith("teleop publishes")
+    assert text.endswith("enable_stamped_cmd_vel:=false")
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:

@@ -28,9 +28,14 @@ PROMISED: dict[str, object] = {
     "reconnect_interval": 0.5,
     "linear_scale": 70.0,
     "angular_scale": 500.0,
+    "control_method": "velocity",
+    "position_scale": 1000.0,
+    "heading_scale": 1000.0,
     "max_linear_speed": 0.5,
     "max_angular_speed": 0.5,
     "max_wheel_speed": 17.0,
+    "max_linear_acceleration": 0.0,
+    "max_angular_acceleration": 0.0,
     "cmd_vel_timeout": 0.5,
     "command_rate": 20.0,
     "enable_stamped_cmd_vel": False,
@@ -247,13 +252,26 @@ def test_one_wrong_value_among_many_is_found() -> None:
         check_all({"port": "/dev/ttyACM3", "command_rate": 1e6, "baudrate": 9600})
 
 
+@pytest.mark.parametrize("signs", [[1, 1, -1], [1, -1, 1], [-1, -1, -1]])
+def test_axis_signs_that_no_mirror_makes_are_refused_for_position_control(
+    signs: list[int],
+) -> None:
+    """Velocities can do with them, places cannot."""
+    assert check_all({"axis_signs": signs})
+    with pytest.raises(ParameterError, match="'axis_signs'"):
+        check_all({"axis_signs": signs, "control_method": "position"})
+    assert check_all({"axis_signs": [1, -1, -1], "control_method": "position"})
+
+
 def test_values_reach_the_core_under_their_meaning() -> None:
     """Every one of them changed, none mistaken for another."""
     values = check_all(
         {
             "linear_scale": 71, "angular_scale": 501, "wheel_radius": 0.03, "delta_frame": "body",
+            "position_scale": 900, "heading_scale": 800,
             "pose_byte_order": "little", "accel_range": 8, "gyro_range": 1000,
             "max_linear_speed": 0.6, "max_angular_speed": 0.7, "max_wheel_speed": 18,
+            "max_linear_acceleration": 0.8, "max_angular_acceleration": 0.9,
             "cmd_vel_timeout": 0.4, "command_rate": 25, "odom_wheel_drift": 0.03,
             "odom_wheel_scale": 0.06, "odom_wheel_slip": 0.05,
             "odom_gap_acceleration": 3, "odom_gap_angular_acceleration": 4,
@@ -263,10 +281,12 @@ def test_values_reach_the_core_under_their_meaning() -> None:
     )  # fmt: skip
     board, session = board_settings(values), session_settings(values)
     assert (board.linear_scale, board.angular_scale, board.wheel_radius_m) == (71.0, 501.0, 0.03)
+    assert (board.position_scale, board.heading_scale) == (900.0, 800.0)
     assert (board.delta_frame, board.pose_byte_order) == ("body", "little")
     assert (board.imu.accel_range_g, board.imu.gyro_range_dps) == (8, 1000)
     limits = session.limits
     assert (limits.linear_mps, limits.angular_radps, limits.wheel_radps) == (0.6, 0.7, 18.0)
+    assert (limits.linear_mps2, limits.angular_radps2) == (0.8, 0.9)
     assert (session.commands.timeout_s, session.commands.rate_hz) == (0.4, 25.0)
     assert (board.base_radius_m, board.counts_per_revolution) == (0.2, 1000)
     odometry, noise = session.odometry, session.odometry.noise

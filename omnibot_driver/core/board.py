@@ -10,6 +10,7 @@ from enum import Enum
 from typing import Literal, Protocol
 
 from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.se2 import Pose
 
 Vector3 = tuple[float, float, float]
 
@@ -138,3 +139,9 @@ class Board(Protocol):
 
     def wheels(self, rates_radps: Vector3) -> bytes:
         """Turn the wheels A, B, C at these rates, already within the limits."""
+
+    def drive_to(self, pose: Pose) -> bytes:
+        """Go to this pose in the board's own earth frame, and stay.
+
+        Raises CommandRefused where the line cannot say it.
+        """

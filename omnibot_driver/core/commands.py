@@ -1,13 +1,15 @@
-"""Which frame goes out when: pacing, repeating, timing out, the e-stop latch.
+"""Which frame goes out when: pacing, repeating, timing out, one authority, the e-stop latch.
 
 Nothing acknowledges a command and the board never stops by itself, so the current command is
-repeated, and when it grows old Stop is, for a while. This module is handed ready frames and does
-not know what is in them; time is an argument.
+repeated, and when it grows old Stop is, for a while. This module does not know what is in a frame;
+time is an argument.
 """
 
 import math
 from dataclasses import dataclass
 from typing import Final
+
+from omnibot_driver.core.motion import Motion
 
 PACE_S: Final = 0.01
 """The board's control tick: commands closer together than this would only fill its buffer."""
@@ -30,32 +32,40 @@ class CommandStream:
         self.settings = settings
         self.latched = False
         self._stop, self._emergency_stop = stop, emergency_stop
-        self._current: bytes | None = None
+        self._current: Motion | None = None
         self._expires_at = -math.inf
         self._stopping_until = -math.inf
-        self._written_at = -math.inf
+        self._written_at = self._said_at = -math.inf
         self._last_written = b""
         self._urgent = False
-        self._fresh = False
+        self._fresh = self._switching = False
 
-    def command(self, frame: bytes, now: float) -> None:
-        """The newest command; it replaces whatever was current."""
-        self._current = frame
-        self._expires_at = now + self.settings.timeout_s
+    @property
+    def current(self) -> Motion | None:
+        """The command that is being carried out."""
+        return self._current
+
+    def command(self, motion: Motion, now: float, *, expires_at: float) -> None:
+        """The newest command replaces whatever was current; another's is stopped in between."""
+        before, self._current = self._current, motion
+        self._expires_at = expires_at
         self._fresh = True
-        self._urgent = frame == self._stop and not self._just_written(frame, now)
+        self._switching |= before is not None and before.authority is not motion.authority
+        stopped = self._just_written(self._stop, now)
+        self._switching &= not stopped
+        self._urgent = (self._switching or motion.stands) and not stopped
 
     def discard(self) -> None:
         """No command is current and the line goes quiet; an e-stop stays."""
         self._current = None
         self._stopping_until = -math.inf
-        self._fresh = self._urgent = False
+        self._fresh = self._urgent = self._switching = False
 
     def halt(self, now: float) -> None:
         """Discard the command, Stop at once, and repeat it for ``STOPPING_S``."""
         self.discard()
         self._stopping_until = now + STOPPING_S
-        self._urgent = True
+        self._urgent = not self._just_written(self._stop, now)
 
     def latch(self, now: float) -> None:
         """E-stop: nothing but emergency-stop frames from now on, the first at once."""
@@ -80,9 +90,10 @@ class CommandStream:
         next_write = self._next_write()
         if now < next_write:
             return b""
-        frame = self._frame(next_write)
-        self._urgent = self._fresh = False
+        frame = self._frame(next_write, now)
+        self._fresh, self._urgent, self._switching = self._switching, False, False
         if frame:
+            self._said_at = now
             self.wrote(frame, now)
         return frame
 
@@ -92,7 +103,7 @@ class CommandStream:
         next_write = self._next_write()
         if self._current is not None and not self.latched:
             return min(next_write, self._expires_at)
-        return next_write if self._frame(next_write) else math.inf
+        return next_write if self._frame(next_write, next_write) else math.inf
 
     def _just_written(self, frame: bytes, now: float) -> bool:
         return self._last_written == frame and now - self._written_at < PACE_S
@@ -100,11 +111,16 @@ class CommandStream:
     def _next_write(self) -> float:
         if self._urgent:
             return -math.inf
-        return self._written_at + (PACE_S if self._fresh else 1.0 / self.settings.rate_hz)
+        paced_at = self._written_at + PACE_S
+        if self._fresh or (self._current is not None and not self._current.settled):
+            return paced_at
+        return max(paced_at, self._said_at + 1.0 / self.settings.rate_hz)
 
-    def _frame(self, at: float) -> bytes:
+    def _frame(self, due_at: float, now: float) -> bytes:
         if self.latched:
             return self._emergency_stop
+        if self._switching:
+            return self._stop
         if self._current is not None:
-            return self._current
-        return self._stop if self._urgent or at < self._stopping_until else b""
+            return self._current.frame(now)
+        return self._stop if self._urgent or due_at < self._stopping_until else b""

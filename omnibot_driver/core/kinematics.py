@@ -21,6 +21,13 @@ class BodyTwist:
     vy_mps: float
     yaw_rate_radps: float
 
+    def faster_than(self, linear_mps: float, angular_radps: float) -> bool:
+        """Whether it moves or turns faster than this."""
+        return (
+            math.hypot(self.vx_mps, self.vy_mps) > linear_mps
+            or abs(self.yaw_rate_radps) > angular_radps
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class OmniKinematics:

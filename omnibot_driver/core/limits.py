@@ -16,16 +16,35 @@ MAX_WORD: Final = 32767
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedLimits:
-    """The fastest that is commanded: m/s as a vector, rad/s of yaw, rad/s of the fastest wheel."""
+    """The fastest that is commanded: m/s as a vector, rad/s of yaw, rad/s of the fastest wheel.
+
+    ``linear_mps2``, ``angular_radps2``: how fast a base velocity is changed; 0 is at once.
+    """
 
     linear_mps: float = 0.5
     angular_radps: float = 0.5
     wheel_radps: float = 17.0
+    linear_mps2: float = 0.0
+    angular_radps2: float = 0.0
 
     def twist(self, wanted: BodyTwist) -> BodyTwist:
         """The linear velocity shortened in its own direction, the yaw rate clamped."""
         vx, vy = shorten((wanted.vx_mps, wanted.vy_mps), self.linear_mps)
         yaw_rate = max(-self.angular_radps, min(self.angular_radps, wanted.yaw_rate_radps))
+        return BodyTwist(vx, vy, yaw_rate)
+
+    def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
+        """The velocity after ``duration_s`` on the straight way to what is wanted."""
+        vx, vy = _step(
+            (now.vx_mps, now.vy_mps),
+            (wanted.vx_mps, wanted.vy_mps),
+            self.linear_mps2 * duration_s if self.linear_mps2 else math.inf,
+        )
+        (yaw_rate,) = _step(
+            (now.yaw_rate_radps,),
+            (wanted.yaw_rate_radps,),
+            self.angular_radps2 * duration_s if self.angular_radps2 else math.inf,
+        )
         return BodyTwist(vx, vy, yaw_rate)
 
     def wheels(self, wanted_radps: Sequence[float]) -> tuple[float, float, float]:
@@ -41,6 +60,20 @@ def require_finite(what: str, values: Sequence[float]) -> None:
         raise CommandRefused(
             f"{what} refused: ({numbers}) is not finite and counts as no command: mend the sender"
         )
+
+
+def require_timely(what: str, age_s: float, longest_s: float) -> None:
+    """Raises CommandRefused for what was sent too long ago, or as far in the future."""
+    if abs(age_s) <= longest_s:
+        return
+    if age_s > 0.0:
+        wrong = f"it is {age_s:.2f} s old and worth nothing after {longest_s:g} s (cmd_vel_timeout)"
+    else:
+        wrong = f"its stamp is {-age_s:.2f} s in the future"
+    raise CommandRefused(
+        f"{what} refused: {wrong}: check the network and that both clocks agree (NTP,"
+        " use_sim_time), or leave the stamp at zero"
+    )
 
 
 def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
@@ -60,9 +93,20 @@ def slow(values: Sequence[float], limit: float) -> tuple[float, ...]:
 
 def to_words(counts: Sequence[float]) -> tuple[int, ...]:
     """Counts rounded to the nearest (halves away from zero), scaled together to fit 16 bits."""
-    return tuple(
-        int(math.copysign(math.floor(abs(count) + 0.5), count)) for count in slow(counts, MAX_WORD)
-    )
+    return tuple(map(to_nearest, slow(counts, MAX_WORD)))
+
+
+def to_nearest(count: float) -> int:
+    """The nearest whole count; halves away from zero, so that both signs are alike."""
+    return int(math.copysign(math.floor(abs(count) + 0.5), count))
+
+
+def _step(now: Sequence[float], wanted: Sequence[float], longest: float) -> tuple[float, ...]:
+    """From one vector towards another, by no more than ``longest``."""
+    way = tuple(there - here for here, there in zip(now, wanted, strict=True))
+    if math.hypot(*way) <= longest:
+        return tuple(wanted)
+    return tuple(here + part for here, part in zip(now, shorten(way, longest), strict=True))
 
 
 def _scale(values: Sequence[float], factor: float) -> tuple[float, ...]:

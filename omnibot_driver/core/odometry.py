@@ -63,6 +63,8 @@ class Odometry:
     def __init__(self, settings: OdometrySettings, axis_signs: Signs = (1, 1, 1)) -> None:
         self.heading_assumed = False
         """True once a board sent no pose and its heading had to be taken for 0."""
+        self.alignments = 0
+        """How often the odometry frame has come to lie otherwise in the board's."""
         self._axis_signs = axis_signs
         self._settings = settings
         self._uncertainty = Uncertainty(settings.noise)
@@ -88,6 +90,7 @@ class Odometry:
 
     def reset(self) -> None:
         """The odometry frame begins where the robot stands."""
+        self.alignments += 1
         if self._board is not None:
             self._release()
             if self._uncertainty.gap != NOTHING:
@@ -128,6 +131,17 @@ class Odometry:
             self._judge(told)
         return estimates
 
+    def in_board_frame(self, place: Pose) -> Pose | None:
+        """A place in the odometry frame as the board would call it, by the shorter turn from here.
+
+        None while it cannot be told: no pose of the board says where the frames lie.
+        """
+        proved = self._proved is not None and self._settings.use_board_pose
+        if self._board is None or self._restarted is not None or not proved:
+            return None
+        way = self._follower.target.way_to(place)
+        return self._board.moved(roll(self._signed(unroll(way))))
+
     # The board's frame
 
     def _has_restarted(self, told: Pose) -> bool:
@@ -150,6 +164,7 @@ class Odometry:
         return estimates
 
     def _begin_at(self, board: Pose) -> None:
+        self.alignments += 1
         self._board, self._restarted, self._doubted = board, None, None
 
     def _believe(self, board: Pose) -> None:
@@ -169,8 +184,9 @@ class Odometry:
             self._follower.correct(roll(self._signed(unroll(way))))
             self._uncertainty.settle()
         else:
+            self.alignments += 1
             self._uncertainty.give_up()
-        self._believe(self._board.moved(way))
+        self._believe(told)
 
     def _reachable(self, told: Pose) -> bool:
         """From the last pose that was believed, in the time since then."""

@@ -20,17 +20,22 @@ from omnibot_driver.core.board import (
     Reading,
     Vector3,
 )
-from omnibot_driver.core.commands import CommandSettings, CommandStream
+from omnibot_driver.core.commands import PACE_S, CommandSettings, CommandStream
 from omnibot_driver.core.device_clock import DeviceClock
 from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.helm import ControlMethod, Helm
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.limits import SpeedLimits, require_finite
+from omnibot_driver.core.limits import SpeedLimits, require_timely
+from omnibot_driver.core.motion import GoalMotion, Motion
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
-from omnibot_driver.core.se2 import Signs
+from omnibot_driver.core.se2 import Pose, Signs
 from omnibot_driver.core.supervisor import Phase, Request, RequestDone, Supervisor
+from omnibot_driver.core.watch import Finding, Watch
 
 SILENCE_S: Final = 1.5
 """The board says something at least once a second; after this it is not known to be there."""
+UNHEARD_S: Final = 0.3
+"""A robot that is not heard for so long is driven no further: it may be restarting."""
 LOSS_NOTICE_S: Final = 10.0
 """Lost frames are counted and told no more often than this."""
 DISCONNECTED: Final = "disconnected"
@@ -73,7 +78,8 @@ class SessionSettings:
 
 class Session:
     """``run``: whether the board is to be started whenever it is there; ``axis_signs``: 1 or -1 for
-    x, y and yaw where the board's body axes are not REP-103's, for commands and odometry alike.
+    x, y and yaw where the board's body axes are not REP-103's, for commands and odometry alike;
+    ``control``: where the board's switch stands, which no board tells.
     """
 
     def __init__(
@@ -83,6 +89,7 @@ class Session:
         *,
         run: bool,
         axis_signs: Signs = (1, 1, 1),
+        control: ControlMethod = "velocity",
     ) -> None:
         self._board = board
         self._supervisor = Supervisor(board, run=run)
@@ -90,12 +97,12 @@ class Session:
             settings.commands, stop=board.stop(), emergency_stop=board.emergency_stop()
         )
         self._odometry = Odometry(settings.odometry, axis_signs)
+        self._helm = Helm(board, self._odometry, settings.limits, axis_signs, control)
         self._clock = DeviceClock(board.tick_s)
-        self._axis_signs = axis_signs
-        self._limits = settings.limits
         self._heard_at = self._came_at = -math.inf
         self._silent = False
         self._heading_assumed = False
+        self._watch = Watch()
         self._lost = 0
         self._lost_told_at = -math.inf
         self._events: list[Event] = []
@@ -106,7 +113,10 @@ class Session:
     @property
     def state(self) -> str:
         """The public name of the link's and the board's state."""
-        return DISCONNECTED if self._closed else self._board.mode.value
+        if self._closed:
+            return DISCONNECTED
+        resetting = self._supervisor.phase is Phase.RESETTING
+        return (Mode.UNKNOWN if resetting else self._board.mode).value
 
     @property
     def estop_active(self) -> bool:
@@ -119,13 +129,14 @@ class Session:
         if self._closed:
             return math.inf
         silent_at = math.inf if self._silent else self._heard_at + SILENCE_S
-        return min(silent_at, self._supervisor.wake_at, self._commands.wake_at)
+        unheard_at = self._heard_at + UNHEARD_S if self._commands.current else math.inf
+        return min(silent_at, unheard_at, self._supervisor.wake_at, self._commands.wake_at)
 
     # What happens
 
     def configure(self, settings: SessionSettings) -> None:
         """New settings, from the next command and frame on."""
-        self._limits = settings.limits
+        self._helm.limits = settings.limits
         self._commands.settings = settings.commands
         self._odometry.settings = settings.odometry
 
@@ -133,6 +144,7 @@ class Session:
         """The port is open."""
         self._board.connect()
         self._commands.discard()
+        self._watch.begin()
         self._clock.restart()
         self._silent, self._heard_at, self._came_at = False, now, -math.inf
         self._supervisor.opened(now)
@@ -155,6 +167,8 @@ class Session:
 
     def tick(self, now: float) -> None:
         """Time passed."""
+        if self._commands.current and now - self._heard_at >= UNHEARD_S:
+            self._commands.halt(now)
         if not self._silent and now - self._heard_at >= SILENCE_S:
             self._silent = True
             self._events.append(Notice(self._why_silent()))
@@ -167,25 +181,24 @@ class Session:
 
     # What is wanted
 
-    def command_twist(self, twist: BodyTwist, now: float) -> None:
-        """Drive the body. Raises CommandRefused, and then nothing changes."""
-        require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
-        self._require_drivable()
-        x, y, yaw = self._axis_signs
-        limited = self._limits.twist(twist)
-        signed = BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps)
-        self._commands.command(self._board.velocity(signed), now)
+    def command_twist(self, twist: BodyTwist, now: float, *, age_s: float = 0.0) -> None:
+        """Drive the body. Raises CommandRefused, and then nothing changes.
+
+        ``age_s``: how long ago it was sent, by the sender's stamp.
+        """
+        timeout_s = self._commands.settings.timeout_s
+        require_timely("cmd_vel", age_s, timeout_s)
+        motion = self._helm.base(twist, before=self._commands.current, since=now - PACE_S)
+        self._command(motion, now, expires_at=now - max(0.0, age_s) + timeout_s)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
         """Turn wheels A, B, C. Raises CommandRefused, and then nothing changes."""
-        if len(rates_radps) != 3:
-            raise CommandRefused(
-                f"wheel_cmd refused: it has {len(rates_radps)} values; send exactly 3,"
-                " the rates of wheels A, B, C in rad/s"
-            )
-        require_finite("wheel_cmd", rates_radps)
-        self._require_drivable()
-        self._commands.command(self._board.wheels(self._limits.wheels(rates_radps)), now)
+        motion = self._helm.wheels(rates_radps)
+        self._command(motion, now, expires_at=now + self._commands.settings.timeout_s)
+
+    def command_pose(self, goal: Pose, now: float) -> None:
+        """Drive to a pose in the odometry frame. Raises CommandRefused; then nothing changes."""
+        self._command(self._helm.pose(goal), now, expires_at=math.inf)
 
     def request(self, request: Request, token: object, now: float) -> None:
         """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""
@@ -202,11 +215,13 @@ class Session:
         if not self.estop_active:
             return "the e-stop was not latched"
         self._commands.release(now)
+        self._watch.release()
         return "e-stop released; the robot stands still until a new command comes"
 
-    def reset_odometry(self) -> None:
-        """The odometry frame begins where the robot stands."""
+    def reset_odometry(self, now: float) -> None:
+        """The odometry frame begins where the robot stands; a goal in the old one is dropped."""
         self._odometry.reset()
+        self._check_goal([], now)
 
     def farewell(self, on_exit: OnExit) -> bytes:
         """The last bytes to write before the port is closed."""
@@ -257,16 +272,25 @@ class Session:
             match reading:
                 case ImuReading(force, rate):
                     self._events.append(ImuEstimate(stamp_s, force, rate))
-                case DisplacementReading(lost=lost):
+                case DisplacementReading(lost=lost, restarted=restarted):
                     self._count_lost(lost, now)
-                    self._events += self._odometry.displace(reading, stamp_s)
-                case PoseReading(lost=lost):
+                    self._look(reading, now)
+                    estimates = self._odometry.displace(reading, stamp_s)
+                    self._events += estimates
+                    self._check_goal(estimates, now)
+                    if restarted:
+                        self._commands.halt(now)
+                case PoseReading(lost=lost, restarted=restarted):
                     self._count_lost(lost, now)
                     self._events += self._odometry.settle(reading)
+                    if restarted:
+                        self._commands.halt(now)
                 case PausedReading(continues):
                     self._commands.discard()
+                    self._watch.begin()
                     self._clock.restart()
                     self._supervisor.heard_paused(now, continues=continues)
+        self._check_goal([], now)
         if self._odometry.heading_assumed and not self._heading_assumed:
             self._heading_assumed = True
             self._events.append(
@@ -274,6 +298,27 @@ class Session:
             )
         if self._board.mode.running and not isinstance(readings[-1], PausedReading):
             self._supervisor.heard_data(now)
+
+    def _look(self, reading: DisplacementReading, now: float) -> None:
+        finding = self._watch.look(reading, self._commands.current)
+        if finding is Finding.ASTRAY:
+            self._commands.halt(now)
+        if finding and self._watch.is_news(finding):
+            self._events.append(Notice(finding.value))
+
+    def _check_goal(self, estimates: Sequence[OdometryEstimate], now: float) -> None:
+        """Drop a goal that is another place by now, or that the robot drives away from."""
+        goal = self._commands.current
+        if not isinstance(goal, GoalMotion):
+            return
+        if goal.alignment != self._odometry.alignments:
+            why = "odom begins anew"
+        elif any(goal.is_left_by(estimate.pose) for estimate in estimates):
+            why = "the robot drives away from it: does the board's switch stand on position?"
+        else:
+            return
+        self._commands.halt(now)
+        self._events.append(Notice(f"the goal of cmd_pose is discarded: {why}"))
 
     def _why_silent(self) -> str:
         if self._came_at > self._heard_at:
@@ -294,14 +339,18 @@ class Session:
             )
             self._lost, self._lost_told_at = 0, now
 
-    def _require_drivable(self) -> None:
+    def _command(self, motion: Motion, now: float, *, expires_at: float) -> None:
         phase, mode = self._supervisor.phase, self._board.mode
         if self.estop_active:
             reason = "the e-stop is latched; release it with the service ~/estop (data: false)"
         elif phase is not Phase.SETTLED:
-            reason = f"the board is {phase.value}"
+            hint = "; the service ~/start makes it run" if phase is Phase.PAUSING else ""
+            reason = f"the board is {phase.value}{hint}"
         elif not mode.running:
             reason = f"the board is {mode.value}; the service ~/start makes it run"
+        elif now - self._heard_at >= UNHEARD_S and not motion.stands:
+            reason = f"nothing was heard from the board for {UNHEARD_S:g} s"
         else:
+            self._commands.command(motion, now, expires_at=expires_at)
             return
         raise CommandRefused(f"motion command refused: {reason}")

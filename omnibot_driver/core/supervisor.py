@@ -16,9 +16,13 @@ from omnibot_driver.core.errors import RequestRefused
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
-"""Longer than the second between two notices: data without a notice means that P was lost."""
+"""Longer than the second between two notices: so much data without a notice means that P, or R,
+was lost."""
+FLOWING_S: Final = 0.1
+"""Data comes every 10 ms; a longer time without any does not count as data."""
 IN_FLIGHT_S: Final = 0.1
-"""A notice that comes sooner than this after a letter may have been sent before it was obeyed."""
+"""A notice that comes sooner than this after a letter may have been sent before it was obeyed; and
+one that is followed by data within this time does not show that the board is paused."""
 ANSWER_WITHIN_S: Final = 4.5
 RESET_WITHIN_S: Final = 9.5
 
@@ -41,6 +45,14 @@ class Phase(Enum):
     RESETTING = "being reset"
 
 
+class Wanted(Enum):
+    """What the board is to be in whenever it is there; it outlives ports, boards and failures."""
+
+    ANY = "as it is"
+    RUNNING = "running"
+    PAUSED = "paused"
+
+
 @dataclass(frozen=True, slots=True)
 class RequestDone:
     """The answer to a request; ``token`` is what the asker handed in."""
@@ -51,16 +63,18 @@ class RequestDone:
 
 
 class Supervisor:
-    """``run``: whether the board is to run whenever it is there."""
+    """``run``: whether the board is to run whenever it is there; otherwise it stays as it is."""
 
     def __init__(self, board: Board, *, run: bool) -> None:
         self.phase = Phase.CLOSED
         self.answers: list[RequestDone] = []
         self._board = board
-        self._run = run
+        self._wanted = Wanted.RUNNING if run else Wanted.ANY
         self._output = bytearray()
-        self._said_at = -math.inf
+        self._said_at = self._data_at = -math.inf
+        self._flowed_s = 0.0
         self._paused_with_p = False
+        self._shown_at = math.inf
         self._request: Request | None = None
         self._token: object = None
         self._deadline = math.inf
@@ -74,8 +88,12 @@ class Supervisor:
     @property
     def wake_at(self) -> float:
         """When ``tick`` has something to do."""
-        retry_at = self._said_at + START_RETRY_S if self.phase is Phase.STARTING else math.inf
-        return min(retry_at, self._deadline)
+        next_at = math.inf
+        if self.phase is Phase.STARTING:
+            next_at = self._said_at + START_RETRY_S
+        elif self.phase is Phase.PAUSING:
+            next_at = self._shown_at + IN_FLIGHT_S
+        return min(next_at, self._deadline)
 
     def opened(self, now: float) -> None:
         """The port is open; the board may be in any state, half-way through a command too."""
@@ -99,18 +117,19 @@ class Supervisor:
         self._request, self._token = request, token
         self._deadline = now + ANSWER_WITHIN_S
         if request is Request.START:
-            self._run = True
+            self._wanted = Wanted.RUNNING
             if self._board.mode.running:
+                self.phase = Phase.SETTLED
                 self._say(self._board.start(), now)
             else:
                 self._begin(now)
         elif request is Request.PAUSE:
-            self._run = False
-            self.phase = Phase.PAUSING
-            self._paused_with_p = False
+            self._wanted = Wanted.PAUSED
+            self._begin_pausing(now, with_p=False)
             self._output += self._board.stop()
         else:
-            self._run = self._run or self._board.mode.running
+            if self._wanted is Wanted.ANY and self._board.mode.running:
+                self._wanted = Wanted.RUNNING
             self.phase = Phase.RESETTING
             self._deadline = now + RESET_WITHIN_S
             self._say(self._board.reset(), now)
@@ -118,24 +137,29 @@ class Supervisor:
     def heard_paused(self, now: float, *, continues: bool) -> None:
         """The board said that it is paused; ``continues``: and that it has not restarted."""
         in_flight = now - self._said_at < IN_FLIGHT_S
-        if self.phase is Phase.PAUSING and (self._paused_with_p or not in_flight):
-            self._settle("paused")
+        running_wanted = self._wanted is Wanted.RUNNING
+        if self.phase is Phase.PAUSING:
+            self._shown_at = now
         elif self.phase is Phase.RESETTING and continues and not in_flight:
             self._say(self._board.reset(), now)
         elif self.phase is Phase.RESETTING and not in_flight:
             self._begin(now)
-            if not self._run:
+            if not running_wanted:
                 self._settle("the board has restarted and is paused, as it was before")
-        elif self.phase is Phase.STARTING or (self.phase is Phase.SETTLED and self._run):
+        elif self.phase is Phase.STARTING or (self.phase is Phase.SETTLED and running_wanted):
             self._begin(now)  # it has restarted, and may have slept through what was said so far
 
     def heard_data(self, now: float) -> None:
         """The board sent data, and its mode is a running one."""
-        unheard = now - self._said_at >= PAUSE_RETRY_S
+        self._flowed_s += min(now - self._data_at, FLOWING_S)
+        self._data_at, self._shown_at = now, math.inf
+        unheard = self._flowed_s >= PAUSE_RETRY_S
         if self.phase is Phase.STARTING:
             self._settle(f"running ({self._board.mode.value})")
         elif self.phase is Phase.SETTLED and self._request is Request.START:
             self._answer(True, f"running ({self._board.mode.value})")
+        elif self.phase is Phase.SETTLED and self._wanted is Wanted.PAUSED:
+            self._begin_pausing(now, with_p=True)
         elif self.phase is Phase.PAUSING and (unheard or not self._paused_with_p):
             self._paused_with_p = True
             self._say(self._board.pause(), now)
@@ -144,27 +168,35 @@ class Supervisor:
 
     def heard_nothing(self, now: float) -> None:
         """The board fell silent: it may be rebooting, or be gone."""
-        if self.phase is Phase.SETTLED and self._run:
+        if self.phase is Phase.SETTLED and self._wanted is Wanted.RUNNING:
             self._begin(now)
 
     def tick(self, now: float) -> None:
         """Repeat what is due, give up what is overdue."""
-        if now >= self._deadline:
+        if self.phase is Phase.PAUSING and now >= self._shown_at + IN_FLIGHT_S:
+            self._settle("paused")
+        elif now >= self._deadline:
             self._give_up(now)
         elif self.phase is Phase.STARTING and now - self._said_at >= START_RETRY_S:
             self._say(self._board.start(), now)
 
     def _begin(self, now: float) -> None:
-        """The opening sequence; a board that is to stay as it is gets no S."""
+        """The opening sequence; a board that is not wanted running gets no S."""
         self._output += self._board.wake()
         self.phase = Phase.SETTLED
-        if self._run:
+        if self._wanted is Wanted.RUNNING:
             self.phase = Phase.STARTING
             self._say(self._board.start(), now)
 
+    def _begin_pausing(self, now: float, *, with_p: bool) -> None:
+        """``with_p``: a P may be under way, or the data a mistake; it takes more of it to say P."""
+        self.phase = Phase.PAUSING
+        self._paused_with_p, self._shown_at = with_p, math.inf
+        self._flowed_s = 0.0
+
     def _say(self, data: bytes, now: float) -> None:
         self._output += data
-        self._said_at = now
+        self._said_at, self._flowed_s = now, 0.0
 
     def _settle(self, message: str) -> None:
         self.phase = Phase.SETTLED
@@ -183,10 +215,12 @@ class Supervisor:
             reason = "the board still says that it is paused: does the cable carry our bytes to it?"
         else:
             reason = "the board goes on sending data: does the cable carry our bytes to it?"
-        if self.phase is not Phase.STARTING:
+        if self.phase is Phase.RESETTING:
             self.phase = Phase.SETTLED
-            if self._run and not mode.running:
+            if self._wanted is Wanted.RUNNING and not mode.running:
                 self._begin(now)
         if self.phase is Phase.STARTING:
             reason += " (S is repeated until data flows)"
+        elif self.phase is Phase.PAUSING:
+            reason += " (P is repeated until it is paused, and motion is refused until ~/start)"
         self._answer(False, reason)

@@ -34,6 +34,7 @@ def main(argv: list[str] | None = None) -> int:
             seed=arguments.seed,
             frame=arguments.frame,
             imu_only=arguments.imu_only,
+            control=arguments.control,
             estop_latches=arguments.latching_estop,
             running=arguments.running,
         )
@@ -71,6 +72,12 @@ def _parser() -> argparse.ArgumentParser:
         choices=("earth", "body"),
         default="earth",
         help="meaning of the 25 Hz frame (default earth)",
+    )
+    parser.add_argument(
+        "--control",
+        choices=("velocity", "position"),
+        default="velocity",
+        help="where the on-board switch stands (default velocity)",
     )
     parser.add_argument(
         "--latching-estop",

@@ -10,6 +10,7 @@ Where the manual is silent:
   itself: rounding errors add up, as they do for anybody who sums what a board of this kind sends.
 - Pausing and emergency stop switch the motors off; friction stops the wheels within 0.3 s.
 - The number in the paused text starts from zero each time the board becomes paused.
+- With the switch on positional control (see `position`) the wheels' targets follow the goal.
 - Control frames with a mode that the manual does not name are taken off the line and ignored.
 """
 
@@ -22,6 +23,7 @@ from typing import Literal
 from omnibot_driver.simulator.chassis import PlanarPose, Wheels, body_from_rims, rims_from_body
 from omnibot_driver.simulator.imu import Mpu6050
 from omnibot_driver.simulator.motors import TICK_S, WheelController
+from omnibot_driver.simulator.position import approach, commanded_pose
 from omnibot_driver.simulator.settings import BoardPose, BoardSettings
 from omnibot_driver.simulator.wire import (
     CommandReceiver,
@@ -59,7 +61,7 @@ class BoardMode(Enum):
 
 _RUNNING = (BoardMode.NOMINAL, BoardMode.IMU_ONLY)
 
-CommandKind = Literal["velocity", "wheels", "estop", "start", "pause", "reset"]
+CommandKind = Literal["velocity", "pose", "wheels", "estop", "start", "pause", "reset"]
 
 _FRAME_KINDS: dict[int, CommandKind] = {
     ControlMode.VELOCITY: "velocity",
@@ -101,6 +103,7 @@ class SimulatedBoard:
         forgotten beyond a million bytes.
     """
 
+    _goal: PlanarPose | None
     _targets: Wheels
     _pwm: Wheels
 
@@ -154,7 +157,7 @@ class SimulatedBoard:
     @property
     def driven(self) -> bool:
         """Whether the motors have been told to turn, and not to stop since."""
-        return self._targets != _ALL_ZERO
+        return self._goal is not None or self._targets != _ALL_ZERO
 
     def receive(self, data: bytes) -> None:
         """Take bytes off the line, in any chunking; each command acts at once."""
@@ -209,7 +212,12 @@ class SimulatedBoard:
             return
         else:
             self.estopped = False
-            self._targets = self._wheel_targets(kind, frame.values)
+            self._goal = None
+            if kind == "velocity" and self.settings.control == "position":
+                kind = "pose"
+                self._goal = commanded_pose(frame.values, self.settings)
+            else:
+                self._targets = self._wheel_targets(kind, frame.values)
         self.commands.append(ReceivedCommand(self.tick, kind, frame.values))
 
     def _wheel_targets(self, kind: CommandKind, values: Triple) -> Wheels:
@@ -222,8 +230,11 @@ class SimulatedBoard:
             rims_mps = rims_from_body(
                 a / linear, b / linear, c / angular, self.settings.base_radius_m
             )
-        target_a, target_b, target_c = (v * TICK_S / self._rim_m_per_count for v in rims_mps)
-        return target_a, target_b, target_c
+        return self._counts_per_tick(rims_mps)
+
+    def _counts_per_tick(self, rims_mps: Wheels) -> Wheels:
+        a, b, c = (v * TICK_S / self._rim_m_per_count for v in rims_mps)
+        return a, b, c
 
     def _run(self) -> None:
         self.mode = BoardMode.IMU_ONLY if self.settings.imu_only else BoardMode.NOMINAL
@@ -235,6 +246,7 @@ class SimulatedBoard:
         self._motors_off()
 
     def _motors_off(self) -> None:
+        self._goal = None
         self._targets = _ALL_ZERO
         self._controllers = (WheelController(), WheelController(), WheelController())
         self._pwm = _ALL_ZERO
@@ -247,6 +259,10 @@ class SimulatedBoard:
         a, b, c = (new - old for new, old in zip(encoders, self._encoders, strict=True))
         self._encoders = encoders
         self._integrate((a, b, c))
+        if self._goal is not None:
+            self._targets = self._counts_per_tick(
+                rims_from_body(*approach(self._pose, self._goal), self.settings.base_radius_m)
+            )
         if self.mode in _RUNNING and not self.estopped:
             pwm_a, pwm_b, pwm_c = (
                 controller.update(target, measured)

@@ -6,6 +6,7 @@ from typing import Literal
 from omnibot_driver.simulator.wire import ByteOrder, Triple
 
 DeltaFrameMeaning = Literal["earth", "body"]
+ControlMethod = Literal["velocity", "position"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +28,10 @@ class BoardSettings:
     imu_only: running, the board is in IMU only mode instead of nominal mode.
     linear_scale: LSB per m/s, of Vx and Vy and of the rim speeds in wheel mode.
     angular_scale: LSB per rad/s, of Omega.
+    control: where the on-board switch stands: whether base vector control commands a velocity, or a
+        pose in the board's own earth frame to drive to.
+    position_scale: LSB per m, of X and Y.
+    heading_scale: LSB per rad, of theta, which is unwrapped as in the 5 Hz frame.
     estop_latches: after an emergency stop frame every motion is refused until a reset;
         otherwise the next motion command moves the robot again.
     pose_byte_order: of the three floats of the 5 Hz frame.
@@ -48,6 +53,9 @@ class BoardSettings:
     imu_only: bool = False
     linear_scale: float = 70.0
     angular_scale: float = 500.0
+    control: ControlMethod = "velocity"
+    position_scale: float = 1000.0
+    heading_scale: float = 1000.0
     estop_latches: bool = False
     pose_byte_order: ByteOrder = "big"
     wheel_radius_m: float = 0.029

@@ -1,10 +1,12 @@
 """A session and a simulated board on one workbench, wired to each other in simulated time."""
 
 from omnibot_driver.core.commands import CommandSettings
+from omnibot_driver.core.helm import ControlMethod
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.se2 import Pose
 from omnibot_driver.core.session import Event, Notice, Session, SessionSettings
 from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
@@ -24,16 +26,22 @@ class Bench:
         *,
         run: bool = True,
         axis_signs: tuple[int, int, int] = (1, 1, 1),
+        limits: SpeedLimits | None = None,
+        use_board_pose: bool = True,
+        control: ControlMethod | None = None,
     ) -> None:
         self.board = SimulatedBoard(board or BoardSettings())
         frame = self.board.settings.frame
         self.session = Session(
             OmniBot(OmniBotSettings(delta_frame=frame)),
             SessionSettings(
-                limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
+                limits=limits or SpeedLimits(),
+                commands=CommandSettings(),
+                odometry=OdometrySettings(use_board_pose=use_board_pose),
             ),
             run=run,
             axis_signs=axis_signs,
+            control=control or self.board.settings.control,
         )
         self.now = 1000.0
         self.hears = self.speaks = True
@@ -73,8 +81,14 @@ class Bench:
             assert self.now < end, f"still {self.session.state}, not {state}"
             self.run(TICK_S)
 
-    def drive(self, vx: float = 0.0, vy: float = 0.0, yaw_rate: float = 0.0) -> None:
-        self.session.command_twist(BodyTwist(vx, vy, yaw_rate), self.now)
+    def drive(
+        self, vx: float = 0.0, vy: float = 0.0, yaw_rate: float = 0.0, *, age_s: float = 0.0
+    ) -> None:
+        self.session.command_twist(BodyTwist(vx, vy, yaw_rate), self.now, age_s=age_s)
+        self.settle()
+
+    def turn_wheels(self, a: float, b: float, c: float) -> None:
+        self.session.command_wheels((a, b, c), self.now)
         self.settle()
 
     def ask(self, request: Request, limit_s: float) -> RequestDone:
@@ -97,6 +111,10 @@ class Bench:
     def still(self) -> bool:
         truth = self.board.truth
         return max(abs(truth.vx_mps), abs(truth.vy_mps), abs(truth.yaw_rate)) < 0.01
+
+    def go_to(self, x_m: float, y_m: float, yaw_rad: float) -> None:
+        self.session.command_pose(Pose(x_m, y_m, yaw_rad), self.now)
+        self.settle()
 
     @property
     def notices(self) -> list[str]:

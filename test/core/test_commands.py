@@ -7,8 +7,34 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver.core.commands import PACE_S, STOPPING_S, CommandSettings, CommandStream
+from omnibot_driver.core.motion import Authority, SteadyMotion
 
 STOP, ESTOP, GO, TURN = b"stop", b"estop", b"go", b"turn"
+TIMEOUT_S = 0.5
+
+
+def order(
+    stream: CommandStream, frame: bytes, now: float, authority: Authority = Authority.BASE
+) -> None:
+    motion = SteadyMotion(authority, frame, stands=frame == STOP, plain=True)
+    stream.command(motion, now, expires_at=now + TIMEOUT_S)
+
+
+class Climbing:
+    """A motion that is another with each frame until it has arrived."""
+
+    authority, stands, plain = Authority.BASE, False, True
+
+    def __init__(self, frames: int) -> None:
+        self.left = frames
+
+    @property
+    def settled(self) -> bool:
+        return not self.left
+
+    def frame(self, now: float) -> bytes:
+        self.left = max(0, self.left - 1)
+        return GO + bytes([self.left])
 
 
 @pytest.fixture
@@ -17,7 +43,7 @@ def stream() -> CommandStream:
 
 
 def make_stream() -> CommandStream:
-    settings = CommandSettings(timeout_s=0.5, rate_hz=20.0)
+    settings = CommandSettings(timeout_s=TIMEOUT_S, rate_hz=20.0)
     return CommandStream(settings, stop=STOP, emergency_stop=ESTOP)
 
 
@@ -36,24 +62,24 @@ def run(stream: CommandStream, start: float, end: float) -> list[tuple[float, by
 
 def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: CommandStream) -> None:
     """No timer stands between a command and the wire."""
-    stream.command(GO, 1.0)
+    order(stream, GO, 1.0)
     assert stream.due(1.0) == GO
 
 
 def test_within_the_pace_only_the_newest_command_goes_out(stream: CommandStream) -> None:
     """Commands closer together than a control tick would only fill the board's buffer."""
-    stream.command(GO, 1.0)
+    order(stream, GO, 1.0)
     stream.due(1.0)
-    stream.command(b"older", 1.002)
+    order(stream, b"older", 1.002)
     assert stream.due(1.002) == b""
-    stream.command(TURN, 1.004)
+    order(stream, TURN, 1.004)
     assert stream.wake_at == pytest.approx(1.0 + PACE_S)
     assert stream.due(1.0 + PACE_S) == TURN
 
 
 def test_the_current_command_is_repeated_at_the_command_rate(stream: CommandStream) -> None:
     """Nothing acknowledges a command, so it is said again."""
-    stream.command(GO, 1.0)
+    order(stream, GO, 1.0)
     written = run(stream, 1.0, 1.449)
     assert [frame for _, frame in written] == [GO] * 9
     assert written[1][0] - written[0][0] == pytest.approx(0.05)
@@ -63,7 +89,7 @@ def test_after_the_timeout_stop_is_repeated_for_a_second_and_then_the_line_is_qu
     stream: CommandStream,
 ) -> None:
     """The board never stops by itself."""
-    stream.command(GO, 1.0)
+    order(stream, GO, 1.0)
     written = run(stream, 1.0, 10.0)
     stops = [at for at, frame in written if frame == STOP]
     assert stops[0] == pytest.approx(1.5)
@@ -74,9 +100,9 @@ def test_after_the_timeout_stop_is_repeated_for_a_second_and_then_the_line_is_qu
 
 def test_stop_never_waits(stream: CommandStream) -> None:
     """Not even for the pace of a command that has just gone out."""
-    stream.command(GO, 1.0)
+    order(stream, GO, 1.0)
     stream.due(1.0)
-    stream.command(STOP, 1.001)
+    order(stream, STOP, 1.001)
     assert stream.due(1.001) == STOP
 
 
@@ -85,20 +111,83 @@ def test_a_flood_of_stops_keeps_the_pace(stream: CommandStream) -> None:
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001
-        stream.command(STOP, now)
+        order(stream, STOP, now)
         written.append(stream.due(now))
     assert 90 <= written.count(STOP) <= 101
 
 
+def test_a_motion_that_still_changes_goes_out_at_every_control_tick(stream: CommandStream) -> None:
+    """And at the command rate once it has arrived."""
+    stream.command(Climbing(4), 1.0, expires_at=1.5)
+    written = run(stream, 1.0, 1.1)
+    assert [frame[-1] for _, frame in written] == [3, 2, 1, 0, 0]
+    assert [at for at, _ in written] == pytest.approx([1.0, 1.01, 1.02, 1.03, 1.08])
+
+
+def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: CommandStream) -> None:
+    """Stop at once, and what is commanded now one control tick later."""
+    order(stream, GO, 1.0)
+    stream.due(1.0)
+    order(stream, TURN, 1.001, Authority.WHEELS)
+    assert run(stream, 1.001, 1.03) == [(1.001, STOP), (pytest.approx(1.011), TURN)]
+
+
+def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
+    stream: CommandStream,
+) -> None:
+    """Also where the one in the middle was never written."""
+    order(stream, GO, 1.0)
+    stream.due(1.0)
+    order(stream, TURN, 1.001, Authority.WHEELS)
+    order(stream, b"there", 1.002, Authority.POSE)
+    assert run(stream, 1.002, 1.03) == [(1.002, STOP), (pytest.approx(1.012), b"there")]
+    order(stream, TURN, 1.04, Authority.WHEELS)
+    order(stream, b"there", 1.041, Authority.POSE)
+    assert run(stream, 1.041, 1.055) == [(1.041, STOP), (pytest.approx(1.051), b"there")]
+
+
+def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
+    stream: CommandStream,
+) -> None:
+    """It has been stopped already."""
+    order(stream, GO, 1.0)
+    run(stream, 1.0, 1.6)
+    order(stream, TURN, 1.62, Authority.WHEELS)
+    assert run(stream, 1.62, 1.64)[0][1] == TURN
+
+
+def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: CommandStream) -> None:
+    """Neither the Stop between them nor the newer one."""
+    order(stream, GO, 1.0)
+    stream.due(1.0)
+    order(stream, TURN, 1.001, Authority.WHEELS)
+    stream.latch(1.001)
+    assert {frame for _, frame in run(stream, 1.001, 1.2)} == {ESTOP}
+
+
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: CommandStream) -> None:
     """A latched stop is said for as long as it is latched."""
-    stream.command(GO, 1.0)
+    order(stream, GO, 1.0)
     stream.due(1.0)
     stream.latch(1.001)
     assert stream.due(1.001) == ESTOP
     written = run(stream, 1.001, 101.0)
     assert {frame for _, frame in written} == {ESTOP}
     assert len(written) == pytest.approx(2000, abs=2)
+
+
+def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
+    stream: CommandStream,
+) -> None:
+    """Letters at 50 Hz, and the stop still goes out at 20 Hz."""
+    stream.latch(1.0)
+    written = 0
+    for step in range(1000):
+        now = 1.0 + step * 0.001
+        if step % 20 == 7:
+            stream.wrote(b"S", now)
+        written += stream.due(now) == ESTOP
+    assert written >= 15
 
 
 def test_a_flood_of_emergency_stops_keeps_the_pace(stream: CommandStream) -> None:
@@ -113,7 +202,7 @@ def test_a_flood_of_emergency_stops_keeps_the_pace(stream: CommandStream) -> Non
 
 def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: CommandStream) -> None:
     """The robot moves again only on a command that is newer than the release."""
-    stream.command(GO, 1.0)
+    order(stream, GO, 1.0)
     stream.due(1.0)
     stream.latch(1.1)
     stream.due(1.1)
@@ -123,21 +212,21 @@ def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: Comm
 
 def test_a_release_without_a_latch_does_nothing(stream: CommandStream) -> None:
     """Releasing twice must not stop a robot that drives again."""
-    stream.command(GO, 1.0)
+    order(stream, GO, 1.0)
     stream.release(1.0)
     assert stream.due(1.0) == GO
 
 
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: CommandStream) -> None:
     """After the process stood still for long, what was commanded before is worth nothing."""
-    stream.command(GO, 1.0)
+    order(stream, GO, 1.0)
     stream.due(1.0)
     assert stream.due(60.0) == STOP
 
 
 STEPS = st.lists(
     st.tuples(
-        st.sampled_from(["command", "stop", "latch", "release", "discard", "wait"]),
+        st.sampled_from(["command", "wheels", "stop", "latch", "release", "discard", "wait"]),
         st.floats(0.0, 0.7),
     ),
     max_size=60,
@@ -150,30 +239,35 @@ def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
 ) -> None:
     """The invariants of the outbound line under any sequence of events."""
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
-    written_at = -math.inf
+    written_at, driven = -math.inf, b""
     for step, pause in steps:
         if step == "command":
-            stream.command(GO, now)
+            order(stream, GO, now)
+            commanded_at = now
+        elif step == "wheels":
+            order(stream, TURN, now, Authority.WHEELS)
             commanded_at = now
         elif step == "stop":
-            stream.command(STOP, now)
+            order(stream, STOP, now)
         elif step == "latch":
             stream.latch(now)
         elif step == "release":
             stream.release(now)
         elif step == "discard":
             stream.discard()
-            commanded_at = -math.inf
+            commanded_at, driven = -math.inf, b""
         end = now + pause
         while True:
             frame = stream.due(now)
-            if frame == GO:
+            if frame in (GO, TURN):
+                assert driven in (b"", frame), "no stop between two authorities"
                 assert not stream.latched
                 assert now - commanded_at < 0.5
                 assert now - written_at >= PACE_S - 1e-9
             if stream.latched:
                 assert frame in (b"", ESTOP)
-            written_at = now if frame else written_at
+            if frame:
+                written_at, driven = now, frame if frame in (GO, TURN) else b""
             assert stream.wake_at > now
             if stream.wake_at > end:
                 break

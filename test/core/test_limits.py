@@ -9,7 +9,14 @@ from strategies import any_twists, finite
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.limits import SpeedLimits, require_finite, shorten, slow, to_words
+from omnibot_driver.core.limits import (
+    SpeedLimits,
+    require_finite,
+    require_timely,
+    shorten,
+    slow,
+    to_words,
+)
 
 limits = st.one_of(st.just(0.0), st.floats(1e-3, 200.0))
 vectors = st.lists(finite, min_size=2, max_size=3)
@@ -137,3 +144,48 @@ def test_what_is_not_finite_is_refused_by_name(bad: float, place: int) -> None:
 def test_what_is_finite_is_not_refused(values: list[float]) -> None:
     """Size is no reason."""
     require_finite("wheel_cmd", values)
+
+
+@given(any_twists, any_twists, st.floats(0.01, 10.0), st.floats(0.0, 0.05))
+def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
+    now: BodyTwist, wanted: BodyTwist, acceleration: float, duration_s: float
+) -> None:
+    """The linear one as a vector, on the straight way; what is within reach is reached exactly."""
+    limits = SpeedLimits(linear_mps2=acceleration, angular_radps2=acceleration)
+    now, wanted = limits.twist(now), limits.twist(wanted)
+    after = limits.approach(now, wanted, duration_s)
+    step = (after.vx_mps - now.vx_mps, after.vy_mps - now.vy_mps)
+    way = [wanted.vx_mps - now.vx_mps, wanted.vy_mps - now.vy_mps]
+    assert math.hypot(*step) <= acceleration * duration_s + 1e-12
+    assert math.hypot(*step) < 1e-9 or math.isclose(
+        step[0] * way[0] + step[1] * way[1], math.hypot(*step) * math.hypot(*way), rel_tol=1e-6
+    )
+    if math.hypot(*way) <= acceleration * duration_s:
+        assert (after.vx_mps, after.vy_mps) == (wanted.vx_mps, wanted.vy_mps)
+    turn = wanted.yaw_rate_radps - now.yaw_rate_radps
+    assert abs(after.yaw_rate_radps - now.yaw_rate_radps) == pytest.approx(
+        min(abs(turn), acceleration * duration_s)
+    )
+
+
+def test_an_acceleration_of_zero_is_no_limit() -> None:
+    """0 switches it off."""
+    wanted = BodyTwist(0.5, -0.5, 0.5)
+    assert SpeedLimits().approach(BodyTwist(-0.5, 0.5, -0.5), wanted, 0.0) == wanted
+
+
+@pytest.mark.parametrize("age_s", [0.0, 0.5, -0.5])
+def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
+    """A clock that is ahead by as much is forgiven as well."""
+    require_timely("cmd_vel", age_s, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("age_s", "said"), [(0.51, r"0\.51 s old"), (-3.0, r"3\.00 s in the future")]
+)
+def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
+    age_s: float, said: str
+) -> None:
+    """And what to look at."""
+    with pytest.raises(CommandRefused, match=f"cmd_vel refused.*{said}.*clocks agree"):
+        require_timely("cmd_vel", age_s, 0.5)

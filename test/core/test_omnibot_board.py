@@ -15,7 +15,7 @@ from omnibot_driver.core.board import (
     PoseReading,
     Reading,
 )
-from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.imu import ImuScale
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.omnibot import (
@@ -28,6 +28,7 @@ from omnibot_driver.core.omnibot import (
     encode,
 )
 from omnibot_driver.core.omnibot.frames import Frame
+from omnibot_driver.core.se2 import Pose
 
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 REST = ImuFrame((120, -80, -16384), (131, 0, -131))
@@ -224,6 +225,34 @@ def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int
     command = bot().velocity(BodyTwist(x / 70, y / 70, omega / 500))
     sent = tuple(int.from_bytes(command[n : n + 2], "big", signed=True) for n in (3, 5, 7))
     assert sent == (x, y, omega)
+
+
+@pytest.mark.parametrize(
+    ("pose", "typed"),
+    [
+        ((1.0, -0.5, 1.571), "FF FE 01 03 E8 FE 0C 06 23"),
+        ((32.767, -32.767, 0.0), "FF FE 01 7F FF 80 01 00 00"),
+        ((0.0, 0.0, 0.0), "FF FE 01 00 00 00 00 00 00"),
+        ((0.0006, -0.0006, 0.0), "FF FE 01 00 01 FF FF 00 00"),
+    ],
+)
+def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
+    pose: tuple[float, float, float], typed: str
+) -> None:
+    """In mode 1; the origin is a place like any other."""
+    assert bot().drive_to(Pose(*pose)) == bytes.fromhex(typed)
+
+
+@pytest.mark.parametrize("far", [33.0, -33.0, 1e300, math.inf, math.nan])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
+    far: float, place: int
+) -> None:
+    """32.77 m and 32.77 rad are the end of the words."""
+    values = [0.0, 0.0, 0.0]
+    values[place] = far
+    with pytest.raises(CommandRefused, match=r"32\.77 m and 32\.77 rad.*~/reset"):
+        bot().drive_to(Pose(*values))
 
 
 # Letters

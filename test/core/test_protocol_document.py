@@ -47,6 +47,8 @@ APPENDIX = {
 DECISIONS = {
     "linear_scale",
     "angular_scale",
+    "position_scale",
+    "heading_scale",
     "wheel_radius",
     "base_radius",
     "counts_per_revolution",

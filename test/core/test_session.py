@@ -350,21 +350,35 @@ def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -
     assert not bench.still()
 
 
-def test_silence_stops_the_robot_and_shows_connecting(bench: Bench) -> None:
+def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(bench: Bench) -> None:
     """Only the direction from the board is cut: it still hears us, so it is told to stop."""
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = False
-    for _ in range(20):
-        bench.run(0.1)
-        if bench.session.state == "nominal":
-            bench.drive(0.5)
-    assert bench.session.state == "connecting"
-    bench.run(1.0)
+    bench.run(0.25)
+    bench.drive(0.5)
+    bench.run(0.06)
+    assert bench.written[-1][1] == STOP
+    with pytest.raises(CommandRefused, match="nothing was heard"):
+        bench.drive(0.5)
+    bench.run(0.4)
     assert bench.still()
+    assert bench.session.state == "nominal"
+    bench.run(1.0)
+    assert bench.session.state == "connecting"
     bench.speaks = True
     bench.run_until_state("nominal")
+    bench.run(1.0)
     assert bench.still()
+
+
+def test_stop_is_sent_also_to_a_board_that_is_not_heard(bench: Bench) -> None:
+    """It may hear us."""
+    bench.speaks = False
+    bench.run(1.45)
+    start = len(bench.written)
+    bench.drive()
+    assert bench.written_since(start) == STOP
 
 
 def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_else(
@@ -563,7 +577,7 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
         bench.drive(0.5)
         bench.run(0.1)
     way_before = bench.board.truth.x_m
-    bench.session.reset_odometry()
+    bench.session.reset_odometry(bench.now)
     for _ in range(10):
         bench.drive(0.5)
         bench.run(0.1)

@@ -285,6 +285,60 @@ def test_a_latching_emergency_stop_ends_with_a_reset_alone() -> None:
     assert board.truth.vx_mps == pytest.approx(0.5, abs=0.005)
 
 
+POSITION = BoardSettings(running=True, control="position")
+
+
+@pytest.mark.parametrize("goal", [(1000, 500, 1571), (-300, 0, -7000), (0, 0, 0), (2, -1, 1)])
+def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
+    goal: tuple[int, int, int],
+) -> None:
+    """In mm and mrad of the board's own earth frame, whole turns included; then it stands."""
+    board = SimulatedBoard(POSITION)
+    board.receive(velocity(*goal))
+    run(board, 15.0)
+    there = board.odometry
+    assert (there.x_mm, there.y_mm, there.theta_mrad) == pytest.approx(goal, abs=2.0)
+    at_rest = board.truth
+    run(board, 2.0)
+    assert board.truth == at_rest
+    assert board.commands[-1] == ReceivedCommand(0, "pose", goal)
+
+
+def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
+    """However far the pose is."""
+    board = SimulatedBoard(POSITION)
+    board.receive(velocity(5000, 5000, 0))
+    run(board, 5.0)
+    assert hypot(board.truth.vx_mps, board.truth.vy_mps) == pytest.approx(0.3, abs=0.01)
+
+
+def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> None:
+    """The reason why Stop is a frame of mode two."""
+    board = SimulatedBoard(
+        BoardSettings(running=True, control="position", initial_pose=BoardPose(1000.0))
+    )
+    board.receive(velocity(0, 0, 0))
+    run(board, 1.0)
+    assert board.truth.vx_mps < -0.2
+    board.receive(STOP)
+    run(board, 1.0)
+    assert board.truth.vx_mps == 0.0
+    assert board.odometry.x_mm > 500.0
+
+
+@pytest.mark.parametrize("ending", [ESTOP, b"P", b"PS"])
+def test_an_emergency_stop_or_a_pause_forgets_the_pose_to_drive_to(ending: bytes) -> None:
+    """It does not drive on afterwards."""
+    board = SimulatedBoard(POSITION)
+    board.receive(velocity(1000, 0, 0))
+    run(board, 1.0)
+    board.receive(ending)
+    run(board, 1.0)
+    at_rest = board.truth
+    run(board, 1.0)
+    assert board.truth == at_rest
+
+
 def test_a_pause_stops_the_motors_and_forgets_the_command() -> None:
     """The robot stands after un-pausing until it is commanded anew."""
     board = SimulatedBoard(RUNNING)

@@ -119,6 +119,29 @@ def test_estop_latches_is_on_the_wire_at_once_and_releases_to_standing_still(
     drive(probe, board)
 
 
+def test_a_board_that_holds_the_estop_itself_is_told_of_and_a_reset_frees_it(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """Released and commanded it stands; the driver names the way out, which works."""
+    board = start_board(estop_latches=True, running=True)
+    driver: Driver = start_driver(board.path)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    drive(probe, board)
+    assert probe.call(SetBool, "estop", data=True).success
+    assert board.wait_for(still, 20.0)
+    assert probe.call(SetBool, "estop", data=False).success
+    commands = probe.publisher(Twist, "cmd_vel")
+    twist = Twist()
+    twist.linear.x = 0.3
+    timer = probe.node.create_timer(0.05, lambda: commands.publish(twist))
+    driver.wait_for_line("does not move.*~/reset")
+    assert still(board.board)
+    probe.node.destroy_timer(timer)
+    assert probe.call(Trigger, "reset").success
+    drive(probe, board)
+
+
 def test_commands_under_estop_are_refused_and_told_what_to_do(
     probe: Probe, driver: Driver, board: PtyBoard
 ) -> None:

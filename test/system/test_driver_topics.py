@@ -7,13 +7,15 @@ from typing import Any
 
 import pytest
 from driver_process import Driver
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from probe import Probe
+from rclpy.duration import Duration
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, Float32MultiArray, String
 
-from omnibot_driver.simulator import PtyBoard, ReceivedCommand, SimulatedBoard
+from omnibot_driver.simulator import BoardPose, PtyBoard, ReceivedCommand, SimulatedBoard
 
 Start = Callable[..., Any]
 
@@ -218,6 +220,69 @@ def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
     assert board.wait_for(lambda b: obeyed(b, "velocity", 21, 0, 0), 20.0)
 
 
+def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is_taken(
+    board: PtyBoard, start_driver: Start, probe_of: Start
+) -> None:
+    """Older than cmd_vel_timeout; a zero stamp is none."""
+    driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    commands = probe.publisher(TwistStamped, "cmd_vel")
+    stamped = TwistStamped()
+    stamped.twist.linear.x = 0.3
+    stamped.header.stamp = (probe.node.get_clock().now() - Duration(seconds=60)).to_msg()
+    commands.publish(stamped)
+    driver.wait_for_line(r"cmd_vel refused: it is 60\.\d\d s old")
+    with board.lock:
+        assert not any(command.kind == "velocity" for command in board.board.commands)
+    stamped = TwistStamped()
+    stamped.twist.linear.x = 0.3
+    commands.publish(stamped)
+    assert board.wait_for(lambda b: obeyed(b, "velocity", 21, 0, 0), 20.0)
+
+
+def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver) -> None:
+    """The middleware would leave them unheard in silence."""
+    probe.node.create_publisher(TwistStamped, "cmd_vel", 1)
+    driver.wait_for_line("probe publishes something else.*enable_stamped_cmd_vel:=true")
+
+
+def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
+    probe: Probe, driver: Driver
+) -> None:
+    """Commands are taken reliably; what may be lost on the way is not."""
+    quality = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    probe.node.create_publisher(Twist, "cmd_vel", quality)
+    driver.wait_for_line("incompatible QoS.*RELIABILITY")
+
+
+def test_a_goal_is_driven_to_with_the_switch_on_position_and_velocities_are_refused(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """A quarter of a metre ahead, in odom; the board has a frame of its own."""
+    board = start_board(
+        control="position", running=True, initial_pose=BoardPose(1000.0, 2000.0, 1570.8)
+    )
+    driver: Driver = start_driver(board.path, control_method="position")
+    probe: Probe = probe_of(driver)
+    odometry = probe.listen(Odometry, "odom")
+    probe.wait_for_state("nominal")
+    probe.wait_for(lambda: len(odometry) > 10)
+    goal = PoseStamped()
+    goal.header.frame_id = "odom"
+    goal.pose.position.x = 0.25
+    goal.pose.orientation.w = 1.0
+    probe.publisher(PoseStamped, "cmd_pose").publish(goal)
+    assert board.wait_for(lambda b: newest(b).kind == "pose", 20.0)
+    probe.wait_for(lambda: odometry[-1].pose.pose.position.x == pytest.approx(0.25, abs=0.005))
+    assert odometry[-1].pose.pose.position.y == pytest.approx(0.0, abs=0.005)
+    probe.publisher(Twist, "cmd_vel").publish(Twist())
+    driver.wait_for_line("cmd_vel refused.*control_method.*position")
+    goal.header.frame_id = "map"
+    probe.publisher(PoseStamped, "cmd_pose").publish(goal)
+    driver.wait_for_line("cmd_pose refused.*'map'.*transform it")
+
+
 def test_an_imu_only_board_is_shown_as_such(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
@@ -235,8 +300,6 @@ def test_frames_of_a_board_that_has_driven_before_begin_at_the_identity(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
     """Its heading is a quarter turn; driving forward is still x in odom."""
-    from omnibot_driver.simulator import BoardPose
-
     board = start_board(initial_pose=BoardPose(1000.0, 2000.0, 1570.8), running=True)
     probe: Probe = probe_of(start_driver(board.path))
     odometry = probe.listen(Odometry, "odom")

@@ -29,7 +29,7 @@ QUALIFIERS: Final = {
     "services": ("reply", "request"),
     "actions": ("call", "execute"),
 }
-MOVES_OR_STOPS: Final = ("/cmd_vel", "/wheel_cmd", "/estop")
+MOVES_OR_STOPS: Final = ("/cmd_vel", "/wheel_cmd", "/cmd_pose", "/estop")
 
 Rules = dict[str, set[str]]
 """The names that a profile allows, by qualifier."""
@@ -116,6 +116,7 @@ def test_only_named_enclaves_may_move_stop_or_release_the_robot() -> None:
     assert who == {
         "/cmd_vel": {"/omnibot/operator", "/omnibot/navigation"},
         "/wheel_cmd": {"/omnibot/operator"},
+        "/cmd_pose": {"/omnibot/operator", "/omnibot/navigation"},
         "/estop": {"/omnibot/operator", "/omnibot/navigation", "/omnibot/estop_button"},
     }
     callers = {path for path, rule in rules.items() if rule["request"]}

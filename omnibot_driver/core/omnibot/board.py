@@ -3,6 +3,7 @@
 Source: the board's manual ver. 0.3. Units on the wire: deltas 0.1 mm and 0.1 mrad per 40 ms;
 poses mm and mrad; velocity and wheel commands in the firmware's own unit, which
 ``linear_scale`` and ``angular_scale`` translate (70 and 500 are the vendor's, found by hand).
+Commanded poses are taken to have the unit of those that are sent; nobody has verified it.
 """
 
 import math
@@ -18,9 +19,10 @@ from omnibot_driver.core.board import (
     Reading,
     Vector3,
 )
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, ImuScale
 from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
-from omnibot_driver.core.limits import to_words
+from omnibot_driver.core.limits import MAX_WORD, to_nearest, to_words
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.decoder import FrameDecoder
 from omnibot_driver.core.omnibot.frames import (
@@ -35,6 +37,7 @@ from omnibot_driver.core.omnibot.frames import (
 )
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
 from omnibot_driver.core.omnibot.sequence import Sequence
+from omnibot_driver.core.se2 import Pose
 
 TICK_S: Final = 0.01
 DELTA_LSB: Final = (1e-4, 1e-4, 1e-4)
@@ -52,13 +55,16 @@ WAKE: Final = bytes(8)
 class OmniBotSettings:
     """What cannot be known from the wire.
 
-    ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per rad/s; ``delta_frame``: whether deltas
+    ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per rad/s; ``position_scale`` and
+    ``heading_scale``: LSB per m and rad of a commanded pose; ``delta_frame``: whether deltas
     are differences of positions in the board's earth frame, motion along its own axes, or (older
     firmware) encoder counts of the wheels A, B, C.
     """
 
     linear_scale: float = 70.0
     angular_scale: float = 500.0
+    position_scale: float = 1000.0
+    heading_scale: float = 1000.0
     wheel_radius_m: float = 0.029
     base_radius_m: float = 0.143
     counts_per_revolution: int = 1560
@@ -157,6 +163,20 @@ class OmniBot:
         unit = self.settings.linear_scale * self.settings.wheel_radius_m
         a, b, c = rates_radps
         return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
+
+    def drive_to(self, pose: Pose) -> bytes:
+        """Base vector control with the switch on position; the origin is a pose like any other."""
+        position, heading = self.settings.position_scale, self.settings.heading_scale
+        counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)
+        if not all(abs(count) < MAX_WORD + 0.5 for count in counts):
+            raise CommandRefused(
+                f"cmd_pose refused: in the board's own frame it is x {pose.x_m:.2f} m,"
+                f" y {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad, and no more than"
+                f" {MAX_WORD / position:.2f} m and {MAX_WORD / heading:.2f} rad can be said:"
+                " ~/reset begins a new frame where the robot stands"
+            )
+        x, y, yaw = map(to_nearest, counts)
+        return frames.encode(CommandFrame(frames.VELOCITY_MODE, (x, y, yaw)))
 
     @staticmethod
     def _drive(mode: int, counts: Vector3) -> bytes:

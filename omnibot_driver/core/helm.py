@@ -1,0 +1,89 @@
+"""From wishes to motions: checked, limited, in the board's own axes and frame.
+
+Knows what may be wished for and where the board's switch stands; not what mode the board is in, nor
+when anything is sent.
+"""
+
+from collections.abc import Sequence
+from typing import Final, Literal
+
+from omnibot_driver.core.board import Board, Mode
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.limits import SpeedLimits, require_finite
+from omnibot_driver.core.motion import Authority, BaseMotion, GoalMotion, Motion, SteadyMotion
+from omnibot_driver.core.odometry import Odometry
+from omnibot_driver.core.se2 import Pose, Signs
+
+ControlMethod = Literal["velocity", "position"]
+
+PLAIN_WHEEL_RADPS: Final = 3.0
+"""Wheels that are commanded to turn faster than this are seen to turn."""
+
+
+class Helm:
+    """``limits`` may be replaced at any time. Every method raises CommandRefused."""
+
+    def __init__(
+        self,
+        board: Board,
+        odometry: Odometry,
+        limits: SpeedLimits,
+        axis_signs: Signs,
+        control: ControlMethod,
+    ) -> None:
+        self.limits = limits
+        self._board, self._odometry = board, odometry
+        self._axis_signs, self._control = axis_signs, control
+
+    def base(self, twist: BodyTwist, *, before: Motion | None, since: float) -> Motion:
+        """Drive the body, from what was commanded ``before``."""
+        self._require_switch(Authority.BASE)
+        require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
+        x, y, yaw = self._axis_signs
+        limited = self.limits.twist(twist)
+        return BaseMotion(
+            BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps),
+            self.limits,
+            self._board.velocity,
+            stop=self._board.stop(),
+            before=before,
+            since=since,
+        )
+
+    def wheels(self, rates_radps: Sequence[float]) -> Motion:
+        """Turn the wheels A, B, C."""
+        self._require_switch(Authority.WHEELS)
+        if len(rates_radps) != 3:
+            raise CommandRefused(
+                f"wheel_cmd refused: it has {len(rates_radps)} values; send exactly 3,"
+                " the rates of wheels A, B, C in rad/s"
+            )
+        require_finite("wheel_cmd", rates_radps)
+        limited = self.limits.wheels(rates_radps)
+        frame = self._board.wheels(limited)
+        return SteadyMotion(
+            Authority.WHEELS,
+            frame,
+            stands=frame == self._board.stop(),
+            plain=max(map(abs, limited)) > PLAIN_WHEEL_RADPS,
+        )
+
+    def pose(self, goal: Pose) -> Motion:
+        """Drive to a pose in the odometry frame and stay there."""
+        self._require_switch(Authority.POSE)
+        require_finite("cmd_pose", (goal.x_m, goal.y_m, goal.yaw_rad))
+        place = self._odometry.in_board_frame(goal)
+        if place is None or self._board.mode is Mode.IMU_ONLY:
+            raise CommandRefused(
+                "cmd_pose refused: where the board believes to be is not known; this needs its"
+                " poses (nominal mode) and `use_board_pose`. After a restart, wait a second"
+            )
+        return GoalMotion(goal, self._board.drive_to(place), self._odometry.alignments)
+
+    def _require_switch(self, authority: Authority) -> None:
+        if (authority is Authority.POSE) is not (self._control == "position"):
+            raise CommandRefused(
+                f"{authority.value} refused: the parameter `control_method` is '{self._control}';"
+                " it must say where the board's switch stands"
+            )

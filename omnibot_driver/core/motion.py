@@ -1,0 +1,144 @@
+"""What is commanded, as the frame that says it now.
+
+A ``Motion`` is one command. The stream asks it for its frame whenever one goes out, so a set-point
+that nears its target by an acceleration limit needs no timer of its own. Whether it may be
+commanded, and when a frame goes out, is others' business.
+"""
+
+import math
+from collections.abc import Callable
+from enum import Enum
+from typing import Final, Protocol
+
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.limits import SpeedLimits
+from omnibot_driver.core.se2 import Pose
+
+LONGEST_STEP_S: Final = 0.05
+"""A frame that goes out late does not make up for more time than this."""
+AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
+
+PLAIN_MPS: Final = 0.05
+PLAIN_RADPS: Final = 0.15
+"""A robot that is commanded to move faster than this is seen to move."""
+LEAVING_M: Final = 0.3
+LEAVING_RAD: Final = 2.0
+"""No controller that drives to a goal overshoots by so much."""
+
+
+class Authority(Enum):
+    """Who commands; the value is the topic's name. One at a time, the newest."""
+
+    BASE = "cmd_vel"
+    WHEELS = "wheel_cmd"
+    POSE = "cmd_pose"
+
+
+class Motion(Protocol):
+    """One command, current until it expires or another takes its place."""
+
+    @property
+    def authority(self) -> Authority:
+        """Whose command it is."""
+
+    @property
+    def stands(self) -> bool:
+        """Whether it is a wish to stand still, which never waits and is no ramp's business."""
+
+    @property
+    def settled(self) -> bool:
+        """False while each next frame is another one."""
+
+    @property
+    def plain(self) -> bool:
+        """Whether anybody would see the robot move under what is commanded now."""
+
+    def frame(self, now: float) -> bytes:
+        """The frame to write at this time."""
+
+
+class BaseMotion:
+    """A body velocity, approached by the acceleration limits from what was commanded before.
+
+    ``encode`` makes a velocity a frame; what it makes ``stop`` of, stands.
+    """
+
+    authority: Final = Authority.BASE
+
+    def __init__(
+        self,
+        wanted: BodyTwist,
+        limits: SpeedLimits,
+        encode: Callable[[BodyTwist], bytes],
+        *,
+        stop: bytes,
+        before: Motion | None,
+        since: float,
+    ) -> None:
+        self._wanted, self._limits, self._encode = wanted, limits, encode
+        self.stands = encode(wanted) == stop
+        self._setpoint, self._reached_at = AT_REST, since
+        if isinstance(before, BaseMotion):
+            self._setpoint = before._setpoint
+            self._reached_at = max(before._reached_at, since)
+        if self.stands:
+            self._setpoint = wanted
+
+    @property
+    def settled(self) -> bool:
+        """Whether the set-point has arrived."""
+        return self._setpoint == self._wanted
+
+    @property
+    def plain(self) -> bool:
+        """By the set-point, not by what is wanted."""
+        return self._setpoint.faster_than(PLAIN_MPS, PLAIN_RADPS)
+
+    def frame(self, now: float) -> bytes:
+        """The set-point of this time; asking moves it."""
+        duration_s = min(now - self._reached_at, LONGEST_STEP_S)
+        self._setpoint = self._limits.approach(self._setpoint, self._wanted, duration_s)
+        self._reached_at = now
+        return self._encode(self._setpoint)
+
+
+class SteadyMotion:
+    """A command whose frame does not change."""
+
+    settled: Final = True
+
+    def __init__(self, authority: Authority, frame: bytes, *, stands: bool, plain: bool) -> None:
+        self.authority, self.stands, self.plain = authority, stands, plain
+        self._frame = frame
+
+    def frame(self, now: float) -> bytes:
+        """Always the same."""
+        return self._frame
+
+
+class GoalMotion:
+    """A pose to drive to: ``place`` in the odometry frame, as that lay at this ``alignment``."""
+
+    authority: Final = Authority.POSE
+    stands: Final = False
+    settled: Final = True
+    plain: Final = False
+
+    def __init__(self, place: Pose, frame: bytes, alignment: int) -> None:
+        self.alignment = alignment
+        self._place, self._frame = place, frame
+        self._nearest_m = self._nearest_rad = math.inf
+
+    def frame(self, now: float) -> bytes:
+        """Always the same."""
+        return self._frame
+
+    def is_left_by(self, pose: Pose) -> bool:
+        """Whether a robot that is here now has been plainly nearer before."""
+        way = pose.way_to(self._place)
+        self._nearest_m = min(self._nearest_m, way.way_m)
+        self._nearest_rad = min(self._nearest_rad, abs(way.yaw_rad))
+        return (
+            way.way_m > self._nearest_m + LEAVING_M
+            or abs(way.yaw_rad) > self._nearest_rad + LEAVING_RAD
+        )

@@ -1,0 +1,42 @@
+"""Positional control, of which the manual says no more than that the switch selects it.
+
+Knows the units of a commanded pose and how fast the robot drives to one. Must not know wheels.
+"""
+
+from math import cos, hypot, sin
+
+from omnibot_driver.simulator.chassis import PlanarPose
+from omnibot_driver.simulator.settings import BoardSettings
+from omnibot_driver.simulator.wire import Triple
+
+SPEED_PER_WAY = 2.0
+"""In 1/s: speed towards the pose per distance from it, up to the fastest."""
+FASTEST_MPS = 0.3
+FASTEST_RADPS = 1.0
+ARRIVED = 0.5e-3
+"""Metres and radians."""
+
+
+def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
+    """The pose in the board's earth frame that the words of a control frame mean."""
+    x, y, theta = values
+    return PlanarPose(
+        x / settings.position_scale, y / settings.position_scale, theta / settings.heading_scale
+    )
+
+
+def approach(pose: PlanarPose, goal: PlanarPose) -> tuple[float, float, float]:
+    """Velocity along the body's x and y and yaw rate, straight to the goal and turning with it.
+
+    The heading is unwrapped: a goal that is a turn further is a turn further.
+    """
+    dx_m, dy_m = goal.x_m - pose.x_m, goal.y_m - pose.y_m
+    way_m, turn_rad = hypot(dx_m, dy_m), goal.yaw_rad - pose.yaw_rad
+    per_m = min(SPEED_PER_WAY, FASTEST_MPS / way_m) if way_m > ARRIVED else 0.0
+    yaw_rate = max(-FASTEST_RADPS, min(FASTEST_RADPS, SPEED_PER_WAY * turn_rad))
+    c, s = cos(pose.yaw_rad), sin(pose.yaw_rad)
+    return (
+        per_m * (c * dx_m + s * dy_m),
+        per_m * (c * dy_m - s * dx_m),
+        yaw_rate if abs(turn_rad) > ARRIVED else 0.0,
+    )
