@@ -86,7 +86,7 @@ def test_the_default_geometry_is_the_drivers() -> None:
 @settings(deadline=None)
 @given(speeds, speeds, speeds)
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
-    """At the rates of a twist each wheel rolls, along its own direction, by the body's motion there.
+    """At the rates of a twist each wheel rolls by the body's motion where it stands.
 
     The rollers take up what is across; so only the part along the rolling direction must agree.
     """
@@ -101,6 +101,15 @@ def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float
         body = (vx - w * place[1], vy + w * place[0], 0.0)
         assert dot(direction, direction) == pytest.approx(1.0)
         assert dot(rolling, direction) == pytest.approx(dot(body, direction), abs=1e-9)
+
+
+def test_a_positive_wheel_turns_counter_clockwise_seen_from_outside() -> None:
+    """So the commissioning guide has it: the axles point away from the centre."""
+    for name in WHEELS:
+        joint = ROBOT.joint_map[name]
+        x, y, _ = joint.origin.xyz
+        axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
+        assert dot(axle, (x, y, 0.0)) == pytest.approx(GEOMETRY["base_radius"])
 
 
 def test_the_wheels_stand_on_the_ground() -> None:
@@ -124,7 +133,11 @@ def test_the_imu_hangs_upside_down() -> None:
 def test_another_robot_is_described_by_arguments() -> None:
     """A bigger robot with its IMU elsewhere needs no other file."""
     robot = description(
-        wheel_radius="0.05", base_radius="0.2", base_height="0.2", imu_rpy="0 0 1.5", imu_xyz="0 0 0"
+        wheel_radius="0.05",
+        base_radius="0.2",
+        base_height="0.2",
+        imu_rpy="0 0 1.5",
+        imu_xyz="0 0 0",
     )
     x, y, z = robot.joint_map["wheel_b_joint"].origin.xyz
     assert (math.hypot(x, y), z) == pytest.approx((0.2, 0.05 - 0.2))

@@ -158,7 +158,11 @@ def test_the_driver_gets_what_is_given(launch: Callable[..., Started]) -> None:
         *("port:=sim://", "publish_tf:=false", "frame_prefix:=robot1/", "namespace:=robot1"),
     )
     given = parameters(started["driver"])
-    assert (given["port"], given["publish_tf"], given["frame_prefix"]) == ("sim://", False, "robot1/")
+    assert (given["port"], given["publish_tf"], given["frame_prefix"]) == (
+        "sim://",
+        False,
+        "robot1/",
+    )
     assert "__ns:=/robot1" in started["driver"]["arguments"]
     assert "__node:=omnibot_driver" in started["driver"]["arguments"]
 

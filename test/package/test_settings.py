@@ -38,7 +38,7 @@ def parameters(name: str, node: str) -> dict[str, Any]:
 
 
 def driver_names() -> set[str]:
-    """The driver's topics and services, relative to its namespace, from the calls that make them."""
+    """The driver's topics and services, relative to its namespace, as its node creates them."""
     calls = [
         node
         for node in ast.walk(ast.parse((ROOT / NODE / "node.py").read_text()))
