@@ -20,8 +20,10 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
-        (f"share/{NAME}/launch", glob("launch/*.launch.py")),
-        (f"share/{NAME}/config", glob("config/*")),
+        *(
+            (f"share/{NAME}/{folder}", glob(f"{folder}/*.*"))
+            for folder in ("config", "docs", "launch", "rviz", "systemd", "udev", "urdf")
+        ),
     ],
     entry_points={
         "console_scripts": [

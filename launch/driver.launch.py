@@ -1,4 +1,4 @@
-"""Starts the driver, with its parameters from a file and, where given, another port."""
+"""Starts the driver, with its parameters from a file and, where given, other values."""
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
@@ -7,19 +7,27 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
+OVERRIDES = {
+    "port": (str, "Serial device or pyserial URL of the board"),
+    "publish_tf": (bool, "Whether the driver publishes odom to base_link on /tf"),
+    "frame_prefix": (str, "Put before every frame name, as it is: robot1/"),
+}
+
 
 def driver_node(context: LaunchContext) -> list[Node]:
-    """Return the driver; an empty ``port`` leaves the choice to the parameter file."""
-    parameters = [LaunchConfiguration("params_file")]
-    if port := LaunchConfiguration("port").perform(context):
-        parameters.append({"port": ParameterValue(port, value_type=str)})
+    """Return the driver; an empty argument leaves the choice to the parameter file."""
+    overrides = {
+        name: ParameterValue(LaunchConfiguration(name), value_type=type_)
+        for name, (type_, _) in OVERRIDES.items()
+        if LaunchConfiguration(name).perform(context)
+    }
     return [
         Node(
             package="omnibot_driver",
             executable="driver",
             name="omnibot_driver",
             namespace=LaunchConfiguration("namespace"),
-            parameters=parameters,
+            parameters=[LaunchConfiguration("params_file"), overrides],
             output="screen",
         )
     ]
@@ -29,11 +37,13 @@ def generate_launch_description() -> LaunchDescription:
     """Return the driver and its arguments."""
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                "port",
-                default_value="",
-                description="Serial device or pyserial URL of the board; "
-                "empty: the port in params_file.",
+            *(
+                DeclareLaunchArgument(
+                    name,
+                    default_value="",
+                    description=f"{description}; empty: what params_file says.",
+                )
+                for name, (_, description) in OVERRIDES.items()
             ),
             DeclareLaunchArgument(
                 "params_file",

@@ -19,10 +19,27 @@ DEADLINE_S = 60.0
 SHARED_FILES = [
     f"ament_index/resource_index/packages/{PACKAGE}",
     f"{PACKAGE}/package.xml",
-    f"{PACKAGE}/config/driver.yaml",
-    f"{PACKAGE}/config/omnibot.policy.xml",
-    f"{PACKAGE}/launch/driver.launch.py",
-    f"{PACKAGE}/launch/simulation.launch.py",
+    *(
+        f"{PACKAGE}/{name}"
+        for name in (
+            "config/driver.yaml",
+            "config/ekf.yaml",
+            "config/foxglove.json",
+            "config/nav2_omnibot.yaml",
+            "config/omnibot.policy.xml",
+            "config/twist_mux.yaml",
+            "docs/commissioning.md",
+            "docs/troubleshooting.md",
+            "launch/description.launch.py",
+            "launch/driver.launch.py",
+            "launch/ekf.launch.py",
+            "launch/simulation.launch.py",
+            "rviz/omnibot.rviz",
+            "systemd/omnibot-driver.service",
+            "udev/99-omnibot.rules",
+            "urdf/omnibot.urdf.xacro",
+        )
+    ),
 ]
 
 

@@ -23,8 +23,12 @@ ROSDEP_KEYS = {
     "pytest": "python3-pytest",
     "serial": "python3-serial",
     "setuptools": "python3-setuptools",
+    "urdf_parser_py": "urdfdom_py",
     "yaml": "python3-yaml",
 }
+
+# What launch files can start and a driver does not need; the README names them.
+OPTIONAL = {"robot_localization", "rviz2"}
 
 # Enough for values and arithmetic; nothing that waits, reads a clock or touches the world.
 PURE_MODULES = {
@@ -85,6 +89,18 @@ def third_party(files: Iterable[Path]) -> set[str]:
     return {ROSDEP_KEYS.get(name, name) for name in top_level - sys.stdlib_module_names - own}
 
 
+def started_by(files: Iterable[Path]) -> set[str]:
+    """Return the packages whose executables the launch files start."""
+    return {
+        ast.literal_eval(keyword.value)
+        for file in files
+        for node in ast.walk(ast.parse(file.read_text(), file))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("Node", "FindExecutable")
+        for keyword in node.keywords
+        if keyword.arg == ("package" if ast.unparse(node.func) == "Node" else "name")
+    } - {PACKAGE}
+
+
 def within(name: str, module: str) -> bool:
     """Tell whether the dotted name is the module or something in it."""
     return name == module or name.startswith(f"{module}.")
@@ -115,9 +131,19 @@ def test_every_entry_point_names_a_function(setup_arguments: dict[str, Any]) -> 
         assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
 
 
-def test_manifest_declares_what_the_package_imports_and_nothing_else() -> None:
-    """On a machine set up by rosdep no import is missing, and nothing is installed for nobody."""
-    assert third_party(python_files(PACKAGE, "launch")) == declared("exec_depend")
+def test_manifest_declares_what_the_package_needs_and_nothing_else() -> None:
+    """On a machine set up by rosdep nothing is missing, and nothing is installed for nobody."""
+    started = started_by(python_files("launch"))
+    needed = third_party(python_files(PACKAGE, "launch")) | (started - OPTIONAL)
+    assert needed == declared("exec_depend")
+
+
+def test_optional_packages_are_started_and_documented() -> None:
+    """What rosdep does not install, the README tells to."""
+    readme = (ROOT / "README.md").read_text()
+    assert started_by(python_files("launch")) >= OPTIONAL
+    for name in OPTIONAL:
+        assert f"ros-jazzy-{name.replace('_', '-')}" in readme
 
 
 def test_manifest_declares_what_the_tests_import() -> None:

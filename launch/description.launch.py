@@ -1,0 +1,80 @@
+"""Publishes the robot's description and its fixed frames, and shows it in RViz where asked to.
+
+The joints keep their names whatever ``frame_prefix`` is: robot_state_publisher puts it before the
+frames only, as the driver does.
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.conditions import IfCondition
+from launch.substitutions import Command, FindExecutable, LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return robot_state_publisher, RViz and their arguments."""
+    description = Command(
+        [
+            FindExecutable(name="xacro"),
+            " ",
+            PathJoinSubstitution(
+                [FindPackageShare("omnibot_driver"), "urdf", "omnibot.urdf.xacro"]
+            ),
+            " ",
+            LaunchConfiguration("xacro_args"),
+        ]
+    )
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                "namespace",
+                default_value="",
+                description="Namespace of robot_description and joint_states; empty: none.",
+            ),
+            DeclareLaunchArgument(
+                "frame_prefix",
+                default_value="",
+                description="Put before every frame name, as it is: robot1/",
+            ),
+            DeclareLaunchArgument(
+                "xacro_args",
+                default_value="",
+                description="What differs on this robot, such as base_height:=0.13 "
+                "imu_rpy:='3.14159 0 1.5708'.",
+            ),
+            DeclareLaunchArgument(
+                "rviz", default_value="false", description="Show the robot in RViz."
+            ),
+            Node(
+                package="robot_state_publisher",
+                executable="robot_state_publisher",
+                namespace=LaunchConfiguration("namespace"),
+                parameters=[
+                    {
+                        "robot_description": ParameterValue(description, value_type=str),
+                        "frame_prefix": ParameterValue(
+                            LaunchConfiguration("frame_prefix"), value_type=str
+                        ),
+                    }
+                ],
+                output="screen",
+            ),
+            Node(
+                condition=IfCondition(LaunchConfiguration("rviz")),
+                package="rviz2",
+                executable="rviz2",
+                namespace=LaunchConfiguration("namespace"),
+                arguments=[
+                    "--display-config",
+                    PathJoinSubstitution(
+                        [FindPackageShare("omnibot_driver"), "rviz", "omnibot.rviz"]
+                    ),
+                    "--fixed-frame",
+                    [LaunchConfiguration("frame_prefix"), "odom"],
+                ],
+                output="screen",
+            ),
+        ]
+    )

@@ -1,0 +1,58 @@
+"""Starts the driver, the description and robot_localization's filter over odometry and gyro.
+
+The filter publishes odom to base_link, so the driver does not. The description is needed: it says
+that the IMU hangs upside down. Takes the arguments of driver.launch.py and description.launch.py.
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+FRAMES = {
+    "map_frame": "map",
+    "odom_frame": "odom",
+    "world_frame": "odom",
+    "base_link_frame": "base_link",
+}
+
+
+def include(name: str, arguments: dict[str, str]) -> IncludeLaunchDescription:
+    """Return another launch file of this package."""
+    path = PathJoinSubstitution([FindPackageShare("omnibot_driver"), "launch", name])
+    return IncludeLaunchDescription(
+        PythonLaunchDescriptionSource(path), launch_arguments=arguments.items()
+    )
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return driver, description and filter."""
+    prefix = LaunchConfiguration("frame_prefix")
+    frames = {
+        parameter: ParameterValue([prefix, frame], value_type=str)
+        for parameter, frame in FRAMES.items()
+    }
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                "ekf_params_file",
+                default_value=PathJoinSubstitution(
+                    [FindPackageShare("omnibot_driver"), "config", "ekf.yaml"]
+                ),
+                description="YAML file with the filter's parameters; the frames are set here.",
+            ),
+            include("driver.launch.py", {"publish_tf": "false"}),
+            include("description.launch.py", {}),
+            Node(
+                package="robot_localization",
+                executable="ekf_node",
+                name="ekf_filter_node",
+                namespace=LaunchConfiguration("namespace"),
+                parameters=[LaunchConfiguration("ekf_params_file"), frames],
+                output="screen",
+            ),
+        ]
+    )

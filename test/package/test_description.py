@@ -1,0 +1,151 @@
+"""The robot's description, expanded by xacro and read by the URDF parser that ROS tools use."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xacro
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from urdf_parser_py.urdf import URDF
+
+from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.parameters import BY_NAME
+
+ROOT = Path(__file__).parents[2]
+WHEELS = ("wheel_a_joint", "wheel_b_joint", "wheel_c_joint")
+GEOMETRY = {"wheel_radius": 0.029, "base_radius": 0.143}
+
+Vector = tuple[float, float, float]
+speeds = st.floats(-2.0, 2.0)
+
+
+def description(**arguments: str) -> Any:
+    """The parsed URDF, with xacro arguments."""
+    document = xacro.process_file(str(ROOT / "urdf/omnibot.urdf.xacro"), mappings=arguments)
+    return URDF.from_xml_string(document.toxml())
+
+
+ROBOT = description()
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def dot(a: Vector, b: Vector) -> float:
+    return sum(x * y for x, y in zip(a, b, strict=True))
+
+
+def rotate(rpy: Vector, vector: Vector) -> Vector:
+    """The vector turned by roll, then pitch, then yaw about fixed axes, as URDF has it."""
+    roll, pitch, yaw = rpy
+    x, y, z = vector
+    y, z = y * math.cos(roll) - z * math.sin(roll), y * math.sin(roll) + z * math.cos(roll)
+    x, z = x * math.cos(pitch) + z * math.sin(pitch), -x * math.sin(pitch) + z * math.cos(pitch)
+    x, y = x * math.cos(yaw) - y * math.sin(yaw), x * math.sin(yaw) + y * math.cos(yaw)
+    return x, y, z
+
+
+def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector, Vector]:
+    """Of a wheel that turns at this rate: where it stands, and its floor's velocity under it.
+
+    What touches the floor stands still, so the wheel's centre moves over it by the opposite.
+    """
+    axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
+    spin = tuple(rate_radps * part for part in axle)
+    touching = cross(spin, (0.0, 0.0, -radius_m))
+    return tuple(joint.origin.xyz), tuple(-part for part in touching)
+
+
+def test_the_joints_are_those_of_joint_states() -> None:
+    """What turns in the description are the three wheels, under the names of the interface."""
+    turning = [joint.name for joint in ROBOT.joints if joint.type != "fixed"]
+    assert turning == list(WHEELS)
+    assert {ROBOT.joint_map[name].type for name in WHEELS} == {"continuous"}
+
+
+def test_the_frames_are_those_of_the_driver() -> None:
+    """base_link is the root: odom moves it, and a frame has one parent."""
+    assert ROBOT.get_root() == BY_NAME["base_frame"].default
+    assert {BY_NAME["imu_frame"].default, "base_footprint"} < set(ROBOT.link_map)
+
+
+def test_the_default_geometry_is_the_drivers() -> None:
+    """One wheel radius and one base radius in description, parameters and manual."""
+    for name, manual_m in GEOMETRY.items():
+        assert BY_NAME[name].default == manual_m
+    for name in WHEELS:
+        x, y, _ = ROBOT.joint_map[name].origin.xyz
+        assert math.hypot(x, y) == pytest.approx(GEOMETRY["base_radius"])
+        (collision,) = ROBOT.link_map[name.replace("joint", "link")].collisions
+        assert collision.geometry.radius == GEOMETRY["wheel_radius"]
+
+
+@settings(deadline=None)
+@given(speeds, speeds, speeds)
+def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
+    """At the rates of a twist each wheel rolls by the body's motion where it stands.
+
+    The rollers take up what is across; so only the part along the rolling direction must agree.
+    """
+    kinematics = OmniKinematics(
+        wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]
+    )
+    rates = kinematics.wheel_rates(BodyTwist(vx, vy, w))
+    for name, rate in zip(WHEELS, rates, strict=True):
+        joint = ROBOT.joint_map[name]
+        place, rolling = floor_speed(joint, rate, GEOMETRY["wheel_radius"])
+        _, direction = floor_speed(joint, 1.0, 1.0)
+        body = (vx - w * place[1], vy + w * place[0], 0.0)
+        assert dot(direction, direction) == pytest.approx(1.0)
+        assert dot(rolling, direction) == pytest.approx(dot(body, direction), abs=1e-9)
+
+
+def test_a_positive_wheel_turns_counter_clockwise_seen_from_outside() -> None:
+    """So the commissioning guide has it: the axles point away from the centre."""
+    for name in WHEELS:
+        joint = ROBOT.joint_map[name]
+        x, y, _ = joint.origin.xyz
+        axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
+        assert dot(axle, (x, y, 0.0)) == pytest.approx(GEOMETRY["base_radius"])
+
+
+def test_the_wheels_stand_on_the_ground() -> None:
+    """base_footprint lies one wheel radius below the axles."""
+    ground = ROBOT.joint_map["base_footprint_joint"].origin.xyz[2]
+    for name in WHEELS:
+        height = ROBOT.joint_map[name].origin.xyz[2]
+        assert height - ground == pytest.approx(GEOMETRY["wheel_radius"])
+
+
+def test_the_imu_hangs_upside_down() -> None:
+    """Its place is that of the vendor's drivers; its z points down, its x forward."""
+    joint = ROBOT.joint_map["imu_joint"]
+    assert (joint.parent, joint.child) == ("base_link", "imu_link")
+    assert joint.origin.xyz == [-0.005, 0.035, -0.06]
+    rpy = tuple(joint.origin.rpy)
+    assert rotate(rpy, (0.0, 0.0, 1.0)) == pytest.approx((0.0, 0.0, -1.0), abs=1e-6)
+    assert rotate(rpy, (1.0, 0.0, 0.0)) == pytest.approx((1.0, 0.0, 0.0), abs=1e-6)
+
+
+def test_another_robot_is_described_by_arguments() -> None:
+    """A bigger robot with its IMU elsewhere needs no other file."""
+    robot = description(
+        wheel_radius="0.05",
+        base_radius="0.2",
+        base_height="0.2",
+        imu_rpy="0 0 1.5",
+        imu_xyz="0 0 0",
+    )
+    x, y, z = robot.joint_map["wheel_b_joint"].origin.xyz
+    assert (math.hypot(x, y), z) == pytest.approx((0.2, 0.05 - 0.2))
+    assert robot.joint_map["imu_joint"].origin.rpy == [0.0, 0.0, 1.5]
+
+
+def test_the_description_needs_no_other_files() -> None:
+    """Primitives only: it looks the same wherever it is shown."""
+    text = (ROOT / "urdf/omnibot.urdf.xacro").read_text()
+    assert "package://" not in text
+    assert "<mesh" not in text

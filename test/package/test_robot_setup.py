@@ -1,0 +1,103 @@
+"""The udev rules and the systemd unit: well formed, and as the documents say."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+RULES = ROOT / "udev/99-omnibot.rules"
+UNIT = ROOT / "systemd/omnibot-driver.service"
+
+TOKEN = re.compile(r'([A-Z]+(?:\{[\w/]+\})?)(==|!=|\+=|:=|=)"([^"]*)"')
+MATCHES = {"ACTION", "SUBSYSTEM", "DRIVER", "ATTRS{idVendor}", "ATTRS{idProduct}"}
+ASSIGNMENTS = {"SYMLINK", "GROUP", "MODE", "ATTR{latency_timer}"}
+
+
+def rules(lines: list[str]) -> list[dict[str, tuple[str, str]]]:
+    """Each line as its keys, with operator and value; anything that is no rule fails."""
+    parsed = []
+    for line in lines:
+        tokens = [TOKEN.fullmatch(token) for token in line.split(", ")]
+        assert all(tokens), line
+        parsed.append({token[1]: (token[2], token[3]) for token in tokens if token})
+    return parsed
+
+
+LINES = RULES.read_text().splitlines()
+ACTIVE = rules([line for line in LINES if line and not line.startswith("#")])
+OFFERED = rules([line.lstrip("#") for line in LINES if line.lstrip("#").startswith("SUBSYSTEM")])
+
+
+def test_every_rule_matches_before_it_assigns() -> None:
+    """Keys and operators are those that udev knows."""
+    for rule in ACTIVE + OFFERED:
+        for key, (operator, _) in rule.items():
+            assert key in MATCHES | ASSIGNMENTS
+            assert operator == ("==" if key in MATCHES else "+=" if key == "SYMLINK" else "=")
+
+
+def test_each_adapter_gets_the_same_name_and_rights() -> None:
+    """/dev/omnibot for the group dialout, and nobody else."""
+    assert len(OFFERED) == 4
+    for rule in OFFERED:
+        assert rule["SUBSYSTEM"] == ("==", "tty")
+        assert {key: rule[key][1] for key in ("SYMLINK", "GROUP", "MODE")} == {
+            "SYMLINK": "omnibot",
+            "GROUP": "dialout",
+            "MODE": "0660",
+        }
+
+
+def test_only_one_adapter_is_taken_for_the_board() -> None:
+    """Two would let a lidar become /dev/omnibot."""
+    assert len([rule for rule in ACTIVE if "SYMLINK" in rule]) == 1
+
+
+def test_an_ftdi_adapter_does_not_hold_bytes_back() -> None:
+    """One millisecond in place of sixteen, once its driver is bound."""
+    (timer,) = [rule for rule in ACTIVE if "ATTR{latency_timer}" in rule]
+    assert timer["DRIVER"] == ("==", "ftdi_sio")
+    assert "bind" in timer["ACTION"][1].split("|")
+    assert timer["ATTR{latency_timer}"] == ("=", "1")
+
+
+def unit_settings() -> dict[str, list[str]]:
+    """The unit's keys with their values, continued lines joined."""
+    settings: dict[str, list[str]] = {}
+    for line in UNIT.read_text().replace("\\\n", " ").splitlines():
+        key, assigned, value = line.partition("=")
+        if assigned and not line.startswith("#"):
+            settings.setdefault(key, []).append(value)
+    return settings
+
+
+def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
+    """Signals must reach the driver itself."""
+    (command,) = unit_settings()["ExecStart"]
+    assert ". /opt/ros/jazzy/setup.bash && " in command
+    assert re.search(r'&& +exec "\S+/lib/omnibot_driver/driver" +--ros-args ', command)
+    assert "port:=/dev/omnibot" in command
+
+
+def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None:
+    """A crash of the driver must not kill what stops the robot then."""
+    settings = unit_settings()
+    assert settings["KillSignal"] == ["SIGINT"]
+    assert settings["KillMode"] == ["control-group"]
+    assert settings["Restart"] == ["on-failure"]
+    assert settings["RestartPreventExitStatus"] == ["2"]
+
+
+@pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="systemd is not installed")
+def test_systemd_accepts_the_unit() -> None:
+    """It reports every key and value that it does not know on stderr."""
+    done = subprocess.run(
+        ["systemd-analyze", "verify", "--man=no", str(UNIT)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")

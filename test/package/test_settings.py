@@ -1,0 +1,197 @@
+"""Settings for other packages: they name what the driver has, and ask no more than it gives."""
+
+import ast
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+import yaml
+from rclpy.context import Context
+
+from omnibot_driver.parameters import BY_NAME
+
+ROOT = Path(__file__).parents[2]
+CONFIG = ROOT / "config"
+NODE = "omnibot_driver"
+
+FRAMES = {BY_NAME[name].default for name in ("odom_frame", "base_frame")} | {"map"}
+LINEAR, ANGULAR = BY_NAME["max_linear_speed"].default, BY_NAME["max_angular_speed"].default
+TIMEOUT = BY_NAME["cmd_vel_timeout"].default
+
+# Topics of others that the displays show.
+OTHERS = {"robot_description", "diagnostics", "goal_pose"}
+
+
+def load(name: str) -> Any:
+    """The parsed YAML file."""
+    return yaml.safe_load((CONFIG / name).read_text())
+
+
+def parameters(name: str, node: str) -> dict[str, Any]:
+    """A node's parameters in the file."""
+    found: dict[str, Any] = load(name)[node]["ros__parameters"]
+    return found
+
+
+def driver_names() -> set[str]:
+    """The driver's topics and services, relative to its namespace, as its node creates them."""
+    calls = [
+        node
+        for node in ast.walk(ast.parse((ROOT / NODE / "node.py").read_text()))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr in ("create_publisher", "create_subscription", "create_service")
+    ]
+    names = [call.args[1].value for call in calls if isinstance(call.args[1], ast.Constant)]
+    return {str(name).replace("~", NODE, 1) for name in names}
+
+
+def everything_under(key: str, tree: Any) -> Iterator[Any]:
+    """Every value of the key, however deep in the tree."""
+    if isinstance(tree, dict):
+        if key in tree:
+            yield tree[key]
+        for branch in tree.values():
+            yield from everything_under(key, branch)
+    elif isinstance(tree, list):
+        for branch in tree:
+            yield from everything_under(key, branch)
+
+
+DRIVER = driver_names()
+
+
+def test_the_drivers_names_are_found() -> None:
+    """The other tests compare with these."""
+    assert {"odom", "imu/data_raw", "cmd_vel", f"{NODE}/estop_active", f"{NODE}/estop"} <= DRIVER
+
+
+@pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.name)
+def test_ros_reads_each_parameter_file(path: Path) -> None:
+    """rcl's parser takes less than YAML: no anchors, no mixed lists."""
+    context = Context()
+    rclpy.init(args=["--ros-args", "--params-file", str(path)], context=context)
+    rclpy.shutdown(context=context)
+
+
+def test_the_filter_fuses_the_drivers_velocities_and_gyro() -> None:
+    """Speeds from odom, turning from both, no pose, no acceleration, and it alone publishes TF."""
+    ekf = parameters("ekf.yaml", "/**")
+    states = [
+        *("x", "y", "z", "roll", "pitch", "yaw"),
+        *("vx", "vy", "vz", "vroll", "vpitch", "vyaw", "ax", "ay", "az"),
+    ]
+    fused = {
+        sensor: {s for s, used in zip(states, ekf[f"{sensor}_config"], strict=True) if used}
+        for sensor in ("odom0", "imu0")
+    }
+    assert fused == {"odom0": {"vx", "vy", "vyaw"}, "imu0": {"vyaw"}}
+    assert {ekf["odom0"], ekf["imu0"]} == {"odom", "imu/data_raw"} <= DRIVER
+    assert {ekf[f"{name}_frame"] for name in ("map", "odom", "base_link", "world")} == FRAMES
+    assert ekf["two_d_mode"] is True
+    assert ekf["publish_tf"] is True
+
+
+def test_nav2_keeps_to_the_drivers_limits() -> None:
+    """Whatever limits a speed in Nav2 is the driver's default, so plans are driven as planned."""
+    file = load("nav2_omnibot.yaml")
+    mppi = file["controller_server"]["ros__parameters"]["FollowPath"]
+    assert {mppi["vx_max"], -mppi["vx_min"], mppi["vy_max"]} == {LINEAR}
+    assert mppi["wz_max"] == ANGULAR
+    smoother = file["velocity_smoother"]["ros__parameters"]
+    assert smoother["max_velocity"] == [LINEAR, LINEAR, ANGULAR]
+    assert smoother["min_velocity"] == [-LINEAR, -LINEAR, -ANGULAR]
+    assert file["behavior_server"]["ros__parameters"]["max_rotational_vel"] <= ANGULAR
+    dock = file["docking_server"]["ros__parameters"]["controller"]
+    assert dock["v_linear_max"] <= LINEAR
+    assert dock["v_angular_max"] <= ANGULAR
+    assert smoother["velocity_timeout"] == TIMEOUT
+
+
+def test_nav2_knows_that_the_robot_moves_sideways() -> None:
+    """Localisation, control and thresholds alike."""
+    file = load("nav2_omnibot.yaml")
+    controller = file["controller_server"]["ros__parameters"]
+    assert controller["FollowPath"]["motion_model"] == "Omni"
+    assert "PreferForwardCritic" not in controller["FollowPath"]["critics"]
+    assert controller["min_y_velocity_threshold"] == controller["min_x_velocity_threshold"]
+    assert file["amcl"]["ros__parameters"]["robot_model_type"] == "nav2_amcl::OmniMotionModel"
+
+
+def test_nav2_uses_the_drivers_topics_and_frames() -> None:
+    """Odometry and commands are where the driver has them."""
+    file = load("nav2_omnibot.yaml")
+    assert set(everything_under("odom_topic", file)) == {"odom"} <= DRIVER
+    assert set(everything_under("cmd_vel_out_topic", file)) == {"cmd_vel"} <= DRIVER
+    keys = (
+        *("global_frame", "global_frame_id", "local_frame", "odom_frame_id", "fixed_frame"),
+        *("robot_base_frame", "base_frame_id", "base_frame"),
+    )
+    assert {frame for key in keys for frame in everything_under(key, file)} == FRAMES
+
+
+def test_every_critic_that_is_tuned_is_used() -> None:
+    """A name that is misspelt in one place would be ignored."""
+    mppi = load("nav2_omnibot.yaml")["controller_server"]["ros__parameters"]["FollowPath"]
+    assert {name for name in mppi if name.endswith("Critic")} == set(mppi["critics"])
+
+
+def test_the_mux_is_locked_by_the_drivers_estop() -> None:
+    """Its topic is the latched Bool of the driver, and stands above every source."""
+    mux = parameters("twist_mux.yaml", "twist_mux")
+    (lock,) = mux["locks"].values()
+    assert lock["topic"] == f"{NODE}/estop_active"
+    assert lock["topic"] in DRIVER
+    assert lock["timeout"] == 0.0
+    assert all(source["priority"] < lock["priority"] for source in mux["topics"].values())
+
+
+def test_the_mux_passes_on_what_the_driver_takes() -> None:
+    """Its sources are not its output, and are forgotten as soon as the driver forgets them."""
+    mux = parameters("twist_mux.yaml", "twist_mux")
+    sources = mux["topics"].values()
+    assert {source["timeout"] for source in sources} == {TIMEOUT}
+    assert not DRIVER & {source["topic"] for source in sources}
+    assert mux["use_stamped"] is BY_NAME["enable_stamped_cmd_vel"].default
+    assert "-r cmd_vel_out:=cmd_vel\n" in (CONFIG / "twist_mux.yaml").read_text()
+
+
+def test_rviz_shows_topics_and_frames_that_exist() -> None:
+    """Relative names, so that a robot's namespace is a robot's display."""
+    rviz = yaml.safe_load((ROOT / "rviz/omnibot.rviz").read_text())["Visualization Manager"]
+    topics = {
+        topic["Value"]
+        for key in ("Topic", "Description Topic")
+        for topic in everything_under(key, rviz)
+    }
+    assert {"odom", "robot_description"} < topics <= DRIVER | OTHERS
+    assert rviz["Global Options"]["Fixed Frame"] == BY_NAME["odom_frame"].default
+
+
+def test_foxglove_shows_topics_and_services_that_exist() -> None:
+    """Every name that begins with a slash in the layout is the driver's, or one of a few others."""
+    text = (CONFIG / "foxglove.json").read_text()
+    names = set(re.findall(r'"/([a-z_/]+)', text))
+    assert {"odom", "imu/data_raw", f"{NODE}/state", f"{NODE}/estop"} < names
+    assert names <= DRIVER | OTHERS
+
+
+def test_foxglove_lays_out_every_panel_once() -> None:
+    """A panel without a place is not drawn, a place without settings is empty."""
+    layout = json.loads((CONFIG / "foxglove.json").read_text())
+    places = list(everything_under("first", layout)) + list(everything_under("second", layout))
+    panels = [place for place in places if isinstance(place, str)]
+    assert sorted(panels) == sorted(layout["configById"])
+
+
+def test_foxglove_drives_slowly_and_often_enough() -> None:
+    """Its buttons stay within the limits and repeat faster than the driver forgets."""
+    teleop = json.loads((CONFIG / "foxglove.json").read_text())["configById"]["Teleop!drive"]
+    assert teleop["publishRate"] > 2 / TIMEOUT
+    limits = {"linear-x": LINEAR, "angular-z": ANGULAR}
+    for button in ("upButton", "downButton", "leftButton", "rightButton"):
+        assert 0 < abs(teleop[button]["value"]) < limits[teleop[button]["field"]]
