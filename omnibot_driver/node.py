@@ -45,6 +45,7 @@ from omnibot_driver.link import Link
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 UNHEARD = ("disconnected", "connecting")
+MessageInfo = dict[str, int]
 NOT_OURS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..+")
 """Parameters that rclpy itself declares for every node."""
 
@@ -78,6 +79,9 @@ class OmniBotDriver(Node):
             self._session,
             self._values["port"],
             self._values["baudrate"],
+            last_words=(self._board.wake() + self._board.emergency_stop())
+            if self._values["guard"]
+            else None,
             reconnect_interval_s=self._values["reconnect_interval"],
             deliver=self._deliver,
             report=self._report_port,
@@ -195,8 +199,7 @@ class OmniBotDriver(Node):
             if self._is_news(text := f"port {self._values['port']} is open"):
                 self.get_logger().info(text)
         elif self._is_news(trouble):
-            interval_s = self._values["reconnect_interval"]
-            self.get_logger().error(f"{trouble} (retrying every {interval_s:g} s)")
+            self.get_logger().error(f"{trouble} (retrying)")
 
     def _is_news(self, text: str) -> bool:
         """Each thing once until the board is understood again: a port that flaps is no news."""
@@ -208,7 +211,10 @@ class OmniBotDriver(Node):
     def _create_inputs(self) -> None:
         if self._values["enable_stamped_cmd_vel"]:
             self.create_subscription(
-                TwistStamped, "cmd_vel", lambda stamped: self._on_twist(stamped.twist), 1
+                TwistStamped,
+                "cmd_vel",
+                lambda stamped, info: self._on_twist(stamped.twist, info),
+                1,
             )
         else:
             self.create_subscription(Twist, "cmd_vel", self._on_twist, 1)
@@ -221,15 +227,17 @@ class OmniBotDriver(Node):
         self.create_service(SetBool, "~/pause", self._on_pause, callback_group=waiting)
         self.create_service(Trigger, "~/reset", self._on_reset, callback_group=waiting)
 
-    def _on_twist(self, twist: Twist) -> None:
-        self._command(lambda session, now: session.command_twist(messages.body_twist(twist), now))
+    def _on_twist(self, twist: Twist, info: MessageInfo) -> None:
+        self._command(
+            lambda session, now: session.command_twist(messages.body_twist(twist), now), info
+        )
 
-    def _on_wheels(self, wheels: Float32MultiArray) -> None:
-        self._command(lambda session, now: session.command_wheels(wheels.data, now))
+    def _on_wheels(self, wheels: Float32MultiArray, info: MessageInfo) -> None:
+        self._command(lambda session, now: session.command_wheels(wheels.data, now), info)
 
-    def _command(self, action: Callable[[Session, float], None]) -> None:
+    def _command(self, action: Callable[[Session, float], None], info: MessageInfo) -> None:
         try:
-            self._link.call(action)
+            self._link.command(action, info["source_timestamp"])
         except CommandRefused as error:
             self.get_logger().warning(str(error), throttle_duration_sec=2.0)
 

@@ -115,9 +115,16 @@ PARAMETERS: Final = (
         "reconnect_interval",
         0.5,
         "s",
-        "Time between two attempts to open the port.",
+        "Time until a lost port is opened again; it grows by half with each failure, to 2 s.",
         low=0.05,
         high=60.0,
+    ),
+    Parameter(
+        "guard",
+        True,
+        "",
+        "Have a small process of its own stop the robot when the driver is killed or hangs.",
+        fixed=True,
     ),
     Parameter(
         "linear_scale",

@@ -24,6 +24,7 @@ from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
 
 PATIENCE_S = 20.0
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+LAST_WORDS = bytes(8) + STOP + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
 
 
 class Listener:
@@ -71,6 +72,7 @@ def link_to(url: str, listener: Listener, session: Session) -> Link:
         session,
         url,
         115200,
+        last_words=LAST_WORDS,
         reconnect_interval_s=0.02,
         deliver=listener.deliver,
         report=listener.report,
