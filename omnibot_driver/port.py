@@ -39,6 +39,7 @@ class Port:
     def __init__(self, url: str, baudrate: int) -> None:
         self._url = url
         self._is_terminal = False
+        self._peer: socket.socket | None = None
         try:
             self._serial = serial.serial_for_url(
                 url,
@@ -101,6 +102,8 @@ class Port:
                 fcntl.ioctl(self._serial.fileno(), termios.TIOCNXCL)
         self._is_terminal = False
         self._serial.close()
+        if self._peer is not None:
+            self._peer.close()  # pyserial leaves a socket open whose peer has gone
 
     def _settle_in(self) -> None:
         descriptor = self.descriptor
@@ -114,6 +117,7 @@ class Port:
                 fcntl.ioctl(descriptor, termios.TIOCEXCL)
         peer = getattr(self._serial, "_socket", None)  # pyserial has no public name for it
         if isinstance(peer, socket.socket):
+            self._peer = peer
             peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, PEER_TIMEOUT_MS)
 
 

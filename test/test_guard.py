@@ -37,10 +37,14 @@ class Line:
         return self.heard
 
     def fill(self) -> None:
-        """Until the kernel takes no more."""
-        with contextlib.suppress(BlockingIOError):
-            while True:
-                os.write(self.near, b"x" * 100)
+        """Until the kernel takes no more, not even after moving it from one buffer to the next."""
+        taken = 1
+        while taken:
+            taken = 0
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    taken += os.write(self.near, b"x")
+            time.sleep(0.05)
 
     def hang_up(self) -> None:
         os.close(self._far)

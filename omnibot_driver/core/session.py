@@ -168,6 +168,7 @@ class Session:
     def stood_still(self, seconds: float, now: float) -> None:
         """This process, or its watchdog, did not run for so long: no command is current."""
         if not self._closed:
+            self._heard_at = now  # the silence was ours
             self._commands.halt(now)
             self._events.append(
                 Notice(
