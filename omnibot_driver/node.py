@@ -20,6 +20,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -53,9 +54,11 @@ NOT_OURS = re.compile(r"use_sim_time|start_type_description_service|qos_override
 class OmniBotDriver(Node):
     """The driver node. Raises ParameterError when it cannot start with the given parameters."""
 
-    def __init__(self, *, defect: Callable[[BaseException], object] = lambda _error: None) -> None:
+    def __init__(
+        self, *, end: Callable[[BaseException | None], object] = lambda _error: None
+    ) -> None:
         super().__init__("omnibot_driver")
-        self._defect = defect
+        self._end = end
         self._values = self._declare_parameters()
         self._message_settings = messages.MessageSettings.from_parameters(self._values)
         self._board = OmniBot(parameters.board_settings(self._values))
@@ -98,11 +101,14 @@ class OmniBotDriver(Node):
 
     def report_defect(self, error: BaseException) -> None:
         """Something that must not happen has; say so and have the driver end."""
+        if isinstance(error, RCLError) and not self.context.ok():
+            self._end(None)  # ROS was shut down under our hands
+            return
         trace = "".join(traceback.format_exception(error))
         self.get_logger().fatal(
             f"stopping after a defect of the driver, please report it:\n{trace}"
         )
-        self._defect(error)
+        self._end(error)
 
     # Parameters
 

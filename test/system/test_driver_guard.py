@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import PATIENCE_S, Driver, Probe
+from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import Twist, TwistStamped
+from probe import Probe
 
 from omnibot_driver.simulator import PtyBoard, SimulatedBoard
 
