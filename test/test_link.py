@@ -12,7 +12,7 @@ import termios
 import threading
 import time
 import tty
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -442,12 +442,13 @@ def test_a_peer_that_vanished_without_a_word_is_given_up(monkeypatch: pytest.Mon
             drop_everything(far)
             port.write(STOP)
             with pytest.raises(LinkError, match="lost"):
-                consume(iter(port.read, None))
+                go_on(port.read)
 
 
-def consume(endless: Iterator[object]) -> None:
-    for _ in endless:
-        pass
+def go_on(action: Callable[[], object]) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        action()
 
 
 def drop_everything(peer: socket.socket) -> None:
@@ -464,7 +465,17 @@ def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port, far = connected(server)
         with far, closing(port), pytest.raises(LinkError, match="while writing"):
-            consume(map(port.write, itertools.repeat(bytes(100_000))))
+            go_on(lambda: port.write(bytes(100_000)))
+
+
+def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) -> None:
+    """What waited in the kernel is given up, so that a board that listens again hears the newest."""
+    port = Port(terminal.path, 115200)
+    terminal.fill()
+    with pytest.raises(LinkError, match="while writing"):
+        port.write(STOP)
+    port.write(STOP)
+    port.close()
 
 
 def test_a_write_that_is_taken_in_pieces_is_completed(terminal: Terminal) -> None:

@@ -646,6 +646,7 @@ def test_a_driver_that_stood_still_has_no_command_and_blames_nobody(bench: Bench
     mark = len(bench.written)
     bench.now += 3.0
     bench.session.stood_still(3.0, bench.now)
+    bench.session.tick(bench.now)
     bench.settle()
     bench.run(2.0)
     assert {data for _, data in bench.written[mark:]} == {STOP}
