@@ -10,8 +10,10 @@ import fcntl
 import io
 import os
 import re
+import select
 import socket
 import termios
+import time
 from pathlib import Path
 from typing import Final
 
@@ -83,7 +85,10 @@ class Port:
     def write(self, data: bytes) -> None:
         """All of it, or LinkError; then nothing that was written and is still here will be sent."""
         try:
-            self._serial.write(data)
+            if (descriptor := self.descriptor) is None:
+                self._serial.write(data)
+            else:
+                _write_whole(descriptor, data)
         except OSError as error:
             with contextlib.suppress(OSError, termios.error):
                 self._serial.reset_output_buffer()
@@ -119,6 +124,19 @@ class Port:
         if isinstance(peer, socket.socket):
             self._peer = peer
             peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, PEER_TIMEOUT_MS)
+
+
+def _write_whole(descriptor: int, data: bytes) -> None:
+    """Unlike pyserial's, it sleeps while there is no room, and late is not failed."""
+    until = time.monotonic() + WRITE_TIMEOUT_S
+    while True:
+        with contextlib.suppress(BlockingIOError):
+            data = data[os.write(descriptor, data) :]
+        if not data:
+            return
+        left_s = max(0.0, until - time.monotonic())
+        if not select.select([], [descriptor], [], left_s)[1]:
+            raise TimeoutError(f"it takes no more bytes for {WRITE_TIMEOUT_S:g} s")
 
 
 def _explain(url: str, error: Exception) -> str:

@@ -469,7 +469,7 @@ def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
 
 
 def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) -> None:
-    """What waited in the kernel is given up, so that a board that listens again hears the newest."""
+    """What waited in the kernel is given up: a board that listens again hears the newest."""
     port = Port(terminal.path, 115200)
     terminal.fill()
     with pytest.raises(LinkError, match="while writing"):
