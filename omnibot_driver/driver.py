@@ -77,7 +77,7 @@ def _main(args: list[str]) -> int:
 
 
 def _run(ending: Ending) -> None:
-    driver = OmniBotDriver(defect=ending.begin)
+    driver = OmniBotDriver(end=ending.begin)
     executor = SingleThreadedExecutor()
     executor.add_node(driver)
     stopping = threading.Event()

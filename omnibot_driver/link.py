@@ -3,7 +3,8 @@
 The *reader* opens the port, waits for bytes, hands them to the session and delivers what comes of
 them at once, on its own thread: no queue and no timer stand between the wire and the listener. The
 *pacer* sleeps until something is due (a repeated command, a timeout, a retry), so the watchdog
-depends on nobody's executor. They and every caller go through one lock.
+depends on nobody's executor. It is also the one whose heartbeat the guard hears. They and every
+caller go through one lock.
 """
 
 import math
@@ -14,11 +15,15 @@ from contextlib import closing
 from functools import partial
 from typing import Final, TypeVar
 
-from omnibot_driver.core.errors import LinkError
-from omnibot_driver.core.session import Event, OnExit, Session
+from omnibot_driver.core.errors import CommandRefused, LinkError
+from omnibot_driver.core.session import Event, Notice, OnExit, Session
+from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
 from omnibot_driver.port import Port
+from omnibot_driver.standstill import Standstill
 
 JOIN_TIMEOUT_S: Final = 1.0
+BACK_OFF: Final = 1.5
+LONGEST_WAIT_S: Final = 2.0
 
 T = TypeVar("T")
 
@@ -26,6 +31,7 @@ T = TypeVar("T")
 class Link:
     """One session on one port, which is opened again whenever it is lost.
 
+    ``last_words`` are what stops the board when this process cannot; None: no guard is wanted.
     ``deliver`` gets the session's events on whichever thread they came up; ``report`` gets a
     sentence about the port whenever it cannot be had or is lost, and None when it is open;
     ``failed`` gets the exception that ended a thread, which nothing but a defect can do.
@@ -37,6 +43,7 @@ class Link:
         url: str,
         baudrate: int,
         *,
+        last_words: bytes | None,
         reconnect_interval_s: float,
         deliver: Callable[[Sequence[Event]], None],
         report: Callable[[str | None], None],
@@ -44,7 +51,8 @@ class Link:
     ) -> None:
         self._session = session
         self._open = partial(Port, url, baudrate)
-        self.reconnect_interval_s = reconnect_interval_s
+        self._last_words = last_words
+        self.reconnect_interval_s = self._wait_s = reconnect_interval_s
         self._deliver = deliver
         self._report = report
         self._failed = failed
@@ -52,7 +60,10 @@ class Link:
         self._closing = threading.Event()
         self._port: Port | None = None
         self._write_error: LinkError | None = None
-        self._pacing_until = -math.inf
+        self._keeper: Keeper | None = None
+        self._unguarded_told = False
+        self._standstill = Standstill()
+        self._pacing_until = self._beat_at = -math.inf
         self._threads = [
             threading.Thread(target=self._guard, args=(work,), name=f"omnibot-{name}", daemon=True)
             for name, work in (("reader", self._serve), ("pacer", self._pace))
@@ -68,12 +79,29 @@ class Link:
         events: Sequence[Event] = ()
         try:
             with self._changed:
+                now = time.monotonic()
+                self._heed_standstill(now)
                 try:
-                    return action(self._session, time.monotonic())
+                    return action(self._session, now)
                 finally:
                     events = self._settle()
         finally:
             self._deliver(events)
+
+    def command(self, action: Callable[[Session, float], None], sent_ns: int) -> None:
+        """``call``, with a command sent at this time of day by the sender's clock.
+
+        Raises CommandRefused for one that has been waiting while this process stood still.
+        """
+
+        def unless_it_waited(session: Session, now: float) -> None:
+            if not self._standstill.outlived_by(sent_ns, now):
+                raise CommandRefused(
+                    "motion command refused: it waited while the driver stood still; send it again"
+                )
+            action(session, now)
+
+        self.call(unless_it_waited)
 
     def close(self, on_exit: OnExit) -> None:
         """Stop the robot, then end the threads and close the port; harmless to repeat."""
@@ -105,14 +133,26 @@ class Link:
                         self._detach()
             except LinkError as error:
                 self._report(str(error))
-                self._closing.wait(self.reconnect_interval_s)
+                self._closing.wait(self._wait_s)
+                longest_s = max(LONGEST_WAIT_S, self.reconnect_interval_s)
+                self._wait_s = min(BACK_OFF * self._wait_s, longest_s)
 
     def _attach(self, port: Port) -> None:
+        keeper, notices = self._guarded(port)
         with self._changed:
-            self._port, self._write_error = port, None
+            self._port, self._write_error, self._keeper = port, None, keeper
             self._session.opened(time.monotonic())
-            events = self._settle()
+            events = [*notices, *self._settle()]
         self._deliver(events)
+
+    def _guarded(self, port: Port) -> tuple[Keeper | None, list[Notice]]:
+        if self._last_words is None:
+            return None, []
+        if port.descriptor is not None:
+            return Keeper(port.descriptor, self._last_words), []
+        told, self._unguarded_told = self._unguarded_told, True
+        text = f"this kind of port cannot be shared with a guard process: {WITHOUT_GUARD}"
+        return None, [] if told else [Notice(text)]
 
     def _read(self, port: Port) -> None:
         while not self._closing.is_set():
@@ -122,7 +162,10 @@ class Link:
                     raise self._write_error
                 if not data:
                     continue
-                self._session.receive(data, time.monotonic())
+                self._wait_s = self.reconnect_interval_s
+                now = time.monotonic()
+                self._heed_standstill(now)
+                self._session.receive(data, now)
                 events = self._settle()
             self._deliver(events)
 
@@ -130,9 +173,12 @@ class Link:
         """Whatever ended the reading, the robot is not left with a command to carry out."""
         with self._changed:
             self._write(self._session.farewell("stop"))
-            self._port = None
+            stopped = self._write_error is None or not self._closing.is_set()
+            keeper, self._port, self._keeper = self._keeper, None, None
             self._session.closed(time.monotonic())
             events = self._settle()
+        if keeper is not None:
+            keeper.end(stopped=stopped)
         self._deliver(events)
 
     def _pace(self) -> None:
@@ -141,14 +187,31 @@ class Link:
                 if self._closing.is_set():
                     return
                 now = time.monotonic()
-                self._pacing_until = self._session.wake_at
+                self._pacing_until = min(self._session.wake_at, self._beat_at)
                 if now < self._pacing_until:
-                    wait = self._pacing_until - now
-                    self._changed.wait(None if math.isinf(wait) else wait)
+                    self._changed.wait(self._pacing_until - now)
                     continue
-                self._session.tick(now)
-                events = self._settle()
+                notices = self._beat(now)
+                if now >= self._session.wake_at:
+                    self._session.tick(now)
+                events = [*notices, *self._settle()]
             self._deliver(events)
+
+    def _beat(self, now: float) -> list[Notice]:
+        """With the lock held: this thread, and so the watchdog, is alive."""
+        self._heed_standstill(now)
+        self._standstill.passed(now, time.time_ns())
+        self._beat_at = now + BEAT_S
+        if self._keeper is None:
+            return []
+        self._keeper.beat(now)
+        trouble, self._keeper.trouble = self._keeper.trouble, ""
+        return [Notice(trouble)] if trouble else []
+
+    def _heed_standstill(self, now: float) -> None:
+        length_s = self._standstill.begun(now)
+        if length_s and not self._closing.is_set():
+            self._session.stood_still(length_s, now)
 
     def _settle(self) -> Sequence[Event]:
         """With the lock held: write what is due, wake the pacer if it sleeps for too long."""

@@ -21,6 +21,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -48,6 +49,7 @@ from omnibot_driver.link import Link
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 LOOK_EVERY_S = WARN_EVERY_S = 2.0
 UNHEARD = ("disconnected", "connecting")
+MessageInfo = dict[str, int]
 NOT_OURS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..+")
 """Parameters that rclpy itself declares for every node."""
 
@@ -55,9 +57,11 @@ NOT_OURS = re.compile(r"use_sim_time|start_type_description_service|qos_override
 class OmniBotDriver(Node):
     """The driver node. Raises ParameterError when it cannot start with the given parameters."""
 
-    def __init__(self, *, defect: Callable[[BaseException], object] = lambda _error: None) -> None:
+    def __init__(
+        self, *, end: Callable[[BaseException | None], object] = lambda _error: None
+    ) -> None:
         super().__init__("omnibot_driver")
-        self._defect = defect
+        self._end = end
         self._values = self._declare_parameters()
         self._message_settings = messages.MessageSettings.from_parameters(self._values)
         self._board = OmniBot(parameters.board_settings(self._values))
@@ -83,6 +87,9 @@ class OmniBotDriver(Node):
             self._session,
             self._values["port"],
             self._values["baudrate"],
+            last_words=(self._board.wake() + self._board.emergency_stop())
+            if self._values["guard"]
+            else None,
             reconnect_interval_s=self._values["reconnect_interval"],
             deliver=self._deliver,
             report=self._report_port,
@@ -99,11 +106,14 @@ class OmniBotDriver(Node):
 
     def report_defect(self, error: BaseException) -> None:
         """Something that must not happen has; say so and have the driver end."""
+        if isinstance(error, RCLError) and not self.context.ok():
+            self._end(None)  # ROS was shut down under our hands
+            return
         trace = "".join(traceback.format_exception(error))
         self.get_logger().fatal(
             f"stopping after a defect of the driver, please report it:\n{trace}"
         )
-        self._defect(error)
+        self._end(error)
 
     # Parameters
 
@@ -200,8 +210,7 @@ class OmniBotDriver(Node):
             if self._is_news(text := f"port {self._values['port']} is open"):
                 self.get_logger().info(text)
         elif self._is_news(trouble):
-            interval_s = self._values["reconnect_interval"]
-            self.get_logger().error(f"{trouble} (retrying every {interval_s:g} s)")
+            self.get_logger().error(f"{trouble} (retrying)")
 
     def _is_news(self, text: str) -> bool:
         """Each thing once until the board is understood again: a port that flaps is no news."""
@@ -227,15 +236,18 @@ class OmniBotDriver(Node):
         self.create_service(SetBool, "~/pause", self._on_pause, callback_group=waiting)
         self.create_service(Trigger, "~/reset", self._on_reset, callback_group=waiting)
 
-    def _on_twist(self, twist: Twist) -> None:
-        self._command(lambda session, now: session.command_twist(messages.body_twist(twist), now))
+    def _on_twist(self, twist: Twist, info: MessageInfo) -> None:
+        self._command(
+            lambda session, now: session.command_twist(messages.body_twist(twist), now), info
+        )
 
-    def _on_twist_stamped(self, stamped: TwistStamped) -> None:
+    def _on_twist_stamped(self, stamped: TwistStamped, info: MessageInfo) -> None:
         age_s = messages.age(stamped.header.stamp, self.get_clock().now().nanoseconds)
         self._command(
             lambda session, now: session.command_twist(
                 messages.body_twist(stamped.twist), now, age_s=age_s
-            )
+            ),
+            info,
         )
 
     def _look_for_other_types(self) -> None:
@@ -248,18 +260,18 @@ class OmniBotDriver(Node):
             self.get_logger().warning(warning)
             self._looking.cancel()
 
-    def _on_wheels(self, wheels: Float32MultiArray) -> None:
-        self._command(lambda session, now: session.command_wheels(wheels.data, now))
+    def _on_wheels(self, wheels: Float32MultiArray, info: MessageInfo) -> None:
+        self._command(lambda session, now: session.command_wheels(wheels.data, now), info)
 
-    def _on_pose(self, goal: PoseStamped) -> None:
+    def _on_pose(self, goal: PoseStamped, info: MessageInfo) -> None:
         frame = self._message_settings.odom_frame
         self._command(
-            lambda session, now: session.command_pose(messages.goal_pose(goal, frame), now)
+            lambda session, now: session.command_pose(messages.goal_pose(goal, frame), now), info
         )
 
-    def _command(self, action: Callable[[Session, float], None]) -> None:
+    def _command(self, action: Callable[[Session, float], None], info: MessageInfo) -> None:
         try:
-            self._link.call(action)
+            self._link.command(action, info["source_timestamp"])
         except CommandRefused as error:
             self._warn_of_refusal(str(error))
 

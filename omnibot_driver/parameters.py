@@ -115,7 +115,7 @@ PARAMETERS: Final = (
         "reconnect_interval",
         0.5,
         "s",
-        "Time between two attempts to open the port.",
+        "Time until a lost port is opened again; it grows by half with each failure, to 2 s.",
         low=0.05,
         high=60.0,
     ),
@@ -126,6 +126,13 @@ PARAMETERS: Final = (
         "Where the board's own switch stands: whether it takes velocities (cmd_vel, wheel_cmd) or"
         " poses to drive to (cmd_pose).",
         choices=("velocity", "position"),
+        fixed=True,
+    ),
+    Parameter(
+        "guard",
+        True,
+        "",
+        "Have a small process of its own stop the robot when the driver is killed or hangs.",
         fixed=True,
     ),
     Parameter(

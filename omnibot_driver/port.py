@@ -4,9 +4,17 @@ It reads and writes bytes and turns every failure into a LinkError whose sentenc
 It knows no threads and no board.
 """
 
+import contextlib
 import errno
+import fcntl
+import io
+import os
 import re
+import select
+import socket
 import termios
+import time
+from pathlib import Path
 from typing import Final
 
 import serial
@@ -17,13 +25,23 @@ READ_TIMEOUT_S: Final = 0.2
 """How soon a port that cannot be interrupted returns to look whether it is still wanted."""
 WRITE_TIMEOUT_S: Final = 0.2
 MOST_AT_ONCE: Final = 4096
+PEER_TIMEOUT_MS: Final = 5000
+"""A network peer that acknowledges nothing for so long is gone."""
+PSEUDO_TERMINALS: Final = range(136, 144)
+"""Linux's major device numbers of them."""
 
 
 class Port:
-    """An open port, exclusively ours. Raises LinkError when it cannot be opened."""
+    """An open port, exclusively ours. Raises LinkError when it cannot be opened.
+
+    Linux raises DTR and RTS when the first program opens a port. Closing leaves them raised, so
+    that a board that is wired to them restarts once after plugging in at the most.
+    """
 
     def __init__(self, url: str, baudrate: int) -> None:
         self._url = url
+        self._is_terminal = False
+        self._peer: socket.socket | None = None
         try:
             self._serial = serial.serial_for_url(
                 url,
@@ -35,6 +53,19 @@ class Port:
             )
         except Exception as error:  # its URL handlers raise whatever they stumble over
             raise LinkError(_explain(url, error)) from error
+        try:
+            self._settle_in()
+        except (OSError, termios.error) as error:
+            self.close()
+            raise LinkError(_explain(url, error)) from error
+
+    @property
+    def descriptor(self) -> int | None:
+        """What another process may inherit to write the same bytes; None where there is none."""
+        try:
+            return int(self._serial.fileno())
+        except io.UnsupportedOperation:
+            return None
 
     def read(self) -> bytes:
         """All that has come in, waiting for the first byte; nothing after a while without one.
@@ -52,10 +83,15 @@ class Port:
         return data  # what came before the loss; the next call finds it again
 
     def write(self, data: bytes) -> None:
-        """All of it, or LinkError."""
+        """All of it, or LinkError; then nothing that was written and is still here will be sent."""
         try:
-            self._serial.write(data)
+            if (descriptor := self.descriptor) is None:
+                self._serial.write(data)
+            else:
+                _write_whole(descriptor, data)
         except OSError as error:
+            with contextlib.suppress(OSError, termios.error):
+                self._serial.reset_output_buffer()
             raise LinkError(f"lost {self._url} while writing: {error}") from error
 
     def interrupt(self) -> None:
@@ -66,7 +102,41 @@ class Port:
 
     def close(self) -> None:
         """Give the port back; harmless to repeat."""
+        if self._is_terminal:
+            with contextlib.suppress(OSError):
+                fcntl.ioctl(self._serial.fileno(), termios.TIOCNXCL)
+        self._is_terminal = False
         self._serial.close()
+        if self._peer is not None:
+            self._peer.close()  # pyserial leaves a socket open whose peer has gone
+
+    def _settle_in(self) -> None:
+        descriptor = self.descriptor
+        self._is_terminal = descriptor is not None and os.isatty(descriptor)
+        if descriptor is not None and self._is_terminal:
+            attributes = termios.tcgetattr(descriptor)
+            attributes[2] &= ~termios.HUPCL
+            termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
+            # A pseudo-terminal would stay exclusive after the death of its user.
+            if os.major(os.fstat(descriptor).st_rdev) not in PSEUDO_TERMINALS:
+                fcntl.ioctl(descriptor, termios.TIOCEXCL)
+        peer = getattr(self._serial, "_socket", None)  # pyserial has no public name for it
+        if isinstance(peer, socket.socket):
+            self._peer = peer
+            peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, PEER_TIMEOUT_MS)
+
+
+def _write_whole(descriptor: int, data: bytes) -> None:
+    """Unlike pyserial's, it sleeps while there is no room, and late is not failed."""
+    until = time.monotonic() + WRITE_TIMEOUT_S
+    while True:
+        with contextlib.suppress(BlockingIOError):
+            data = data[os.write(descriptor, data) :]
+        if not data:
+            return
+        left_s = max(0.0, until - time.monotonic())
+        if not select.select([], [descriptor], [], left_s)[1]:
+            raise TimeoutError(f"it takes no more bytes for {WRITE_TIMEOUT_S:g} s")
 
 
 def _explain(url: str, error: Exception) -> str:
@@ -93,7 +163,20 @@ def _explain(url: str, error: Exception) -> str:
         )
     if code in (errno.EAGAIN, errno.EBUSY):
         return (
-            f"{url} is in use by another program, perhaps a second driver:"
-            f" `fuser {url}` names it; end it first"
+            f"{url} is in use by another program{_owner(url)}, perhaps a second driver:"
+            f" end it first (`fuser {url}` names it; the guard of a killed driver leaves by itself)"
         )
     return f"cannot open {url}: {error}; check the parameter `port`"
+
+
+def _owner(path: str) -> str:
+    """Who holds the lock on this file, in brackets; nothing where it cannot be known."""
+    with contextlib.suppress(OSError):
+        status = os.stat(path)
+        device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}"
+        for line in Path("/proc/locks").read_text(encoding="ascii").splitlines():
+            _, kind, _, _, pid, file, *_ = line.replace("-> ", "").split()
+            if kind == "FLOCK" and file == f"{device}:{status.st_ino}":
+                name = Path(f"/proc/{pid}/comm").read_text(encoding="utf-8").strip()
+                return f" (process {pid}, {name})"
+    return ""

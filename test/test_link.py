@@ -1,10 +1,20 @@
 """The threads around a session, on a real pseudo-terminal and without ROS."""
 
 import contextlib
+import ctypes
+import fcntl
+import itertools
 import os
+import select
 import socket
+import struct
+import termios
 import threading
-from collections.abc import Iterator, Sequence
+import time
+import tty
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,13 +27,15 @@ from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
-from omnibot_driver.core.session import Event, ImuEstimate, Session, SessionSettings
+from omnibot_driver.core.session import Event, ImuEstimate, Notice, Session, SessionSettings
 from omnibot_driver.link import Link
 from omnibot_driver.port import Port
 from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
+from omnibot_driver.standstill import SETTLE_S
 
 PATIENCE_S = 20.0
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+LAST_WORDS = bytes(8) + STOP + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
 
 
 class Listener:
@@ -59,11 +71,11 @@ class Listener:
             assert self._changed.wait_for(predicate, PATIENCE_S)
 
 
-def session() -> Session:
+def session(*, run: bool = True) -> Session:
     settings = SessionSettings(
         limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
     )
-    return Session(OmniBot(OmniBotSettings()), settings, run=True)
+    return Session(OmniBot(OmniBotSettings()), settings, run=run)
 
 
 def link_to(url: str, listener: Listener, session: Session) -> Link:
@@ -71,6 +83,7 @@ def link_to(url: str, listener: Listener, session: Session) -> Link:
         session,
         url,
         115200,
+        last_words=LAST_WORDS,
         reconnect_interval_s=0.02,
         deliver=listener.deliver,
         report=listener.report,
@@ -157,6 +170,168 @@ def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
     never.close("stop")
 
 
+def test_attempts_are_made_less_and_less_often_up_to_a_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each wait is half as long again as the one before; a limit keeps the board from waiting."""
+    listener, times = Listener(), list[float]()
+    listener.report = lambda _trouble: times.append(time.monotonic())  # type: ignore[method-assign]
+    link = link_to("/no/such/port", listener, session())
+    link.start()
+    while len(times) < 6:
+        time.sleep(0.01)
+    link.close("stop")
+    for number, (before, after) in enumerate(itertools.pairwise(times[:6])):
+        assert after - before >= 0.02 * 1.5**number
+    monkeypatch.setattr("omnibot_driver.link.LONGEST_WAIT_S", 0.0)
+    listener = Listener()
+    link = link_to("/no/such/port", listener, session())
+    link.start()
+    listener.wait_for(lambda: len(listener.reports) > 40)  # unlimited, that took days
+    link.close("stop")
+
+
+def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_path: Path) -> None:
+    """Behind the link that udev keeps; the command from before is forgotten."""
+    name = tmp_path / "omnibot"
+    listener, ours = Listener(), session()
+    with PtyBoard(SimulatedBoard()) as second:
+        with PtyBoard(SimulatedBoard(), str(name)) as first:
+            link = link_to(str(name), listener, ours)
+            link.start()
+            listener.wait_for(lambda: ours.state == "nominal")
+            link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
+            assert first.wait_for(lambda b: b.commands[-1].kind == "velocity", PATIENCE_S)
+        listener.wait_for(lambda: ours.state == "disconnected")
+        name.symlink_to(second.path)
+        listener.wait_for(lambda: ours.state == "nominal")
+        assert second.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
+        with second.lock:
+            assert "velocity" not in [command.kind for command in second.board.commands]
+        link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
+        assert second.wait_for(lambda b: b.commands[-1].kind == "velocity", PATIENCE_S)
+        link.close("stop")
+        assert first.path != second.path
+
+
+class Terminal:
+    """A pseudo-terminal with nobody behind it who reads."""
+
+    def __init__(self) -> None:
+        self.far, self._near = os.openpty()
+        tty.setraw(self._near)
+        os.set_blocking(self._near, False)
+        os.set_blocking(self.far, False)
+        self.path = os.ttyname(self._near)
+
+    def fill(self) -> None:
+        """Until the kernel takes no more, not even after moving it from one buffer to the next."""
+        taken = 1
+        while taken:
+            taken = 0
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    taken += os.write(self._near, b"x")
+            time.sleep(0.05)
+
+    def read_until(self, words: bytes) -> bytes:
+        """All that has been written, up to the time when these words are in it."""
+        heard, end = b"", time.monotonic() + PATIENCE_S
+        while words not in heard:
+            assert select.select([self.far], [], [], end - time.monotonic())[0], heard
+            heard += os.read(self.far, 4096)
+        return heard
+
+    def close(self) -> None:
+        os.close(self.far)
+        os.close(self._near)
+
+
+@pytest.fixture
+def terminal() -> Iterator[Terminal]:
+    terminal = Terminal()
+    yield terminal
+    terminal.close()
+
+
+def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
+    terminal: Terminal,
+) -> None:
+    """A board that hung may hold half a command; S, which found no room, is not what it needs."""
+    listener = Listener()
+    link = link_to(terminal.path, listener, session())
+    link.start()
+    terminal.read_until(STOP + b"S")
+    terminal.fill()
+    listener.wait_for(lambda: any("while writing" in str(text) for text in listener.reports))
+    heard = terminal.read_until(STOP + b"S")
+    assert heard.lstrip(b"x").startswith(bytes(8) + STOP + b"S")
+    link.close("stop")
+
+
+def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) -> None:
+    """Closing does not hang; the robot is stopped as soon as the board listens again."""
+    listener, ours = Listener(), session(run=False)
+    link = link_to(terminal.path, listener, ours)
+    link.start()
+    terminal.read_until(STOP)
+    terminal.fill()
+    link.close("stop")
+    terminal.read_until(LAST_WORDS)
+    wait_for_threads_to_end()
+
+
+def wait_for_threads_to_end() -> None:
+    for thread in threading.enumerate():
+        if thread.name.startswith("omnibot-"):
+            thread.join(PATIENCE_S)
+
+
+def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
+    """The driver is then the only one who can stop the robot."""
+    listener = Listener()
+    link = link_to("loop://", listener, session())
+    link.start()
+    listener.wait_for(lambda: listener.events)
+    notices = [event.text for event in listener.events if isinstance(event, Notice)]
+    link.close("stop")
+    assert len(notices) == 1
+    assert "guard" in notices[0]
+
+
+def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(board: PtyBoard) -> None:
+    """A deliverer that hangs keeps the pacer from passing; then no command is fresh."""
+    listener, ours = Listener(), session()
+    link = link_to(board.path, listener, ours)
+    link.start()
+    listener.wait_for(lambda: ours.state == "nominal")
+    link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
+    drive = partial(link.command, lambda s, now: s.command_twist(BodyTwist(0.2, 0.0, 0.0), now))
+    drive(time.time_ns())
+    hold, held = threading.Event(), threading.Event()
+
+    def hang(_session: Session, _now: float) -> None:
+        held.set()
+        hold.wait(PATIENCE_S)
+
+    holder = threading.Thread(target=link.call, args=(hang,))
+    holder.start()
+    held.wait(PATIENCE_S)
+    assert board.wait_for(lambda b: b.estopped, PATIENCE_S)
+    sent_ns = time.time_ns()
+    hold.set()
+    holder.join(PATIENCE_S)
+    with pytest.raises(CommandRefused, match="waited"):
+        drive(sent_ns)
+    listener.wait_for(lambda: any("stood still" in str(event) for event in listener.events))
+    assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
+    fresh = time.monotonic() + SETTLE_S
+    while time.monotonic() <= fresh:
+        time.sleep(0.02)
+    drive(time.time_ns())
+    link.close("stop")
+
+
 def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
     """The terminal hangs up."""
     listener, ours = Listener(), session()
@@ -209,6 +384,111 @@ def test_every_way_a_port_can_refuse_says_what_to_do(
     with pytest.raises(LinkError, match=advice) as caught:
         Port("/dev/ttyUSB0", 115200)
     assert caught.value.__cause__ is error
+
+
+def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
+    """By the kernel's list of locks."""
+    port = Port(terminal.path, 115200)
+    with pytest.raises(LinkError, match=rf"in use by another program \(process {os.getpid()}, "):
+        Port(terminal.path, 115200)
+    port.close()
+
+
+def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
+    """DTR falling would restart a board that is wired to it."""
+    Port(terminal.path, 115200).close()
+    near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)
+    assert not termios.tcgetattr(near)[2] & termios.HUPCL
+    os.close(near)
+
+
+def test_a_real_terminal_is_exclusive_until_it_is_closed(
+    terminal: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Programs that ask for no lock are kept out as well; a pseudo-terminal stays as it is."""
+
+    def exclusive() -> bool:
+        near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)  # as root, one may
+        answer = fcntl.ioctl(near, TIOCGEXCL, bytes(4))
+        os.close(near)
+        return answer != bytes(4)
+
+    port = Port(terminal.path, 115200)
+    assert not exclusive()
+    port.close()
+    monkeypatch.setattr("omnibot_driver.port.PSEUDO_TERMINALS", ())
+    port = Port(terminal.path, 115200)
+    assert os.geteuid() != 0 or exclusive()
+    port.close()
+    assert not exclusive()
+
+
+TIOCGEXCL = 0x80045440
+"""Linux's ioctl for whether a terminal is exclusive; the termios module does not have it."""
+
+
+def connected(server: socket.socket) -> tuple[Port, socket.socket]:
+    """A port at this server, and the far end."""
+    port = Port(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
+    return port, server.accept()[0]
+
+
+def test_a_peer_that_vanished_without_a_word_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A half-open connection: nothing is acknowledged, nothing is refused."""
+    monkeypatch.setattr("omnibot_driver.port.PEER_TIMEOUT_MS", 300)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port, far = connected(server)
+        with far, closing(port):
+            drop_everything(far)
+            port.write(STOP)
+            with pytest.raises(LinkError, match="lost"):
+                go_on(port.read)
+
+
+def go_on(action: Callable[[], object]) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        action()
+
+
+def drop_everything(peer: socket.socket) -> None:
+    """Have the kernel throw away what comes in for this socket: a packet filter that says no."""
+    program = ctypes.create_string_buffer(struct.pack("HBBI", 0x06, 0, 0, 0))
+    so_attach_filter = 26
+    peer.setsockopt(
+        socket.SOL_SOCKET, so_attach_filter, struct.pack("HP", 1, ctypes.addressof(program))
+    )
+
+
+def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
+    """Once the buffers on both sides are full."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port, far = connected(server)
+        with far, closing(port), pytest.raises(LinkError, match="while writing"):
+            go_on(lambda: port.write(bytes(100_000)))
+
+
+def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) -> None:
+    """What waited in the kernel is given up: a board that listens again hears the newest."""
+    port = Port(terminal.path, 115200)
+    terminal.fill()
+    with pytest.raises(LinkError, match="while writing"):
+        port.write(STOP)
+    port.write(STOP)
+    port.close()
+
+
+def test_a_write_that_is_taken_in_pieces_is_completed(terminal: Terminal) -> None:
+    """The kernel takes what there is room for, and the rest when somebody reads."""
+    port = Port(terminal.path, 115200)
+    message = b"".join(b"%05d" % number for number in range(8000))
+    reader = threading.Thread(target=lambda: heard.append(terminal.read_until(b"07999")))
+    heard: list[bytes] = []
+    reader.start()
+    port.write(message)
+    reader.join(PATIENCE_S)
+    assert heard == [message]
+    port.close()
 
 
 def test_a_board_behind_a_socket_is_served_as_well() -> None:

@@ -26,6 +26,7 @@ PROMISED: dict[str, object] = {
     "auto_start": True,
     "on_exit": "stop",
     "reconnect_interval": 0.5,
+    "guard": True,
     "linear_scale": 70.0,
     "angular_scale": 500.0,
     "control_method": "velocity",

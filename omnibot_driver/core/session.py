@@ -179,6 +179,18 @@ class Session:
                 self._supervisor.heard_nothing(now)
         self._supervisor.tick(now)
 
+    def stood_still(self, seconds: float, now: float) -> None:
+        """This process, or its watchdog, did not run for so long: no command is current."""
+        if not self._closed:
+            self._heard_at = now  # the silence was ours
+            self._commands.halt(now)
+            self._events.append(
+                Notice(
+                    f"the driver stood still for {seconds:.1f} s: the robot is stopped"
+                    " until a new command comes"
+                )
+            )
+
     # What is wanted
 
     def command_twist(self, twist: BodyTwist, now: float, *, age_s: float = 0.0) -> None:

@@ -651,3 +651,22 @@ def test_a_robot_that_drove_on_unheard_is_where_it_is_once_it_is_heard_again() -
     assert math.hypot(truth.x_m, truth.y_m) > 0.7
     assert math.hypot(pose.x_m - truth.x_m, pose.y_m - truth.y_m) < 0.005
     assert pose.yaw_rad == pytest.approx(truth.yaw_rad, abs=0.005)
+
+
+def test_a_driver_that_stood_still_has_no_command_and_blames_nobody(bench: Bench) -> None:
+    """What was current is not repeated; the silence was its own."""
+    bench.drive(vx=0.3)
+    bench.run(0.2)
+    mark = len(bench.written)
+    bench.now += 3.0
+    bench.session.stood_still(3.0, bench.now)
+    bench.session.tick(bench.now)
+    bench.settle()
+    bench.run(2.0)
+    assert {data for _, data in bench.written[mark:]} == {STOP}
+    assert bench.still()
+    assert bench.notices == [
+        "the driver stood still for 3.0 s: the robot is stopped until a new command comes"
+    ]
+    bench.drive(vx=0.3)
+    assert bench.board.commands[-1].kind == "velocity"

@@ -16,15 +16,22 @@ _namespaces = (f"robot{number}" for number in itertools.count())
 
 
 class Driver:
-    """``python -m omnibot_driver.driver`` as a process of its own, in a namespace of its own."""
+    """``python -m omnibot_driver.driver`` as a process of its own, in a namespace of its own.
 
-    def __init__(self, *, port: str, **parameters: object) -> None:
+    ``before``: Python to be run in that process first.
+    """
+
+    def __init__(self, *, port: str, before: str = "", **parameters: object) -> None:
         self.namespace = next(_namespaces)
         arguments = ["--ros-args", "-r", f"__ns:=/{self.namespace}"]
         for name, value in {"port": port, **parameters}.items():
             arguments += ["-p", f"{name}:={value}"]
+        program = ["-m", "omnibot_driver.driver"]
+        if before:
+            main = "import sys, omnibot_driver.driver as driver; sys.exit(driver.main())"
+            program = ["-c", f"{before}\n{main}"]
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "omnibot_driver.driver", *arguments],
+            [sys.executable, *program, *arguments],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

@@ -2,10 +2,12 @@
 
 import contextlib
 import os
+import select
 import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,12 +19,14 @@ from probe import Probe
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParameters
 from sensor_msgs.msg import Imu
+from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from omnibot_driver.simulator import BoardMode, PtyBoard, SimulatedBoard
 
 Start = Callable[..., Any]
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+LAST_WORDS = bytes(8) + STOP + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
 
 
 def driving(probe: Probe, board: PtyBoard) -> None:
@@ -56,6 +60,63 @@ def test_a_signal_while_driving_ends_with_the_stop_frame_and_exit_code_zero(
     assert driver.end(*signals) == 0
     assert "Traceback" not in driver.output
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), 20.0)
+
+
+EXPLODES = """
+import omnibot_driver.node as node
+def explode(self, message):
+    raise ZeroDivisionError("a defect in a callback")
+node.OmniBotDriver._on_estop_topic = explode
+"""
+SHUTS_DOWN = """
+import rclpy, omnibot_driver.node as node
+node.OmniBotDriver._on_estop_topic = lambda self, message: rclpy.shutdown()
+"""
+
+
+@pytest.mark.parametrize(("before", "exit_code"), [(EXPLODES, 1), (SHUTS_DOWN, 0)])
+def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
+    start_board: Start, start_driver: Start, probe_of: Start, before: str, exit_code: int
+) -> None:
+    """The exit code tells which of them it was."""
+    board = start_board()
+    driver: Driver = start_driver(board.path, before=before, cmd_vel_timeout=10.0)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    driving(probe, board)
+    probe.publisher(Bool, "estop").publish(Bool(data=True))
+    assert driver.process.wait(20.0) == exit_code, driver.output
+    assert ("a defect in a callback" in driver.output) == bool(exit_code)
+    assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), 20.0)
+
+
+def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
+    start_driver: Start, probe_of: Start, silent_terminal: tuple[int, str]
+) -> None:
+    """The kernel's buffer is full, so the farewell does not fit in; the guard goes on trying."""
+    far, path = silent_terminal
+    driver: Driver = start_driver(path, auto_start=False)
+    probe_of(driver).wait_for_state("connecting")
+    assert os.read(far, 100).endswith(STOP)
+    fill(path)
+    assert driver.end(signal.SIGINT) == 0
+    heard = b""
+    while LAST_WORDS not in heard:
+        assert select.select([far], [], [], 20.0)[0], heard
+        heard += os.read(far, 4096)
+
+
+def fill(terminal: str) -> None:
+    """Until the kernel takes no more, not even after moving it from one buffer to the next."""
+    descriptor = os.open(terminal, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    taken = 1
+    while taken:
+        taken = 0
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                taken += os.write(descriptor, b"x")
+        time.sleep(0.05)
+    os.close(descriptor)
 
 
 @pytest.mark.parametrize(
@@ -288,11 +349,11 @@ def test_a_log_that_nobody_reads_does_not_keep_the_robot_moving(start_board: Sta
 
 
 def test_a_port_that_flaps_is_told_once(start_driver: Start) -> None:
-    """A server that hangs up at once, twenty times."""
+    """A server that hangs up at once, again and again."""
     server = socket.create_server(("127.0.0.1", 0))
     port = f"socket://127.0.0.1:{server.getsockname()[1]}"
     driver: Driver = start_driver(port, reconnect_interval=0.05)
-    for _ in range(20):
+    for _ in range(8):
         peer, _ = server.accept()
         peer.close()
     server.close()

@@ -1,0 +1,102 @@
+"""Keeps a guard beside an open port: the driver's side of `guard.py`.
+
+It starts the process, beats for it, replaces it when it dies, and sends it away. It knows no
+threads and no board; whoever uses it calls ``beat`` from the thread whose life matters.
+"""
+
+import contextlib
+import math
+import os
+import subprocess
+import sys
+from typing import Final
+
+from omnibot_driver import guard
+
+BEAT_S: Final = 0.1
+RESTART_S: Final = 1.0
+"""A guard that dies at once is not started more often than this."""
+LEAVES_WITHIN_S: Final = 0.5
+SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + LEAVES_WITHIN_S
+
+
+class Keeper:
+    """A guard for one open port, from now until ``end``.
+
+    ``last_words``: what the guard is to say. ``trouble``: a sentence once the guard is not as it
+    should be, to be taken away by whoever tells it.
+    """
+
+    def __init__(self, descriptor: int, last_words: bytes) -> None:
+        self.trouble = ""
+        self._descriptor = descriptor
+        self._last_words = last_words
+        self._process: subprocess.Popen[bytes] | None = None
+        self._restart_at = -math.inf
+        self._told = False
+        self._start()
+
+    def beat(self, now: float) -> None:
+        """The driver is alive; call it every ``BEAT_S``."""
+        if self._process is not None:
+            assert self._process.stdin is not None
+            try:
+                os.write(self._process.stdin.fileno(), guard.BEAT)
+            except BlockingIOError:
+                pass  # it is being kept from reading; what waits for it shows that we live
+            except OSError:
+                code = self._dismiss(guard.BYE, LEAVES_WITHIN_S)
+                self._tell(f"the guard process died (exit code {code}); another one is started")
+        if self._process is None and now >= self._restart_at:
+            self._restart_at = now + RESTART_S
+            self._start()
+
+    def end(self, *, stopped: bool) -> None:
+        """It leaves, and the port is ours alone; harmless to repeat.
+
+        Unless the robot is known to have been ``stopped``, it says its last words first.
+        """
+        self._restart_at = math.inf
+        if stopped:
+            self._dismiss(guard.BYE, LEAVES_WITHIN_S)
+        else:
+            self._dismiss(b"", SPEAKS_WITHIN_S)
+
+    def _start(self) -> None:
+        command = [sys.executable, "-I", "-S", guard.__file__]
+        try:
+            self._process = subprocess.Popen(
+                [*command, str(self._descriptor), self._last_words.hex()],
+                bufsize=0,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                pass_fds=(self._descriptor,),
+                start_new_session=True,  # ctrl-C is for the driver alone
+            )
+        except OSError as error:
+            self._tell(f"no guard process can be started ({error}): {WITHOUT_GUARD}")
+            return
+        assert self._process.stdin is not None
+        os.set_blocking(self._process.stdin.fileno(), False)
+
+    def _dismiss(self, word: bytes, within_s: float) -> int | None:
+        if self._process is None:
+            return None
+        process, self._process = self._process, None
+        assert process.stdin is not None
+        with contextlib.suppress(OSError):
+            process.stdin.write(word)
+        process.stdin.close()
+        try:
+            return process.wait(within_s)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return process.wait()
+
+    def _tell(self, trouble: str) -> None:
+        if not self._told:
+            self._told, self.trouble = True, trouble
+
+
+WITHOUT_GUARD: Final = "if the driver is killed, the robot goes on with its last command"

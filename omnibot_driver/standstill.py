@@ -1,0 +1,48 @@
+"""Did this process stand still? SIGSTOP, a swapped-out host, a thread that hangs.
+
+While it did, its watchdog did too, and commands went on arriving for it. So when it runs again,
+nothing that was sent meanwhile is a command any more. This module is told the time and whether the
+watchdog's thread runs; it knows no threads and no commands.
+"""
+
+import math
+from typing import Final
+
+STANDSTILL_S: Final = 0.4
+"""A thread that ought to pass ten times a second has not for so long. It is less than the guard's
+limit: whenever the guard steps in, this is noticed as well."""
+SETTLE_S: Final = 0.25
+"""What comes so soon after a standstill had been waiting, whatever the sender's clock says."""
+
+
+class Standstill:
+    """``passed`` by the watchdog's thread, ``begun`` by every thread before it does something."""
+
+    def __init__(self) -> None:
+        self._passed_at = math.inf
+        self._begun = False
+        self._over_at = -math.inf
+        self._from_ns = self._until_ns = 0
+
+    def begun(self, now: float) -> float:
+        """Its length in seconds so far, once for each standstill; otherwise 0."""
+        length_s = now - self._passed_at
+        if self._begun or length_s < STANDSTILL_S:
+            return 0.0
+        self._begun = True
+        return length_s
+
+    def passed(self, now: float, wall_ns: int) -> None:
+        """The watchdog's thread runs; ``wall_ns`` is the time of day."""
+        if self._begun:
+            self._begun = False
+            self._over_at = now
+            self._from_ns = wall_ns - round((now - self._passed_at) * 1e9)
+            self._until_ns = wall_ns
+        self._passed_at = now
+
+    def outlived_by(self, sent_ns: int, now: float) -> bool:
+        """A command, sent at this time of day by the sender's clock, is not from before its end."""
+        if self._begun or now < self._over_at + SETTLE_S:
+            return False
+        return not self._from_ns <= sent_ns <= self._until_ns

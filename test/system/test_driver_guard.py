@@ -1,0 +1,186 @@
+"""A host that is lost: the driver is killed, crashes or hangs while the robot moves."""
+
+import contextlib
+import os
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from driver_process import PATIENCE_S, Driver
+from geometry_msgs.msg import Twist, TwistStamped
+from probe import Probe
+
+from omnibot_driver.simulator import PtyBoard, SimulatedBoard
+
+Start = Callable[..., Any]
+ZEROS = bytes(8)
+STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+EMERGENCY_STOP = bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+LAST_WORDS = ZEROS + STOP + EMERGENCY_STOP
+
+
+def twist(vx_mps: float) -> Twist:
+    message = Twist()
+    message.linear.x = vx_mps
+    return message
+
+
+def driving(probe: Probe, board: PtyBoard) -> Any:
+    """The robot moves; returns the publisher of its commands."""
+    commands = probe.publisher(Twist, "cmd_vel")
+    commands.publish(twist(0.3))
+    assert board.wait_for(lambda b: b.truth.vx_mps > 0.1, PATIENCE_S)
+    return commands
+
+
+def still(board: SimulatedBoard) -> bool:
+    truth = board.truth
+    return max(abs(truth.vx_mps), abs(truth.vy_mps), abs(truth.yaw_rate)) < 0.01
+
+
+def guards_of(driver: Driver) -> list[int]:
+    """The processes that share the driver's port and are not the driver."""
+    found = []
+    for directory in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            parent = int((directory / "stat").read_text().rpartition(")")[2].split()[1])
+            if parent == driver.process.pid and b"guard.py" in (directory / "cmdline").read_bytes():
+                found.append(int(directory.name))
+    return found
+
+
+def wait_until(predicate: Callable[[], object]) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while not predicate():
+        assert time.monotonic() < end, "it did not come about"
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
+def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
+    board: PtyBoard, driver: Driver, probe: Probe, number: signal.Signals
+) -> None:
+    """Without a chance to do anything about it itself."""
+    driving(probe, board)
+    assert driver.end(number) == -number
+    assert board.wait_for(still, PATIENCE_S)
+    with board.lock:
+        assert board.board.estopped
+        assert bytes(board.board.received).endswith(LAST_WORDS)
+
+
+def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
+    board: PtyBoard, driver: Driver, probe: Probe, start_driver: Start, probe_of: Start
+) -> None:
+    """It is refused for a second at the most, and goes on trying."""
+    driving(probe, board)
+    driver.end(signal.SIGKILL)
+    successor: Driver = start_driver(board.path)
+    again: Probe = probe_of(successor)
+    again.wait_for_state("nominal")
+    driving(again, board)
+
+
+def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
+    board: PtyBoard, driver: Driver, probe: Probe
+) -> None:
+    """A command that waited in the middleware while it hung is none."""
+    commands = driving(probe, board)
+    driver.process.send_signal(signal.SIGSTOP)
+    assert board.wait_for(lambda b: bytes(b.received).endswith(LAST_WORDS), PATIENCE_S)
+    assert board.wait_for(still, PATIENCE_S)
+    deaf = board.board.tick + 200  # longer than a board may be silent
+    assert board.wait_for(lambda b: b.tick > deaf, PATIENCE_S)
+    with board.lock:
+        mark = len(board.board.commands)
+    for _ in range(20):
+        commands.publish(twist(0.2))
+    driver.process.send_signal(signal.SIGCONT)
+    driver.wait_for_line("the driver stood still for .* s")
+    driver.wait_for_line("motion command refused: it waited")
+    assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
+    with board.lock:
+        kinds = {command.kind for command in list(board.board.commands)[mark:]}
+    assert kinds <= {"wheels", "estop"}
+    wait_until(lambda: commands.publish(twist(0.3)) or not still(board.board))
+    assert "nothing comes from the board" not in driver.output
+    driver.end(signal.SIGKILL)
+    assert board.wait_for(still, PATIENCE_S)
+
+
+def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
+    board: PtyBoard, start_driver: Start, probe_of: Start
+) -> None:
+    """Its stamp may be that of a planner that knows nothing of this."""
+    driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    commands = probe.publisher(TwistStamped, "cmd_vel")
+    driver.process.send_signal(signal.SIGSTOP)
+    stamped = TwistStamped(twist=twist(0.2))
+    stamped.header.stamp = probe.node.get_clock().now().to_msg()
+    commands.publish(stamped)
+    assert board.wait_for(lambda b: bytes(b.received).endswith(LAST_WORDS), PATIENCE_S)
+    driver.process.send_signal(signal.SIGCONT)
+    driver.wait_for_line("motion command refused: it waited")
+    with board.lock:
+        assert "velocity" not in [command.kind for command in board.board.commands]
+
+
+def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
+    board: PtyBoard, driver: Driver, probe: Probe
+) -> None:
+    """The user hears of it once."""
+    driving(probe, board)
+    (first,) = guards_of(driver)
+    os.kill(first, signal.SIGKILL)
+    driver.wait_for_line("the guard process died.*another one is started")
+    wait_until(lambda: guards_of(driver) not in ([], [first]))
+    driver.end(signal.SIGKILL)
+    assert board.wait_for(lambda b: b.estopped, PATIENCE_S)
+    assert board.wait_for(still, PATIENCE_S)
+
+
+def test_every_connection_has_one_guard_and_no_process_stays_behind(
+    start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
+) -> None:
+    """Over reconnections, and after the end."""
+    link = tmp_path / "omnibot"
+    driver: Driver = start_driver(str(link), reconnect_interval=0.05)
+    probe: Probe = probe_of(driver)
+    seen = set()
+    for _ in range(5):
+        with PtyBoard(SimulatedBoard(), str(link)):
+            probe.wait_for_state("nominal")
+            (guard,) = guards_of(driver)
+            seen.add(guard)
+        probe.wait_for_state("disconnected")
+        wait_until(lambda: not guards_of(driver))
+    assert len(seen) == 5
+    start_board(link=str(link))
+    probe.wait_for_state("nominal")
+    (guard,) = guards_of(driver)
+    assert driver.end(signal.SIGINT) == 0
+    assert not Path(f"/proc/{guard}").exists()
+
+
+def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: Probe) -> None:
+    """Whoever ends it by ctrl-C does not find an e-stop afterwards."""
+    driving(probe, board)
+    assert driver.end(signal.SIGINT) == 0
+    with board.lock:
+        assert not board.board.estopped
+        assert EMERGENCY_STOP not in bytes(board.board.received)
+
+
+def test_the_guard_can_be_done_without(board: PtyBoard, start_driver: Start) -> None:
+    """``guard: false``, for a debugger's sake."""
+    driver: Driver = start_driver(board.path, guard=False)
+    driver.wait_for_line("state: nominal")
+    assert guards_of(driver) == []
+    driver.end(signal.SIGKILL)
+    with board.lock:
+        assert EMERGENCY_STOP not in bytes(board.board.received)

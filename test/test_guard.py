@@ -1,0 +1,230 @@
+"""The guard as a process, on a real pseudo-terminal, with and without its keeper."""
+
+import ast
+import contextlib
+import os
+import select
+import signal
+import time
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from omnibot_driver import guard
+from omnibot_driver.keeper import Keeper
+
+PATIENCE_S = 20.0
+LAST_WORDS = b"these are my last words"
+
+
+class Line:
+    """A pseudo-terminal: ``near`` is the driver's port; the far end is read here."""
+
+    def __init__(self) -> None:
+        self._far, self.near = os.openpty()
+        tty.setraw(self.near)
+        os.set_blocking(self.near, False)
+        self.heard = b""
+
+    def hear(self, words: bytes) -> bytes:
+        """Everything so far, once these words are in it."""
+        end = time.monotonic() + PATIENCE_S
+        while words not in self.heard:
+            assert select.select([self._far], [], [], end - time.monotonic())[0], self.heard
+            self.heard += os.read(self._far, 4096)
+        return self.heard
+
+    def fill(self) -> None:
+        """Until the kernel takes no more, not even after moving it from one buffer to the next."""
+        taken = 1
+        while taken:
+            taken = 0
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    taken += os.write(self.near, b"x")
+            time.sleep(0.05)
+
+    def hang_up(self) -> None:
+        os.close(self._far)
+        self._far = -1
+
+    def close(self) -> None:
+        os.close(self.near)
+        if self._far >= 0:
+            os.close(self._far)
+
+
+@pytest.fixture
+def line() -> Iterator[Line]:
+    descriptors = len(os.listdir("/proc/self/fd"))
+    line = Line()
+    yield line
+    line.close()
+    assert len(os.listdir("/proc/self/fd")) == descriptors
+    assert children() == [], "a process is left behind, or a zombie"
+
+
+def children() -> list[int]:
+    """Our child processes, zombies included."""
+    found = []
+    for directory in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            after_name = (directory / "stat").read_text().rpartition(")")[2].split()
+            if int(after_name[1]) == os.getpid():
+                found.append(int(directory.name))
+    return found
+
+
+def started(pid: int) -> None:
+    """Wait until Python has come up in it, and it does not heed SIGTERM any more."""
+    end = time.monotonic() + PATIENCE_S
+    bit = 1 << (signal.SIGTERM - 1)
+    while not int(status_of(pid, "SigIgn"), 16) & bit:
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def status_of(pid: int, field: str) -> str:
+    text = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
+    return text.partition(f"{field}:")[2].split()[0]
+
+
+def alive(keeper: Keeper, seconds: float) -> None:
+    """Beat as the driver does."""
+    end = time.monotonic() + seconds
+    while (now := time.monotonic()) < end:
+        keeper.beat(now)
+        time.sleep(0.05)
+
+
+def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
+    """It has stopped the robot itself; not a byte is added."""
+    keeper = Keeper(line.near, LAST_WORDS)
+    alive(keeper, 0.2)
+    keeper.end(stopped=True)
+    keeper.end(stopped=True)
+    os.write(line.near, b"end")
+    assert line.hear(b"end") == b"end"
+
+
+def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None:
+    """For a second, since the board may be deaf just now; then it leaves."""
+    keeper = Keeper(line.near, LAST_WORDS)
+    keeper.end(stopped=False)
+    assert line.hear(guard.TIMES * LAST_WORDS) == guard.TIMES * LAST_WORDS
+
+
+def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line: Line) -> None:
+    """And it goes on guarding: the next time as well."""
+    keeper = Keeper(line.near, LAST_WORDS)
+    alive(keeper, 2 * guard.LIMIT_S)
+    assert line.heard == b""
+    line.hear(2 * LAST_WORDS)
+    alive(keeper, 2 * guard.LIMIT_S)
+    os.write(line.near, b"and again: ")
+    heard = line.hear(b"and again: " + LAST_WORDS)
+    assert heard.partition(b"and again: ")[0].count(LAST_WORDS) < guard.TIMES
+    keeper.end(stopped=True)
+
+
+def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
+    """What waits there is old commands; nobody reads until the guard has gone."""
+    keeper = Keeper(line.near, LAST_WORDS)
+    line.fill()
+    keeper.end(stopped=False)
+    line.hear(LAST_WORDS)
+
+
+def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
+    """It leaves, and so does the driver."""
+    keeper = Keeper(line.near, LAST_WORDS)
+    line.hang_up()
+    keeper.end(stopped=False)
+
+
+def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
+    """And the new one guards."""
+    keeper = Keeper(line.near, LAST_WORDS)
+    (first,) = children()
+    os.kill(first, signal.SIGKILL)
+    end = time.monotonic() + PATIENCE_S
+    while children() in ([first], []):
+        assert time.monotonic() < end
+        alive(keeper, 0.1)
+    assert "exit code -9" in keeper.trouble
+    assert "another one is started" in keeper.trouble
+    keeper.trouble = ""
+    (second,) = children()
+    os.kill(second, signal.SIGKILL)
+    while children() in ([second], []):
+        assert time.monotonic() < end
+        alive(keeper, 0.1)
+    assert keeper.trouble == ""
+    keeper.end(stopped=False)
+    line.hear(LAST_WORDS)
+
+
+def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The driver drives on without."""
+    with monkeypatch.context() as without:
+        without.setattr("sys.executable", "/no/python")
+        keeper = Keeper(line.near, LAST_WORDS)
+        keeper.beat(1000.0)
+    assert "no guard process can be started" in keeper.trouble
+    keeper.beat(1000.5)
+    assert children() == []
+    keeper.beat(1001.5)
+    keeper.end(stopped=False)
+    line.hear(LAST_WORDS)
+
+
+def test_a_guard_that_is_stopped_blocks_neither_beating_nor_ending(line: Line) -> None:
+    """Its pipe fills up, and it does not hear the good-bye."""
+    keeper = Keeper(line.near, LAST_WORDS)
+    (pid,) = children()
+    os.kill(pid, signal.SIGSTOP)
+    for _ in range(70_000):
+        keeper.beat(1000.0)
+    assert keeper.trouble == ""
+    keeper.end(stopped=True)
+
+
+def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
+    """Ctrl-C does not reach its session; SIGTERM to a whole group does, and is not for it."""
+    keeper = Keeper(line.near, LAST_WORDS)
+    (pid,) = children()
+    assert os.getsid(pid) == pid
+    started(pid)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        os.kill(pid, number)
+    keeper.end(stopped=False)
+    line.hear(LAST_WORDS)
+
+
+def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
+    """None of the driver's sockets and files; no module but a few of Python's own."""
+    keeper = Keeper(line.near, LAST_WORDS)
+    (pid,) = children()
+    started(pid)
+    opened = [os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir()]
+    resident_kb = int(status_of(pid, "VmRSS"))
+    keeper.end(stopped=True)
+    assert sorted(name.partition(":")[0] for name in opened) == [
+        *["/dev/null"] * 2,
+        os.ttyname(line.near),
+        "pipe",
+    ]
+    assert resident_kb < 20_000
+    tree = ast.parse(Path(guard.__file__).read_text(encoding="utf-8"))
+    imported = {
+        alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import)
+        for alias in node.names
+    }
+    assert imported == {"contextlib", "os", "select", "signal", "sys", "termios"}
+    assert not any(isinstance(node, ast.ImportFrom) for node in ast.walk(tree))
