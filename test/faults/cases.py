@@ -1,0 +1,313 @@
+"""The faults, scripted: what happens while somebody drives, and what has to come of it.
+
+A case gets a rig whose robot stands and leaves it so; ``findings`` collects what it has to say.
+"""
+
+import signal
+from collections.abc import Callable
+from functools import partial
+from random import Random
+from typing import Final
+
+from driver_process import Driver
+from geometry_msgs.msg import Twist
+from line import Damage, cut, gaining, late, losing, losing_bursts, noise
+from rig import TICK_S, TIMEOUT_S, Rig
+from std_msgs.msg import Bool, Float32MultiArray
+from std_srvs.srv import SetBool, Trigger
+
+Case = Callable[[Rig], None]
+
+NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
+HANGS_S: Final = 1.0
+"""So long the guard waits for a sign of life."""
+SILENCE_S: Final = 1.5
+"""So long a board may say nothing before the driver holds it for lost."""
+
+
+def ticks(seconds: float) -> int:
+    return round(seconds / TICK_S)
+
+
+# Whoever commands
+
+
+def publisher_ceases(rig: Rig) -> None:
+    rig.drive()
+    rig.hand.leave()
+    rig.expect_still(rig.line.tick, "the publisher ceases")
+
+
+def publisher_sends_nonsense(rig: Rig) -> None:
+    rig.drive()
+    since = rig.line.tick + ticks(0.05)
+    for value in NONSENSE:
+        rig.hand.hold(value, 0.0, 0.0)
+        rig.wait_ticks(25)
+    rig.expect_still(since, "the publisher sends NaN and infinity")
+    rig.hand.leave()
+
+
+def wheel_commands_of_the_wrong_size(rig: Rig) -> None:
+    publisher = rig.probe.publisher(Float32MultiArray, "wheel_cmd")
+    rig.drive()
+    rig.hand.leave()
+    since = rig.line.tick
+    for data in ([], [5.0], [5.0, 5.0], [5.0] * 4, [float("nan"), 5.0, 5.0], [5.0] * 1000):
+        publisher.publish(Float32MultiArray(data=data))
+        rig.wait_ticks(10)
+    rig.expect_still(since, "wheel commands of the wrong size")
+    rig.probe.node.destroy_publisher(publisher)
+
+
+def flood_of_commands(rig: Rig) -> None:
+    publisher = rig.probe.publisher(Twist, "cmd_vel")
+    slow, fast = Twist(), Twist()
+    slow.linear.x, fast.linear.x = 0.05, 0.4
+    heard = len(rig.imu)
+    since, sent = rig.line.tick, len(rig.line.sent)
+    while rig.line.tick < since + 300:
+        before = rig.line.tick
+        for _ in range(10):
+            publisher.publish(slow if rig.line.tick % 2 else fast)
+        rig.wait_for_board(lambda line, before=before: line.tick > before)
+    rig.expect_still(rig.line.tick, "1,000 commands a second, then none")
+    imus = sum(frame[:2] == b"\xff\xfa" for frame in rig.line.sent[sent:])
+    rig.probe.wait_for(lambda: len(rig.imu) - heard >= imus)
+    rig.probe.node.destroy_publisher(publisher)
+
+
+# The line and the board
+
+
+def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, rig: Rig) -> None:
+    """The line damages bytes for a while; then it is whole, and nobody commands."""
+    rig.drive()
+    rig.line.to_board = to_board or rig.line.to_board
+    rig.line.from_board = from_board or rig.line.from_board
+    rig.wait_ticks(ticks(seconds))
+    rig.hand.leave()
+    rig.line.heal()
+    rig.expect_still(rig.line.tick, "the line is whole again", TIMEOUT_S)
+
+
+def cut_to_the_board(rig: Rig) -> None:
+    """Longer than Stop is repeated, so all of it is lost on the way."""
+    rig.drive()
+    rig.line.to_board = cut
+    rig.hand.leave()
+    rig.wait_ticks(ticks(2.5))
+    rig.line.heal()
+    rig.expect_still(rig.line.tick, "cut to the board, whole again", 1.0)
+
+
+def cut_from_the_board(rig: Rig) -> None:
+    rig.drive()
+    rig.line.from_board = cut
+    rig.expect_still(rig.line.tick, "nothing comes from the board", SILENCE_S)
+    rig.hand.leave()
+    rig.line.heal()
+
+
+def cut_both_ways(rig: Rig) -> None:
+    rig.drive()
+    rig.line.from_board = rig.line.to_board = cut
+    rig.wait_ticks(ticks(3.0))
+    rig.hand.leave()
+    rig.line.heal()
+    rig.expect_still(rig.line.tick, "cut both ways, whole again")
+
+
+def board_reboots(rig: Rig) -> None:
+    rig.drive()
+    since = rig.line.tick
+    rig.reboot_board()
+    rig.hand.leave()
+    rig.expect_still(since, "the board reboots")
+
+
+def board_reboots_while_somebody_drives_on(rig: Rig) -> None:
+    """Commands go on arriving; none may reach a board that boots, whatever it takes them for."""
+    rig.drive()
+    rig.reboot_board()
+    rig.probe.wait_for_state("nominal")
+    assert rig.wait_for_board(lambda line: line.board.driven), "it never moved again"
+    rig.hand.leave()
+    rig.expect_still(rig.line.tick, "rebooted, driven on, left")
+
+
+def unplugged(rig: Rig) -> None:
+    rig.drive()
+    rig.hand.leave()
+    rig.unplug()
+    rig.probe.wait_for_state("disconnected")
+    rig.plug()
+    mark = len(rig.line.board.received)
+    since = rig.line.tick
+    rig.expect_still(since, "unplugged while driving, plugged in again", 1.0)
+    opening = bytes(rig.line.board.received[mark : mark + 17])
+    stop = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+    rig.findings.expect(opening == bytes(8) + stop, f"the first bytes were {opening.hex(' ')}")
+
+
+def unplugged_while_somebody_drives_on(rig: Rig) -> None:
+    rig.drive()
+    rig.unplug()
+    rig.probe.wait_for_state("disconnected")
+    rig.plug()
+    rig.probe.wait_for_state("nominal")
+    assert rig.wait_for_board(lambda line: line.board.driven), "it never moved again"
+    rig.hand.leave()
+    rig.expect_still(rig.line.tick, "plugged in, driven on, left")
+
+
+# The e-stop and the services
+
+
+def estop(rig: Rig) -> None:
+    """Held through everything; released, the old command counts for nothing."""
+    rig.drive()
+    answer = rig.probe.call(SetBool, "estop", data=True)
+    rig.findings.expect(answer.success, "the e-stop was refused")
+    since = rig.line.tick
+    rig.reboot_board()
+    rig.probe.wait_for_state("nominal")
+    rig.unplug()
+    rig.probe.wait_for_state("disconnected")
+    rig.plug()
+    rig.probe.wait_for_state("nominal")
+    rig.probe.call(Trigger, "start")
+    rig.expect_still(since, "e-stop, with somebody driving on", 0.0)
+    rig.hand.leave()
+    since = rig.line.tick
+    rig.probe.call(SetBool, "estop", data=False)
+    rig.expect_still(since, "the e-stop is released", 0.0)
+
+
+def estop_by_topic(rig: Rig) -> None:
+    publisher = rig.probe.publisher(Bool, "estop")
+    rig.drive()
+    publisher.publish(Bool(data=True))
+    rig.probe.wait_for(lambda: rig.estops and rig.estops[-1].data)
+    since = rig.line.tick
+    publisher.publish(Bool(data=False))
+    rig.expect_still(since, "e-stop by topic, with somebody driving on", 0.0)
+    rig.hand.leave()
+    rig.probe.call(SetBool, "estop", data=False)
+    rig.probe.node.destroy_publisher(publisher)
+
+
+def service_discards_the_command(service: str, rig: Rig) -> None:
+    """Pause and un-pause, or reset: who drove before has to command anew."""
+    rig.drive()
+    rig.hand.leave()
+    since = rig.line.tick
+    if service == "pause":
+        rig.probe.call(SetBool, "pause", data=True)
+        rig.probe.call(SetBool, "pause", data=False)
+    else:
+        rig.probe.call(Trigger, service)
+    rig.expect_still(since, f"~/{service}")
+    rig.probe.wait_for_state("nominal")
+
+
+def random_lines(seed: int) -> dict[str, Case]:
+    """Damage to bytes; the random numbers are the seed's."""
+    random = Random(f"lines {seed}")
+    return {
+        "1 byte in 1,000 lost, both ways": partial(
+            damaged, losing(1e-3, random), losing(1e-3, random), 5.0
+        ),
+        "1 byte in 100 lost, both ways": partial(
+            damaged, losing(1e-2, random), losing(1e-2, random), 5.0
+        ),
+        "1 byte in 1,000 added, from the board": partial(damaged, None, gaining(1e-3, random), 5.0),
+        "bursts of 1 to 200 bytes lost, from the board": partial(
+            damaged, None, losing_bursts(5e-4, random), 5.0
+        ),
+        "noise instead of the board": partial(damaged, None, noise(random), 2.0),
+        "an adapter that keeps bytes back for 0.3 s": partial(damaged, None, late(30), 3.0),
+    }
+
+
+COMMANDS: Final[dict[str, Case]] = {
+    "the publisher of cmd_vel ceases": publisher_ceases,
+    "cmd_vel is NaN or infinite": publisher_sends_nonsense,
+    "wheel_cmd has the wrong size": wheel_commands_of_the_wrong_size,
+    "1,000 commands a second": flood_of_commands,
+}
+LINE: Final[dict[str, Case]] = {
+    "the cable is cut, to the board": cut_to_the_board,
+    "the cable is cut, from the board": cut_from_the_board,
+    "the cable is cut, both ways": cut_both_ways,
+    "the board reboots": board_reboots,
+    "the board reboots, somebody drives on": board_reboots_while_somebody_drives_on,
+    "unplugged, plugged in under another name": unplugged,
+    "unplugged and plugged in, somebody drives on": unplugged_while_somebody_drives_on,
+}
+SERVICES: Final[dict[str, Case]] = {
+    "e-stop through reboot, replug and ~/start": estop,
+    "e-stop by topic; false does not release": estop_by_topic,
+    "~/pause and un-pause": partial(service_discards_the_command, "pause"),
+    "~/reset": partial(service_discards_the_command, "reset"),
+}
+
+# The host
+
+
+def driver_hangs(rig: Rig) -> None:
+    """Stopped like a machine that swaps; somebody drives on, and his commands queue up."""
+    rig.drive()
+    since = rig.line.tick
+    rig.driver.process.send_signal(signal.SIGSTOP)
+    rig.expect_still(since, "the driver hangs", HANGS_S)
+    rig.hand.leave()
+    since = rig.line.tick
+    rig.driver.process.send_signal(signal.SIGCONT)
+    rig.expect_still(since, "the driver goes on", 0.0)
+
+
+def second_driver(rig: Rig) -> None:
+    """On the same port: refused, and the first one does not notice."""
+    rig.drive()
+    with Driver(port=rig.port) as other:
+        said = other.wait_for_line("is in use")
+        rig.findings.expect(
+            str(rig.driver.process.pid) in said, f"the owner's pid is not in: {said}"
+        )
+        rig.findings.expect(rig.line.board.driven, "the first driver was disturbed")
+        rig.hand.leave()
+        rig.expect_still(rig.line.tick, "with a second driver waiting")
+
+
+def ended_by(numbers: tuple[signal.Signals, ...], rig: Rig) -> None:
+    """The process ends, by asking or by force; nobody commands Stop but what it leaves behind."""
+    rig.drive()
+    since = rig.line.tick
+    rig.driver.end(*numbers)
+    rig.expect_still(since, "the driver ends", 0.5)
+    rig.hand.leave()
+
+
+HOST: Final[dict[str, Case]] = {
+    "the driver hangs and goes on (SIGSTOP, SIGCONT)": driver_hangs,
+    "a second driver on the same port": second_driver,
+}
+ENDINGS: Final[dict[str, Case]] = {
+    name: partial(ended_by, numbers)
+    for name, numbers in {
+        "ctrl-C": (signal.SIGINT,),
+        "ctrl-C twice": (signal.SIGINT, signal.SIGINT),
+        "SIGTERM": (signal.SIGTERM,),
+        "SIGHUP": (signal.SIGHUP,),
+        "SIGKILL": (signal.SIGKILL,),
+        "segmentation fault": (signal.SIGSEGV,),
+        "abort": (signal.SIGABRT,),
+    }.items()
+}
+"""The driver does not survive these: each needs a rig of its own."""
+
+
+def survivable(seed: int) -> dict[str, Case]:
+    """All that one driver goes through, one after the other."""
+    return {**COMMANDS, **LINE, **random_lines(seed), **SERVICES, **HOST}

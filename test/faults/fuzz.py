@@ -1,0 +1,112 @@
+"""Random input from ROS: messages of any content and size, bytes that are no message, calls."""
+
+import struct
+from collections.abc import Callable
+from random import Random
+from typing import Any, Final
+
+from geometry_msgs.msg import Twist
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from rclpy._rclpy_pybind11 import RCLError
+from rig import Rig
+from std_msgs.msg import Bool, Float32MultiArray
+from std_srvs.srv import SetBool, Trigger
+
+CALLS_ONE_IN: Final = 20
+BURST: Final = 10
+"""Messages to a tick: a thousand a second."""
+CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
+
+
+def odd_float(random: Random) -> float:
+    """Anything that 64 bits can say, and the usual suspects."""
+    anything = struct.unpack("d", random.randbytes(8))[0]
+    usual = (0.0, -0.0, 0.3, -0.3, 1e-300, 1e300, float("nan"), float("inf"), -float("inf"))
+    return random.choice((*usual, anything))
+
+
+def twist(random: Random) -> Twist:
+    message = Twist()
+    for vector in (message.linear, message.angular):
+        vector.x, vector.y, vector.z = (odd_float(random) for _ in range(3))
+    return message
+
+
+def wheels(random: Random) -> Float32MultiArray:
+    size = random.choice((0, 1, 2, 3, 3, 3, 4, 100))
+    fitting = (random.uniform(-1e3, 1e3), float("nan"), float("inf"))
+    return Float32MultiArray(data=[random.choice(fitting) for _ in range(size)])
+
+
+def no_message(random: Random) -> bytes:
+    """Bytes on the wire that are no message of this type, or hardly one."""
+    return CDR_LITTLE_ENDIAN + random.randbytes(random.randrange(64))
+
+
+def parameters(random: Random) -> SetParameters.Request:
+    """Values that may or may not be allowed; identity and names that nobody knows too."""
+    value = random.choice(
+        (
+            ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=odd_float(random)),
+            ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=-1),
+            ParameterValue(type=ParameterType.PARAMETER_STRING, string_value="x"),
+            ParameterValue(type=ParameterType.PARAMETER_NOT_SET),
+        )
+    )
+    name = random.choice(("port", "odom_frame", "no_such_parameter", "axis_signs", "baudrate"))
+    return SetParameters.Request(parameters=[Parameter(name=name, value=value)])
+
+
+def coin(random: Random) -> bool:
+    return random.random() < 0.5
+
+
+def fuzz(rig: Rig, count: int, random: Random) -> None:
+    """So many messages and calls; then the node is alive, has answered all and sends as before."""
+    probe = rig.probe
+    publishers = [
+        (probe.publisher(Twist, "cmd_vel"), twist),
+        (probe.publisher(Float32MultiArray, "wheel_cmd"), wheels),
+        (probe.publisher(Bool, "estop"), lambda random: Bool(data=random.random() < 0.1)),
+    ]
+    calls: list[tuple[Any, Callable[[Random], Any]]] = [
+        (probe.client(Trigger, "start"), lambda _: Trigger.Request()),
+        (probe.client(Trigger, "reset_odometry"), lambda _: Trigger.Request()),
+        (
+            probe.client(SetBool, "pause"),
+            lambda random: SetBool.Request(data=random.random() < 0.5),
+        ),
+        (
+            probe.client(SetBool, "estop"),
+            lambda random: SetBool.Request(data=random.random() < 0.5),
+        ),
+        (probe.client(SetParameters, "set_parameters"), parameters),
+    ]
+    futures = []
+    for number in range(count):
+        if number % BURST == 0:
+            rig.wait_ticks(1)
+        if random.randrange(CALLS_ONE_IN) == 0:
+            client, request = random.choice(calls)
+            futures.append(client.call_async(request(random)))
+            continue
+        publisher, message = random.choice(publishers)
+        odd = random.random() < 0.1
+        try:
+            publisher.publish(no_message(random) if odd else message(random))
+        except RCLError:
+            assert odd  # this side's own middleware would not send it
+    for future in futures:
+        probe.wait_for_future(future)
+    probe.call(SetBool, "estop", data=False)
+    probe.call(Trigger, "start")
+    for publisher, _ in publishers:
+        probe.node.destroy_publisher(publisher)
+    for client, _ in calls:
+        probe.node.destroy_client(client)
+    rig.findings.expect(rig.driver.process.poll() is None, "the node has died")
+    heard, sent = len(rig.imu), len(rig.line.sent)
+    rig.wait_ticks(200)
+    imus = sum(frame[:2] == b"\xff\xfa" for frame in rig.line.sent[sent:])
+    rig.probe.wait_for(lambda: len(rig.imu) - heard >= imus - 2)

@@ -1,0 +1,118 @@
+"""A simulated board at the end of a line that can be broken, and a record of the truth.
+
+Knows bytes only as bytes. A ``Damage`` is what happens to those of one tick, or of one write.
+"""
+
+from collections.abc import Callable
+from random import Random
+from typing import Final
+
+from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+
+TICK_S: Final = 0.01
+BYTES_PER_TICK: Final = 115
+"""At 115200 baud."""
+
+Damage = Callable[[bytes], bytes]
+
+
+def whole(data: bytes) -> bytes:
+    return data
+
+
+def cut(_data: bytes) -> bytes:
+    return b""
+
+
+def losing(rate: float, random: Random) -> Damage:
+    """Single bytes, each with the same probability."""
+    return lambda data: bytes(byte for byte in data if random.random() >= rate)
+
+
+def gaining(rate: float, random: Random) -> Damage:
+    """Bytes of any value, anywhere."""
+
+    def damage(data: bytes) -> bytes:
+        out = bytearray()
+        for byte in data:
+            if random.random() < rate:
+                out.append(random.randrange(256))
+            out.append(byte)
+        return bytes(out)
+
+    return damage
+
+
+def losing_bursts(rate: float, random: Random) -> Damage:
+    """1 to 200 bytes in a row, over any number of ticks."""
+    left = 0
+
+    def damage(data: bytes) -> bytes:
+        nonlocal left
+        out = bytearray()
+        for byte in data:
+            if not left and random.random() < rate:
+                left = random.randint(1, 200)
+            if left:
+                left -= 1
+            else:
+                out.append(byte)
+        return bytes(out)
+
+    return damage
+
+
+def noise(random: Random) -> Damage:
+    """A wrong baudrate or a broken wire: as many bytes as the line carries, none of them true."""
+    return lambda _data: random.randbytes(BYTES_PER_TICK)
+
+
+def late(ticks: int) -> Damage:
+    """An adapter that keeps everything back for so long, then hands it over at once."""
+    held: list[bytes] = []
+
+    def damage(data: bytes) -> bytes:
+        held.append(data)
+        if len(held) < ticks:
+            return b""
+        out = b"".join(held)
+        held.clear()
+        return out
+
+    return damage
+
+
+class BreakableLine:
+    """A board as its terminal sees it: ``receive`` and ``step`` go through damage.
+
+    ``sent``: every frame and text the board sent, whole or damaged later; ``driven_at``: the last
+    tick in which its motors were told to turn.
+    """
+
+    def __init__(self, settings: BoardSettings) -> None:
+        self.board = SimulatedBoard(settings)
+        self.to_board = self.from_board = whole
+        self.sent: list[bytes] = []
+        self.driven_at = -1
+
+    @property
+    def tick(self) -> int:
+        return self.board.tick
+
+    def heal(self) -> None:
+        self.to_board = self.from_board = whole
+
+    def receive(self, data: bytes) -> None:
+        self.board.receive(self.to_board(data))
+
+    def step(self) -> bytes:
+        data = self.board.step()
+        sent = []
+        for frame in reversed(self.board.sent):
+            if frame.tick != self.board.tick:
+                break
+            sent.append(frame.data)
+        self.sent += reversed(sent)
+        if self.board.driven:
+            self.driven_at = self.board.tick
+        return self.from_board(data)

@@ -1,0 +1,109 @@
+"""Faults in random order, on top of each other, while somebody drives at random.
+
+Every few steps the line heals and the hand leaves the stick: then the robot has to stand in time,
+come back to its state, and obey a fresh command.
+"""
+
+from collections.abc import Callable
+from random import Random
+from typing import Final
+
+from line import Damage, cut, gaining, late, losing, losing_bursts, noise
+from rig import Rig
+from std_srvs.srv import SetBool, Trigger
+
+STEPS_TO_A_REST: Final = 3
+TRIES: Final = 15
+STANDS_AGAIN_S: Final = 1.0
+"""After the line heals: a driver that heard nothing must first see that the robot moves."""
+
+
+def walk(rig: Rig, random: Random, steps: int) -> list[str]:
+    """So many faults; returns their names in order."""
+    names = []
+    for step in range(1, steps + 1):
+        if random.random() < 0.8:
+            rig.hand.hold(*(random.uniform(-0.5, 0.5) for _ in range(3)))
+        else:
+            rig.hand.leave()
+        name = random.choice(list(STEPS))
+        names.append(name)
+        STEPS[name](rig, random)
+        rig.wait_ticks(random.randrange(150))
+        if step % STEPS_TO_A_REST == 0 or step == steps:
+            _rest(rig, f"step {step}, after {', '.join(names[-STEPS_TO_A_REST:])}")
+    return names
+
+
+def _rest(rig: Rig, what: str) -> None:
+    rig.line.heal()
+    rig.hand.leave()
+    rig.expect_still(rig.line.tick, what, STANDS_AGAIN_S)
+    rig.probe.call(SetBool, "estop", data=False)
+    for _ in range(TRIES):  # another request may be under way
+        answer = rig.probe.call(SetBool, "pause", data=False)
+        if answer.success:
+            break
+        rig.wait_ticks(100)
+    rig.findings.expect(answer.success, f"{what}: it does not run: {answer.message}")
+    rig.expect_obeys_again()
+
+
+def _damage(kind: Callable[[Random], Damage]) -> Callable[[Rig, Random], None]:
+    def start(rig: Rig, random: Random) -> None:
+        to_board, from_board = random.choice(((True, False), (False, True), (True, True)))
+        rig.line.to_board = kind(random) if to_board else rig.line.to_board
+        rig.line.from_board = kind(random) if from_board else rig.line.from_board
+
+    return start
+
+
+def _from_board(kind: Callable[[Random], Damage]) -> Callable[[Rig, Random], None]:
+    def start(rig: Rig, random: Random) -> None:
+        rig.line.from_board = kind(random)
+
+    return start
+
+
+def _heal(rig: Rig, _random: Random) -> None:
+    rig.line.heal()
+
+
+def _reboot(rig: Rig, _random: Random) -> None:
+    rig.reboot_board()
+
+
+def _replug(rig: Rig, random: Random) -> None:
+    rig.unplug()
+    if random.random() < 0.5:
+        rig.probe.wait_for_state("disconnected")
+    rig.plug()
+
+
+def _call(service: str) -> Callable[[Rig, Random], None]:
+    def call(rig: Rig, random: Random) -> None:
+        if service in ("pause", "estop"):
+            rig.probe.call_async(SetBool, service, data=random.random() < 0.5)
+        else:
+            rig.probe.call_async(Trigger, service)
+
+    return call
+
+
+STEPS: Final[dict[str, Callable[[Rig, Random], None]]] = {
+    "a cut": _damage(lambda _: cut),
+    "1 byte in 100 lost": _damage(lambda random: losing(1e-2, random)),
+    "1 byte in 1,000 lost": _damage(lambda random: losing(1e-3, random)),
+    "1 byte in 1,000 added": _from_board(lambda random: gaining(1e-3, random)),
+    "bursts lost": _from_board(lambda random: losing_bursts(1e-3, random)),
+    "noise": _from_board(noise),
+    "a late adapter": _from_board(lambda random: late(random.randrange(2, 60))),
+    "a whole line": _heal,
+    "a reboot": _reboot,
+    "a replug": _replug,
+    "start": _call("start"),
+    "pause": _call("pause"),
+    "reset": _call("reset"),
+    "e-stop": _call("estop"),
+    "reset_odometry": _call("reset_odometry"),
+}
