@@ -43,6 +43,8 @@ class Sequence:
         self._regular = False
         """Five deltas to a pose were seen; only then is a sixth missed."""
         self._paused = self._reconnected = False
+        self._ahead = False
+        """The last count was ahead of the time, and once the time is believed: a bit flipped."""
 
     def pause(self) -> None:
         """The board said that it is paused: what comes next takes up the count, or begins anew."""
@@ -71,6 +73,11 @@ class Sequence:
         if lost and late_s > LATE_S and (from_zero or reconnected):
             self._pose = None
             return Step(0, None, restarted=True)
+        ahead = (lost + 1) * DELTA_PERIOD_S > elapsed_s + LATE_S
+        self._ahead = ahead and not self._ahead
+        if self._ahead:
+            lost = max(0, round(elapsed_s / DELTA_PERIOD_S) - 1)
+            self._delta = (before + lost + 1) % WRAP
         lost -= min(lost, told)
         self._since_pose += lost + 1
         return Step(lost)
