@@ -48,12 +48,13 @@ class MotionLimits:
     force_step_mps2: float = 4.0
 
 
-@dataclass(slots=True)
-class Refusals:
-    """How many readings were refused since the driver began."""
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """How many readings that cannot be true were not believed since the driver began."""
 
-    imu: int = 0
-    displacements: int = 0
+    imu: int
+    displacements: int
+    poses: int
 
 
 class Plausibility:
@@ -61,7 +62,7 @@ class Plausibility:
 
     def __init__(self, limits: MotionLimits, tick_s: float) -> None:
         self.limits = limits
-        self.refused = Refusals()
+        self.refused_imu = self.refused_displacements = 0
         self._tick_s = tick_s
         self._imu_leaps = _Leaps(of_one_word=True)
         self._motion_leaps = _Leaps(of_one_word=False)
@@ -102,7 +103,7 @@ class Plausibility:
         was_flip, leaps = self._imu_leaps.judge(values)
         held, self._held_imu = self._held_imu, []
         if was_flip:
-            self.refused.imu += 1
+            self.refused_imu += 1
             held = []
         if leaps:
             self._held_imu = [(reading, stamp_s)]
@@ -144,7 +145,7 @@ class Plausibility:
         )
 
     def _refuse(self, reading: DisplacementReading) -> None:
-        self.refused.displacements += 1
+        self.refused_displacements += 1
         self._lost += reading.lost + 1
         self._restarted |= reading.restarted
         self._time_unknown |= reading.duration_s is None

@@ -124,7 +124,7 @@ def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str
 
 @pytest.mark.parametrize("lost", [26, 50, 100, 250])
 def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
-    """Displacements wait for the board's pose, a fifth of a second at the most; no guess is seen."""
+    """Displacements wait a fifth of a second at the most for the board's pose; no guess is seen."""
     for seed in range(5):
         on = line(seed)
         lose(on, lost * PERIOD_S)
