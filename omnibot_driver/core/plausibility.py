@@ -25,12 +25,15 @@ from omnibot_driver.core.board import (
 Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
-BACK: Final = 0.25
-"""What is left of a leap when it is over, or shows elsewhere while only one word is wrong."""
 OUT_OF_PROPORTION: Final = 3.0
 """A leap is so many times larger than any step of the last while."""
 CALMING: Final = 0.95
 """What a reading leaves of the largest step before it: after 20 of them a third."""
+STILL: Final = 0.05
+"""Part of a leap by which the sensor's other words may move, and all of them when it is over. A
+knock, however short, moves more."""
+BACK: Final = 0.25
+"""Part of a leap that may be left when a robot that drives is back where it was."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,8 +67,8 @@ class Plausibility:
         self.limits = limits
         self.refused_imu = self.refused_displacements = 0
         self._tick_s = tick_s
-        self._imu_leaps = _Leaps(of_one_word=True)
-        self._motion_leaps = _Leaps(of_one_word=False)
+        self._imu_leaps = _Leaps(STILL, of_one_word=True)
+        self._motion_leaps = _Leaps(BACK, of_one_word=False)
         self._held_imu: list[Stamped] = []
         self._held_motion: list[Stamped] = []
         """A displacement that leaps, and the poses after it."""
@@ -175,10 +178,12 @@ class Plausibility:
 class _Leaps:
     """Finds single leaps in a row of values, each in units of what it may change by at once.
 
-    ``of_one_word``: only a leap of one value alone is damage; if others move too, it is a shock.
+    ``left``: what may be left of a leap that is over, as a part of it; ``of_one_word``: if another
+    value moves by more than that at the same time, it is a shock.
     """
 
-    def __init__(self, *, of_one_word: bool) -> None:
+    def __init__(self, left: float, *, of_one_word: bool) -> None:
+        self._left = left
         self._of_one_word = of_one_word
         self.forget()
 
@@ -193,17 +198,18 @@ class _Leaps:
         leaping, self._leaping = self._leaping, None
         was_single = False
         if leaping is not None and self._sure is not None:
-            left = max(map(abs, _steps(self._sure, values)))
-            leapt = max(map(abs, _steps(self._sure, leaping)))
-            was_single = left <= BACK * leapt
-            if not was_single:
+            leapt = _steps(self._sure, leaping)[-1]
+            was_single = _steps(self._sure, values)[-1] <= self._left * leapt
+            if was_single:  # the next one is a shock after all, unless it is larger
+                self._restless = max(self._restless, leapt / OUT_OF_PROPORTION)
+            else:
                 self._restless = max(self._restless, leapt)
                 self._sure = leaping
         if self._sure is None:
             self._sure = values
             return False, False
-        *others, largest = sorted(map(abs, _steps(self._sure, values)))
-        alone = not self._of_one_word or others[-1] <= BACK * largest
+        *others, largest = _steps(self._sure, values)
+        alone = not self._of_one_word or others[-1] <= self._left * largest
         if alone and largest > max(periods, OUT_OF_PROPORTION * self._restless):
             self._leaping = values
             return was_single, True
@@ -213,4 +219,5 @@ class _Leaps:
 
 
 def _steps(before: Sequence[float], after: Sequence[float]) -> list[float]:
-    return [new - old for old, new in zip(before, after, strict=True)]
+    """How far each value moved, the largest last."""
+    return sorted(abs(new - old) for old, new in zip(before, after, strict=True))

@@ -37,6 +37,7 @@ from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
 from omnibot_driver.core.omnibot.sequence import Sequence
 
 TICK_S: Final = 0.01
+IMUS_PER_DELTA: Final = 4
 DELTA_LSB: Final = (1e-4, 1e-4, 1e-4)
 """m, m, rad."""
 POSE_LSB_M: Final = 1e-3
@@ -83,6 +84,7 @@ class OmniBot:
         self._modes = ModeTracker()
         self._sequence.reconnect()
         self._paused_count: int | None = None
+        self._imus = 0
 
     @property
     def mode(self) -> Mode:
@@ -167,6 +169,7 @@ class OmniBot:
         self._modes.hear(frame)
         match frame:
             case ImuFrame(accel, gyro):
+                self._imus += 1
                 scale = self.settings.imu
                 return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro))
             case DeltaFrame():
@@ -187,7 +190,8 @@ class OmniBot:
 
     def _displacement(self, frame: DeltaFrame, now: float) -> DisplacementReading:
         self._paused_count = None
-        step = self._sequence.delta(frame.seq, now)
+        step = self._sequence.delta(frame.seq, now, whole=self._imus == IMUS_PER_DELTA)
+        self._imus = 0
         words = (frame.dx, frame.dy, frame.dtheta)
         if self.settings.delta_frame == "wheel_counts":
             dx, dy, dyaw = self._rolled(words)
