@@ -98,6 +98,7 @@ class Session:
         self._heard_at = self._came_at = -math.inf
         self._silent = False
         self._heading_assumed = False
+        self._advice: str | None = None
         self._lost = 0
         self._lost_news, self._refused_news = News(), News()
         self._events: list[Event] = []
@@ -277,9 +278,15 @@ class Session:
                 self._lost += reading.lost
             self._measure(self._plausibility.admit(reading, stamp_s), now)
         self._tell(now)
+        if self._board.advice != self._advice and self._board.advice is not None:
+            self._advice = self._board.advice
+            self._notify(self._advice)
         if self._odometry.heading_assumed and not self._heading_assumed:
             self._heading_assumed = True
-            self._notify("the board sends no pose: its heading is assumed to have been 0 at first")
+            self._notify(
+                "the board sends no pose that makes sense: its heading is assumed to have been 0"
+                " at first"
+            )
         if self._board.mode.running and not isinstance(readings[-1], PausedReading):
             self._supervisor.heard_data(now)
 

@@ -22,7 +22,7 @@ from typing import Any
 ACCEL_LSB = 9.80665 / 16384
 GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
-SIDEWAYS = 3
+SIDEWAYS = 50
 """Frames that a stamp may be off by, before and after a loss has been counted."""
 
 Triple = tuple[float, float, float]
@@ -211,7 +211,7 @@ def main() -> int:
     for fault in ("lose", "burst", "flip"):
         parser.add_argument(f"--{fault}", type=float, default=0.0, metavar="RATE")
     arguments = parser.parse_args()
-    os.environ.setdefault("ROS_DOMAIN_ID", "98")
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 101))
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     sys.path.insert(0, str(Path(__file__).parent))
     import rclpy

@@ -35,6 +35,7 @@ from omnibot_driver.core.omnibot.frames import (
 )
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
 from omnibot_driver.core.omnibot.sequence import Sequence
+from omnibot_driver.core.omnibot.suspicion import Suspicion
 
 TICK_S: Final = 0.01
 IMUS_PER_DELTA: Final = 4
@@ -74,6 +75,7 @@ class OmniBot:
     def __init__(self, settings: OmniBotSettings) -> None:
         self.settings = settings
         self._sequence = Sequence()
+        self._suspicion = Suspicion()
         self.connect()
 
     def connect(self) -> None:
@@ -103,6 +105,11 @@ class OmniBot:
         if not begun.startswith(frames.IMU_HEADER):
             return None
         return max(0, frames.IMU_LENGTH - len(begun)) * frames.BYTE_S
+
+    @property
+    def advice(self) -> str | None:
+        """Which parameter is set wrong, by what the board sends."""
+        return self._suspicion.advice
 
     def receive(self, data: bytes, now: float) -> list[Reading]:
         """The readings that these bytes complete, in the order of the line."""
@@ -176,13 +183,15 @@ class OmniBot:
                 return self._displacement(frame, now)
             case PoseFrame(x, y, theta, seq):
                 step = self._sequence.pose(seq, now)
-                return PoseReading(
+                pose = PoseReading(
                     x * POSE_LSB_M,
                     y * POSE_LSB_M,
                     theta * POSE_LSB_RAD,
                     lost=step.lost,
                     restarted=step.restarted,
                 )
+                self._suspicion.posed(frame, pose, self.settings.pose_byte_order)
+                return pose
             case PausedFrame(count):
                 before, self._paused_count = self._paused_count, count
                 self._sequence.pause()
@@ -197,7 +206,7 @@ class OmniBot:
             dx, dy, dyaw = self._rolled(words)
         else:
             dx, dy, dyaw = (word * unit for word, unit in zip(words, DELTA_LSB, strict=True))
-        return DisplacementReading(
+        displacement = DisplacementReading(
             dx,
             dy,
             dyaw,
@@ -206,6 +215,8 @@ class OmniBot:
             lost=step.lost,
             restarted=step.restarted,
         )
+        self._suspicion.displaced(displacement)
+        return displacement
 
     def _rolled(self, counts: Words) -> Vector3:
         """The body's displacement from the wheels' counts (manual, "Odometry equation")."""
