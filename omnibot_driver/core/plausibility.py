@@ -29,7 +29,7 @@ OUT_OF_PROPORTION: Final = 3.0
 """A leap is so many times larger than any step of the last while."""
 CALMING: Final = 0.95
 """What a reading leaves of the largest step before it: after 20 of them a third."""
-STILL: Final = 0.05
+STILL: Final = 0.08
 """Part of a leap by which the sensor's other words may move, and all of them when it is over. A
 knock, however short, moves more."""
 BACK: Final = 0.25

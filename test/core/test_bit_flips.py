@@ -114,10 +114,13 @@ def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
 
 @given(flips.filter(lambda flip: flip[0] == IMU))
 @settings(max_examples=40, deadline=None)
-def test_an_imu_word_is_published_wrong_by_less_than_its_limit_or_not_at_all(
+def test_an_imu_word_is_published_wrong_by_half_a_g_at_the_most(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """4 m/s² and 0.5 rad/s; every other reading is there."""
+    """Or 0.6 rad/s: a third bit from the top may pass while the robot shakes, larger ones do not.
+
+    Every other reading is there.
+    """
     _, byte, bit, ticks = flip
     drive = Drive()
     drive.run(ticks * TICK_S)
@@ -140,8 +143,8 @@ def test_an_imu_word_is_published_wrong_by_less_than_its_limit_or_not_at_all(
     for number, (force, rate) in enumerate(got):
         if (force, rate) in wrong:
             true_force, true_rate = sent[number]
-            assert math.dist(force, true_force) < 4.0 + 0.5
-            assert math.dist(rate, true_rate) < 0.5 + 0.1
+            assert math.dist(force, true_force) < 5.0
+            assert math.dist(rate, true_rate) < 0.6
 
 
 def test_what_is_refused_is_counted_and_told() -> None:
