@@ -15,7 +15,6 @@ from collections import deque
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -60,9 +59,10 @@ class Outcome:
 
 def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float = 0.0) -> Outcome:
     """Drive for so long, stand still for two seconds, and compare. Needs an initialised rclpy."""
-    from conftest import Driver, Probe
+    from driver_process import Driver
     from geometry_msgs.msg import Twist
     from nav_msgs.msg import Odometry
+    from probe import Probe
     from sensor_msgs.msg import Imu
 
     from omnibot_driver.simulator import (
@@ -213,7 +213,6 @@ def main() -> int:
     arguments = parser.parse_args()
     os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 101))
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    sys.path.insert(0, str(Path(__file__).parent))
     import rclpy
 
     rclpy.init()
