@@ -67,8 +67,8 @@ class Plausibility:
         self.limits = limits
         self.refused_imu = self.refused_displacements = 0
         self._tick_s = tick_s
-        self._imu_leaps = _Leaps(STILL, of_one_word=True)
-        self._motion_leaps = _Leaps(BACK, of_one_word=False)
+        self._imu_leaps = _Leaps(STILL, knocked=3)
+        self._motion_leaps = _Leaps(BACK, knocked=0)
         self._held_imu: list[Stamped] = []
         self._held_motion: list[Stamped] = []
         """A displacement that leaps, and the poses after it."""
@@ -178,13 +178,13 @@ class Plausibility:
 class _Leaps:
     """Finds single leaps in a row of values, each in units of what it may change by at once.
 
-    ``left``: what may be left of a leap that is over, as a part of it; ``of_one_word``: if another
-    value moves by more than that at the same time, it is a shock.
+    ``left``: what may be left of a leap that is over, as a part of it; ``knocked``: so many of the
+    first values may leap in a knock and be back, and then others move too; the rest never can.
     """
 
-    def __init__(self, left: float, *, of_one_word: bool) -> None:
+    def __init__(self, left: float, *, knocked: int) -> None:
         self._left = left
-        self._of_one_word = of_one_word
+        self._knocked = knocked
         self.forget()
 
     def forget(self) -> None:
@@ -198,8 +198,8 @@ class _Leaps:
         leaping, self._leaping = self._leaping, None
         was_single = False
         if leaping is not None and self._sure is not None:
-            leapt = _steps(self._sure, leaping)[-1]
-            was_single = _steps(self._sure, values)[-1] <= self._left * leapt
+            leapt = max(_steps(self._sure, leaping))
+            was_single = max(_steps(self._sure, values)) <= self._left * leapt
             if was_single:  # the next one is a shock after all, unless it is larger
                 self._restless = max(self._restless, leapt / OUT_OF_PROPORTION)
             else:
@@ -208,9 +208,11 @@ class _Leaps:
         if self._sure is None:
             self._sure = values
             return False, False
-        *others, largest = _steps(self._sure, values)
-        alone = not self._of_one_word or others[-1] <= self._left * largest
-        if alone and largest > max(periods, OUT_OF_PROPORTION * self._restless):
+        steps = _steps(self._sure, values)
+        least = max(periods, OUT_OF_PROPORTION * self._restless)
+        *others, largest = sorted(steps)
+        alone = not others or others[-1] <= self._left * largest
+        if max(steps[self._knocked :]) > least or (alone and largest > least):
             self._leaping = values
             return was_single, True
         self._restless = max(CALMING * self._restless, largest)
@@ -219,5 +221,5 @@ class _Leaps:
 
 
 def _steps(before: Sequence[float], after: Sequence[float]) -> list[float]:
-    """How far each value moved, the largest last."""
-    return sorted(abs(new - old) for old, new in zip(before, after, strict=True))
+    """How far each value moved."""
+    return [abs(new - old) for old, new in zip(before, after, strict=True)]

@@ -87,6 +87,15 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
     assert through.refused_imu == 0
 
 
+def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
+    """Words of another frame in place of the gyro's."""
+    leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
+    readings, through = row(60, {50: leaps}), gate()
+    came = admitted(readings, through)
+    assert came[50:52] == [[], [readings[51]]]
+    assert through.refused_imu == 1
+
+
 @pytest.mark.parametrize("across", [0.1, -0.1, 0.3])
 def test_a_knock_of_one_reading_shows_in_other_axes_and_comes_out_at_once(across: float) -> None:
     """However short it is."""

@@ -11,8 +11,9 @@ import math
 import os
 import struct
 import sys
+from bisect import bisect_left
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from random import Random
@@ -23,6 +24,8 @@ GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
 """Frames that a stamp may be off by, before and after a loss has been counted."""
+LONGEST_STALL = 1000
+"""IMU frames that time may jump by where the machine, and the board with it, stood still."""
 
 Triple = tuple[float, float, float]
 
@@ -110,13 +113,19 @@ def compare(
     sent: Sequence[bytes], imu: Sequence[Any], odom: Sequence[Any], seconds: float, line: Any
 ) -> Outcome:
     words = [struct.unpack(">6h", data[2:]) for data in sent if data[:2] == b"\xff\xfa"]
-    got_words = [_words(message) for message in imu]
-    imu_found = trace(words, got_words, [_stamp(message) for message in imu], TICK_S)
-    deltas, poses = board_poses(sent)
+    imu_at = [_stamp(message) for message in imu]
+    imu_found = trace(words, [_words(message) for message in imu], imu_at)
+    deltas, poses, numbers = board_poses(sent)
     keys = [(round(math.hypot(dx, dy), 3), turn) for dx, dy, turn in deltas]
-    odom_found = trace(
-        keys, [_displacement(message) for message in odom], [_stamp(m) for m in odom], PERIOD_S
-    )
+    odom_found: list[int | None] = []
+    last = -1
+    for message in odom:
+        middle = bisect_left(numbers, expected(_stamp(message), imu_found, imu_at))
+        key = _displacement(message)
+        around = outwards(middle, SIDEWAYS)
+        number = next((n for n in around if last < n < len(keys) and keys[n] == key), None)
+        odom_found.append(number)
+        last = last if number is None else number
     errors = []
     for message, number in zip(odom, odom_found, strict=True):
         if number is not None:
@@ -143,43 +152,62 @@ def compare(
 
 
 def trace(
-    sent: Sequence[object], got: Sequence[object], stamps_s: Sequence[float], period_s: float
+    sent: Sequence[object], got: Sequence[object], stamps_s: Sequence[float]
 ) -> list[int | None]:
-    """Which of the sent frames each message is; None where it is none of those it could be.
+    """Which of the sent IMU frames each message is; None where it is none that was still to come.
 
-    The first is looked for everywhere, the others by the time since the one before.
+    The nearest one by time; noise makes each of them unlike all others.
     """
     found: list[int | None] = []
-    at, at_s = -1, 0.0
+    at, at_s = -1, stamps_s[0]
     for key, stamp_s in zip(got, stamps_s, strict=True):
-        if at < 0:
-            nearest = range(min(len(sent), 1000))
-        else:
-            middle = at + max(1, round((stamp_s - at_s) / period_s))
-            by_distance = sorted(range(-SIDEWAYS, SIDEWAYS + 1), key=abs)
-            nearest = [middle + k for k in by_distance if at < middle + k < len(sent)]
-        number = next((n for n in nearest if sent[n] == key), None)
+        middle = at + max(1, round((stamp_s - at_s) / TICK_S))
+        around = outwards(middle, LONGEST_STALL)
+        number = next((n for n in around if at < n < len(sent) and sent[n] == key), None)
         if number is not None:
             at, at_s = number, stamp_s
         found.append(number)
     return found
 
 
-def board_poses(sent: Sequence[bytes]) -> tuple[list[tuple[int, int, int]], list[Triple]]:
-    """The words of every delta, and the board's pose after it, to the rounding of four deltas."""
+def outwards(middle: int, reach: int) -> Iterator[int]:
+    """The numbers about this one, the nearest first."""
+    yield middle
+    for distance in range(1, reach + 1):
+        yield from (middle + distance, middle - distance)
+
+
+def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[float]) -> int:
+    """The IMU frame of this time, by the nearest that was found."""
+    place = min(bisect_left(stamps_s, stamp_s), len(stamps_s) - 1)
+    while (number := found[place]) is None:
+        place -= 1
+    return number + round((stamp_s - stamps_s[place]) / TICK_S)
+
+
+def board_poses(
+    sent: Sequence[bytes],
+) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
+    """The words of every delta, the board's pose after it, to the rounding of four deltas, and the
+    number of the IMU frame right before it.
+    """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []
+    numbers: list[int] = []
     x = y = yaw = 0.0
+    number = -1
     for data in sent:
+        number += data[:2] == b"\xff\xfa"
         if data[:2] == b"\xff\xfb":
             dx, dy, turn = struct.unpack(">3h", data[2:8])
             x, y, yaw = x + dx * 1e-4, y + dy * 1e-4, yaw + turn * 1e-4
             deltas.append((dx, dy, turn))
             poses.append((x, y, yaw))
+            numbers.append(number)
         elif data[:2] == b"\xff\xfc":
             x, y, yaw = (value / 1000 for value in struct.unpack(">3f", data[2:14]))
             poses[-1] = (x, y, yaw)
-    return deltas, poses
+    return deltas, poses, numbers
 
 
 def _words(message: Any) -> tuple[int, ...]:
