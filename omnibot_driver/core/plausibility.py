@@ -211,7 +211,7 @@ class _Leaps:
         steps = _steps(self._sure, values)
         least = max(periods, OUT_OF_PROPORTION * self._restless)
         *others, largest = sorted(steps)
-        alone = not others or others[-1] <= self._left * largest
+        alone = others[-1] <= self._left * largest
         if max(steps[self._knocked :]) > least or (alone and largest > least):
             self._leaping = values
             return was_single, True

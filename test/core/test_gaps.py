@@ -122,6 +122,30 @@ def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str
             assert abs(step.yaw_rad) <= 8.0 * seconds + 1e-6
 
 
+def test_a_bridge_that_was_far_wrong_is_put_right_at_the_fastest_speed_and_no_faster() -> None:
+    """The robot turned round unheard, at twice the speed: half a metre at 2 m/s."""
+    odometry, x, stamp_s = attached(), 0.0, 0.0
+    estimates: list[OdometryEstimate] = []
+
+    def drive(step: float, lost: int, told: bool) -> None:
+        nonlocal x, stamp_s
+        x, stamp_s = x + step, stamp_s + (lost + 1) * PERIOD_S
+        reading = DisplacementReading(step, 0.0, 0.0, "earth", PERIOD_S, lost)
+        estimates.extend(odometry.displace(reading, stamp_s))
+        if told:
+            odometry.settle(PoseReading(x, 0.0, 0.0))
+
+    for number in range(10):
+        drive(0.01, 0, number % 5 == 4)
+    x -= 0.5
+    drive(-0.01, 25, True)
+    for number in range(25):
+        drive(-0.01, 0, number % 5 == 4)
+    moves = steps(estimates)
+    assert max(step.way_m / seconds for seconds, step in moves) == pytest.approx(2.0)
+    assert estimates[-1].pose.x_m == pytest.approx(x, abs=1e-9)
+
+
 @pytest.mark.parametrize("lost", [26, 50, 100, 250])
 def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
     """Displacements wait a fifth of a second at the most for the board's pose; no guess is seen."""
