@@ -15,6 +15,7 @@ from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, GYRO_COUNTS_PER_DPS, Imu
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBotSettings
+from omnibot_driver.core.plausibility import MotionLimits
 from omnibot_driver.core.session import SessionSettings
 from omnibot_driver.core.uncertainty import OdometryNoise
 
@@ -293,8 +294,8 @@ PARAMETERS: Final = (
         "fastest_linear_speed",
         2.0,
         "m/s",
-        "What the robot can never exceed, pushed by hand too: no pose of the board is believed that"
-        " is further away, no correction of odom is faster.",
+        "What the robot can never exceed, pushed by hand too: no faster displacement and no pose"
+        " further away is believed, no correction of odom is faster.",
         low=0.1,
         high=_SPEED,
     ),
@@ -305,6 +306,32 @@ PARAMETERS: Final = (
         "Likewise, for turning.",
         low=0.1,
         high=100.0,
+    ),
+    Parameter(
+        "fastest_linear_acceleration",
+        15.0,
+        "m/s²",
+        "What the robot can never exceed, bumped too: a displacement that leaps further and is back"
+        " with the next is refused.",
+        low=0.1,
+        high=1000.0,
+    ),
+    Parameter(
+        "fastest_angular_acceleration",
+        50.0,
+        "rad/s²",
+        "Likewise, for turning; for single leaps of the gyro too.",
+        low=1.0,
+        high=10_000.0,
+    ),
+    Parameter(
+        "largest_force_step",
+        4.0,
+        "m/s²",
+        "A single leap of one axis of the accelerometer that is larger, and back with the next"
+        " reading, is refused; a shock lasts longer, or shows in other axes.",
+        low=0.1,
+        high=1000.0,
     ),
     Parameter(
         "accel_range",
@@ -467,5 +494,12 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
             use_board_pose=values["use_board_pose"],
             fastest_mps=values["fastest_linear_speed"],
             fastest_radps=values["fastest_angular_speed"],
+        ),
+        motion=MotionLimits(
+            fastest_mps=values["fastest_linear_speed"],
+            fastest_radps=values["fastest_angular_speed"],
+            fastest_mps2=values["fastest_linear_acceleration"],
+            fastest_radps2=values["fastest_angular_acceleration"],
+            force_step_mps2=values["largest_force_step"],
         ),
     )

@@ -101,6 +101,10 @@ class Board(Protocol):
         The beginning tells when the reading was sampled better than an end that is delivered late.
         """
 
+    @property
+    def advice(self) -> str | None:
+        """What a user should set otherwise, by what the board sends; None while all is well."""
+
     def connect(self) -> None:
         """The line is new: nothing that was held or believed is worth anything any more."""
 

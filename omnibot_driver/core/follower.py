@@ -12,7 +12,7 @@ SPREAD_S: Final = 0.2
 
 
 class Follower:
-    """``pose`` follows ``target``. What the robot could have moved and did not is kept as room."""
+    """``pose`` follows ``target``. What the robot could have moved and did not is room for it."""
 
     def __init__(self) -> None:
         self.pose = self.target = Pose()
@@ -24,10 +24,10 @@ class Follower:
         """By how much ``pose`` is known to be off."""
         return self.target - self.pose
 
-    def correct(self, chord: Pose) -> None:
+    def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:
         """The target is elsewhere: this displacement away, in its own axes."""
         self.target = self.target.moved(chord)
-        self._settling_s = SPREAD_S
+        self._settling_s = spread_s
 
     def move(self, chord: Pose, room_m: float, room_rad: float) -> None:
         """The robot moved so, in its own axes, and could have moved as far as the room."""
@@ -36,23 +36,15 @@ class Follower:
         self._room_m += room_m - chord.way_m
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
-    def follow(self, seconds: float, *, keep_room: bool) -> None:
-        """Approach the target by this step's share.
-
-        Room is kept while something is wrong, or will be: what the robot could have moved in a gap
-        and did not by the bridge is left for the correction.
-        """
+    def follow(self, seconds: float) -> None:
+        """Approach the target by this step's share, as far as there is room."""
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0
         self._settling_s = max(0.0, self._settling_s - seconds)
         linear = min(share, _part(wrong.way_m, self._room_m))
         angular = min(share, _part(abs(wrong.yaw_rad), self._room_rad))
-        step = wrong.times(linear, linear, angular)
-        self.pose += step
-        self._room_m -= step.way_m
-        self._room_rad -= abs(step.yaw_rad)
-        if not keep_room and self.wrong.tiny:
-            self._room_m = self._room_rad = 0.0
+        self.pose += wrong.times(linear, linear, angular)
+        self._room_m = self._room_rad = 0.0
 
 
 def _part(wanted: float, room: float) -> float:

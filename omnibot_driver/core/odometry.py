@@ -6,10 +6,11 @@ together, by the same tangent in the body's axes, so motion that was lost on the
 with the next pose. This module knows SE(2); it knows no bytes, no clock and no ROS.
 """
 
-import math
 from dataclasses import dataclass, field
 from typing import Final
 
+from omnibot_driver.core.backlog import Backlog, advanced, chord
+from omnibot_driver.core.belief import Belief, expected
 from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.follower import Follower
 from omnibot_driver.core.kinematics import BodyTwist
@@ -18,14 +19,14 @@ from omnibot_driver.core.uncertainty import NOTHING, Covariance, OdometryNoise, 
 
 LONGEST_WAIT_S: Final = 1.0
 """Board time without any pose after which heading 0 is assumed."""
+LONG_GAP: Final = 25
+"""After more lost displacements the next ones wait for the pose, which tells what was lost."""
+POSE_DUE_S: Final = 0.24
+"""Board time within which a pose comes, unless it is lost as well."""
 LONGEST_BRIDGE: Final = 50
 """Displacements that a bridge stands for at the most; a robot that is not heard is soon stopped."""
 UNKNOWN_S: Final = 0.5
 """Time in which a robot rolls out: what may be unreported where nobody knows how long it was."""
-BELIEVED_M: Final = 0.02
-BELIEVED_TURN_RAD: Final = 0.05
-"""A pose that is off by more than this and what the gaps explain must be confirmed by the next."""
-BELIEVED_SIGMAS: Final = 3.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,14 +70,17 @@ class Odometry:
         self._settings = settings
         self._uncertainty = Uncertainty(settings.noise)
         self._board: Pose | None = None
-        self._proved: Pose | None = None
-        self._unproved_s = 0.0
-        self._doubted: Pose | None = None
+        self._belief = Belief()
         self._restarted: Pose | None = None
-        self._waiting: list[tuple[DisplacementReading, float]] = []
+        self._backlog = Backlog()
         self._last_stamp_s: float | None = None
         self._last: tuple[Pose, float] | None = None
         self.reset()
+
+    @property
+    def refused_poses(self) -> int:
+        """Poses that are not possible, or that the next one did not confirm."""
+        return self._belief.refused
 
     @property
     def settings(self) -> OdometrySettings:
@@ -94,41 +98,48 @@ class Odometry:
         if self._board is not None:
             self._release()
             if self._uncertainty.gap != NOTHING:
-                self._proved = None  # what the next pose corrects was before the reset
-        self._waiting = []
+                self._belief.proved = None  # what the next pose corrects was before the reset
+        self._backlog = Backlog()
         self._follower = Follower()
         self._uncertainty = Uncertainty(self._settings.noise)
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
-        """The estimates that this displacement completes: none while the heading is unknown."""
+        """The estimates that this displacement completes: none while a pose must tell first."""
         estimates = []
         if reading.restarted:
             estimates = self._release() if self._board is not None else []
-            self._waiting = []
-            self._restarted = Pose()
+            self._backlog = Backlog()
+            self._restarted, self._belief.doubted = Pose(), None
         if self._restarted is not None:
-            self._restarted = _advanced(self._restarted, reading)
-        self._waiting.append((reading, stamp_s))
+            self._restarted = advanced(self._restarted, reading)
+        self._belief.displaced(reading)
+        self._backlog.add(reading, stamp_s)
+        waited_s = self._backlog.duration_s
         if reading.frame == "earth" and (self._board is None or self._restarted is not None):
-            if sum(waiting.duration_s or 0.0 for waiting, _ in self._waiting) < LONGEST_WAIT_S:
+            if waited_s < LONGEST_WAIT_S:
                 return estimates
-            self.heading_assumed = True
-            self._begin_at(Pose())
-            self._proved = None
+            self._assume()
+        elif self._backlog.lost > LONG_GAP and self._settles and waited_s < POSE_DUE_S:
+            return estimates
         return estimates + self._release()
 
     def settle(self, reading: PoseReading) -> list[OdometryEstimate]:
         """Take what the board's pose tells; releases the displacements that waited for it."""
         told = Pose(reading.x_m, reading.y_m, reading.yaw_rad)
-        if not told.finite:
+        if not self._belief.possible(told):
             return []
-        if self._board is None or reading.restarted or self._has_restarted(told):
+        confirmed = self._belief.confirmed(told, self._uncertainty.gap)
+        if reading.restarted or self._is_new_frame(told, confirmed):
             return self._attach(told)
-        self._restarted = None
+        if self._board is None or self._restarted is not None:
+            self._belief.doubted = told
+            return []
+        if self._backlog and self._settings.use_board_pose and self._reachable(told):
+            return self._resume(told)
         estimates = self._release()
         self._bridge_until_pose(reading.lost)
         if self._settings.use_board_pose:
-            self._judge(told)
+            self._judge(told, confirmed)
         return estimates
 
     def in_board_frame(self, place: Pose) -> Pose | None:
@@ -136,49 +147,80 @@ class Odometry:
 
         None while it cannot be told: no pose of the board says where the frames lie.
         """
-        proved = self._proved is not None and self._settings.use_board_pose
-        if self._board is None or self._restarted is not None or not proved:
+        if self._board is None or self._restarted is not None or not self._settles:
             return None
         way = self._follower.target.way_to(place)
         return self._board.moved(roll(self._signed(unroll(way))))
 
+    @property
+    def _settles(self) -> bool:
+        """Whether a pose may settle what is lost."""
+        return self._settings.use_board_pose and self._belief.proved is not None
+
     # The board's frame
 
-    def _has_restarted(self, told: Pose) -> bool:
-        """Whether the board counts from zero again: its pose says so better than its past does."""
-        if self._restarted is None or self._board is None:
+    def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
+        """Whether the board's frame is another one than before, if there was one.
+
+        After what looked like a restart, one pose alone is believed where either zero or the past
+        explains it.
+        """
+        if self._board is None:
+            return confirmed
+        if self._restarted is None:
             return False
+        gap = self._uncertainty.gap
         anew = self._restarted.way_to(told)
-        waited = sum((_chord(reading) for reading, _ in self._waiting), Pose())
-        went_on = (self._board + waited).way_to(told)
-        return self._expected(anew) and anew.way_m + abs(anew.yaw_rad) < went_on.way_m + abs(
-            went_on.yaw_rad
-        )
+        went_on = self._board.way_to(self._backlog.before(told))
+        if expected(anew, gap) and _size(anew) < _size(went_on):
+            return True
+        if expected(went_on, gap) or (confirmed and self._reachable(told)):
+            self._restarted = None
+        return confirmed and self._restarted is not None
 
     def _attach(self, told: Pose) -> list[OdometryEstimate]:
         """The board's frame is a new one; the odometry goes on from where it is."""
-        self._begin_at(told - sum((_chord(reading) for reading, _ in self._waiting), Pose()))
+        self._begin_at(self._backlog.before(told))
         estimates = self._release()
-        self._believe(told)
+        self._belief.believe(told)
         self._uncertainty.give_up()
         return estimates
 
+    def _resume(self, told: Pose) -> list[OdometryEstimate]:
+        """The pose tells what was lost before the displacements that wait."""
+        assert self._board is not None
+        seconds = self._backlog.unheard_s(self._last_stamp_s)
+        way = unroll(self._board.way_to(self._backlog.before(told)))
+        self._board = self._board.moved(roll(way))
+        self._uncertainty.move(self._follower.target.yaw_rad, self._signed(way))
+        self._follower.correct(roll(self._signed(way)), 0.0)
+        self._move(Pose(), seconds)
+        self._backlog.forget_losses()
+        estimates = self._release()
+        self._uncertainty.settle()
+        self._belief.believe(told)
+        return estimates
+
+    def _assume(self) -> None:
+        """No two poses agree: the last one it is, or heading 0 where there is none."""
+        if self._belief.doubted is not None:
+            self._begin_at(self._backlog.before(self._belief.doubted))
+        else:
+            self.heading_assumed = True
+            self._begin_at(Pose())
+        self._belief.proved = None
+
     def _begin_at(self, board: Pose) -> None:
         self.alignments += 1
-        self._board, self._restarted, self._doubted = board, None, None
+        self._board, self._restarted, self._belief.doubted = board, None, None
 
-    def _believe(self, board: Pose) -> None:
-        self._board = self._proved = board
-        self._unproved_s, self._doubted = 0.0, None
-
-    def _judge(self, told: Pose) -> None:
+    def _judge(self, told: Pose, confirmed: bool) -> None:
         """Correct by a pose that is reachable and no surprise, or confirmed by the one before."""
         assert self._board is not None
         way = self._board.way_to(told)
         reachable = self._reachable(told)
-        confirmed = self._doubted is not None and self._expected(self._doubted.way_to(told))
-        if not confirmed and not (reachable and self._expected(way)):
-            self._doubted = told
+        if not confirmed and not (reachable and expected(way, self._uncertainty.gap)):
+            self._belief.doubted = told
             return
         if reachable:
             self._follower.correct(roll(self._signed(unroll(way))))
@@ -186,30 +228,18 @@ class Odometry:
         else:
             self.alignments += 1
             self._uncertainty.give_up()
-        self._believe(told)
+        self._board = told
+        self._belief.believe(told)
 
     def _reachable(self, told: Pose) -> bool:
-        """From the last pose that was believed, in the time since then."""
-        if self._proved is None:
-            return False
-        way, seconds = self._proved.way_to(told), self._unproved_s
-        return (
-            way.way_m <= BELIEVED_M + self._settings.fastest_mps * seconds
-            and abs(way.yaw_rad) <= BELIEVED_TURN_RAD + self._settings.fastest_radps * seconds
-        )
-
-    def _expected(self, way: Pose) -> bool:
-        """No surprise: rounding, and what the open gaps explain."""
-        gap = self._uncertainty.gap
-        metres = math.sqrt(gap.xx + gap.yy) * BELIEVED_SIGMAS
-        turn = math.sqrt(gap.yaw_yaw) * BELIEVED_SIGMAS
-        return way.way_m <= BELIEVED_M + metres and abs(way.yaw_rad) <= BELIEVED_TURN_RAD + turn
+        waited_s = self._backlog.unheard_s(self._last_stamp_s) + self._backlog.duration_s
+        settings = self._settings
+        return self._belief.reachable(told, waited_s, settings.fastest_mps, settings.fastest_radps)
 
     # Motion
 
     def _release(self) -> list[OdometryEstimate]:
-        waiting, self._waiting = self._waiting, []
-        return [self._integrate(reading, stamp_s) for reading, stamp_s in waiting]
+        return [self._integrate(reading, stamp_s) for reading, stamp_s in self._backlog.take()]
 
     def _integrate(self, reading: DisplacementReading, stamp_s: float) -> OdometryEstimate:
         last_stamp_s, self._last_stamp_s = self._last_stamp_s, stamp_s
@@ -222,13 +252,9 @@ class Odometry:
             self._miss((reading.lost + 1) * seconds)
         self._bridge(bridge, reading.lost * seconds)
         if self._board is not None:
-            self._board = _advanced(self._board, reading)
-        if self._doubted is not None:
-            self._doubted = _advanced(self._doubted, reading)
+            self._board = advanced(self._board, reading)
         self._move(tangent, seconds)
-        self._follower.follow(
-            (reading.lost + 1) * seconds, keep_room=self._uncertainty.gap != NOTHING
-        )
+        self._follower.follow((reading.lost + 1) * seconds)
         twist = self._signed(tangent).over(seconds) if reading.duration_s else None
         covariance = self._uncertainty.total(self._follower.wrong)
         return OdometryEstimate(stamp_s, self._follower.pose, twist, covariance)
@@ -237,8 +263,7 @@ class Odometry:
         """Motion that was not told, taken to be this one."""
         if self._board is not None:
             self._board = self._board.moved(roll(tangent))
-        if self._doubted is not None:
-            self._doubted = self._doubted.moved(roll(tangent))
+        self._belief.bridged(roll(tangent))
         self._move(tangent, seconds)
 
     def _bridge_until_pose(self, lost: int) -> None:
@@ -255,7 +280,7 @@ class Odometry:
         self._follower.move(
             roll(part), self._settings.fastest_mps * seconds, self._settings.fastest_radps * seconds
         )
-        self._unproved_s += seconds
+        self._belief.passed(seconds)
 
     def _tangents(self, reading: DisplacementReading) -> tuple[Pose, Pose]:
         """In the board's body axes: of the lost displacements before this one, and of this one.
@@ -274,8 +299,8 @@ class Odometry:
 
     def _tangent(self, reading: DisplacementReading, bridged_rad: float) -> Pose:
         if reading.frame == "body" or self._board is None:
-            return _chord(reading)
-        return unroll(_chord(reading).turned(-self._board.yaw_rad - bridged_rad))
+            return chord(reading)
+        return unroll(chord(reading).turned(-self._board.yaw_rad - bridged_rad))
 
     def _miss(self, duration_s: float) -> None:
         self._uncertainty.miss(duration_s, self._settings.fastest_mps, self._settings.fastest_radps)
@@ -284,12 +309,5 @@ class Odometry:
         return tangent.times(*self._axis_signs)
 
 
-def _chord(reading: DisplacementReading) -> Pose:
-    return Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad)
-
-
-def _advanced(board: Pose, reading: DisplacementReading) -> Pose:
-    """A pose in the board's frame after this displacement."""
-    if reading.frame == "earth":
-        return board + _chord(reading)
-    return board.moved(roll(_chord(reading)))
+def _size(way: Pose) -> float:
+    return way.way_m + abs(way.yaw_rad)

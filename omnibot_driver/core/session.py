@@ -7,7 +7,7 @@ not log: whatever a user should hear of is an event.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from omnibot_driver.core.board import (
@@ -27,7 +27,9 @@ from omnibot_driver.core.helm import ControlMethod, Helm
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits, require_timely
 from omnibot_driver.core.motion import GoalMotion, Motion
+from omnibot_driver.core.news import News
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.plausibility import MotionLimits, Plausibility, Refused, Stamped
 from omnibot_driver.core.se2 import Pose, Signs
 from omnibot_driver.core.supervisor import Phase, Request, RequestDone, Supervisor
 from omnibot_driver.core.watch import Finding, Watch
@@ -36,8 +38,6 @@ SILENCE_S: Final = 1.5
 """The board says something at least once a second; after this it is not known to be there."""
 UNHEARD_S: Final = 0.3
 """A robot that is not heard for so long is driven no further: it may be restarting."""
-LOSS_NOTICE_S: Final = 10.0
-"""Lost frames are counted and told no more often than this."""
 DISCONNECTED: Final = "disconnected"
 
 OnExit = Literal["stop", "pause", "reset"]
@@ -74,6 +74,7 @@ class SessionSettings:
     limits: SpeedLimits
     commands: CommandSettings
     odometry: OdometrySettings
+    motion: MotionLimits = field(default_factory=MotionLimits)
 
 
 class Session:
@@ -98,13 +99,15 @@ class Session:
         )
         self._odometry = Odometry(settings.odometry, axis_signs)
         self._helm = Helm(board, self._odometry, settings.limits, axis_signs, control)
+        self._plausibility = Plausibility(settings.motion, board.tick_s)
         self._clock = DeviceClock(board.tick_s)
         self._heard_at = self._came_at = -math.inf
         self._silent = False
         self._heading_assumed = False
         self._watch = Watch()
+        self._advice: str | None = None
         self._lost = 0
-        self._lost_told_at = -math.inf
+        self._lost_news, self._refused_news = News(), News()
         self._events: list[Event] = []
         self._shown = (self.state, self.estop_active)
 
@@ -124,6 +127,20 @@ class Session:
         return self._commands.latched
 
     @property
+    def lost(self) -> int:
+        """Displacements that were lost on the line since the driver began."""
+        return self._lost
+
+    @property
+    def refused(self) -> Refused:
+        """What the wire said and nobody was told."""
+        imu, displacements = (
+            self._plausibility.refused_imu,
+            self._plausibility.refused_displacements,
+        )
+        return Refused(imu, displacements, self._odometry.refused_poses)
+
+    @property
     def wake_at(self) -> float:
         """When ``tick`` must be called at the latest; infinity when nothing is due."""
         if self._closed:
@@ -139,6 +156,7 @@ class Session:
         self._helm.limits = settings.limits
         self._commands.settings = settings.commands
         self._odometry.settings = settings.odometry
+        self._plausibility.limits = settings.motion
 
     def opened(self, now: float) -> None:
         """The port is open."""
@@ -154,6 +172,7 @@ class Session:
     def closed(self, now: float) -> None:
         """The port is gone."""
         self._take_in(self._board.flush(now), now)
+        self._measure(self._plausibility.release(), now)
         self._supervisor.closed()
         self._commands.discard()
 
@@ -171,7 +190,8 @@ class Session:
             self._commands.halt(now)
         if not self._silent and now - self._heard_at >= SILENCE_S:
             self._silent = True
-            self._events.append(Notice(self._why_silent()))
+            self._measure(self._plausibility.release(), now)
+            self._notify(self._why_silent())
             if self._board.mode is not Mode.UNKNOWN:
                 self._board.silence()
                 self._clock.restart()
@@ -281,19 +301,36 @@ class Session:
             return
         self._heard_at, self._silent = now, False
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
+            if isinstance(reading, DisplacementReading | PoseReading):
+                self._lost += reading.lost
+            self._measure(self._plausibility.admit(reading, stamp_s), now)
+        self._check_goal([], now)
+        self._tell(now)
+        if self._board.advice != self._advice and self._board.advice is not None:
+            self._advice = self._board.advice
+            self._notify(self._advice)
+        if self._odometry.heading_assumed and not self._heading_assumed:
+            self._heading_assumed = True
+            self._notify(
+                "the board sends no pose that makes sense: its heading is assumed to have been 0"
+                " at first"
+            )
+        if self._board.mode.running and not isinstance(readings[-1], PausedReading):
+            self._supervisor.heard_data(now)
+
+    def _measure(self, readings: list[Stamped], now: float) -> None:
+        for reading, stamp_s in readings:
             match reading:
                 case ImuReading(force, rate):
                     self._events.append(ImuEstimate(stamp_s, force, rate))
-                case DisplacementReading(lost=lost, restarted=restarted):
-                    self._count_lost(lost, now)
+                case DisplacementReading(restarted=restarted):
                     self._look(reading, now)
                     estimates = self._odometry.displace(reading, stamp_s)
                     self._events += estimates
                     self._check_goal(estimates, now)
                     if restarted:
                         self._commands.halt(now)
-                case PoseReading(lost=lost, restarted=restarted):
-                    self._count_lost(lost, now)
+                case PoseReading(restarted=restarted):
                     self._events += self._odometry.settle(reading)
                     if restarted:
                         self._commands.halt(now)
@@ -302,21 +339,13 @@ class Session:
                     self._watch.begin()
                     self._clock.restart()
                     self._supervisor.heard_paused(now, continues=continues)
-        self._check_goal([], now)
-        if self._odometry.heading_assumed and not self._heading_assumed:
-            self._heading_assumed = True
-            self._events.append(
-                Notice("the board sends no pose: its heading is assumed to have been 0 at first")
-            )
-        if self._board.mode.running and not isinstance(readings[-1], PausedReading):
-            self._supervisor.heard_data(now)
 
     def _look(self, reading: DisplacementReading, now: float) -> None:
         finding = self._watch.look(reading, self._commands.current)
         if finding is Finding.ASTRAY:
             self._commands.halt(now)
         if finding and self._watch.is_news(finding):
-            self._events.append(Notice(finding.value))
+            self._notify(finding.value)
 
     def _check_goal(self, estimates: Sequence[OdometryEstimate], now: float) -> None:
         """Drop a goal that is another place by now, or that the robot drives away from."""
@@ -330,7 +359,7 @@ class Session:
         else:
             return
         self._commands.halt(now)
-        self._events.append(Notice(f"the goal of cmd_pose is discarded: {why}"))
+        self._notify(f"the goal of cmd_pose is discarded: {why}")
 
     def _why_silent(self) -> str:
         if self._came_at > self._heard_at:
@@ -343,13 +372,20 @@ class Session:
             " and that `port` is its port"
         )
 
-    def _count_lost(self, lost: int, now: float) -> None:
-        self._lost += lost
-        if self._lost and now - self._lost_told_at >= LOSS_NOTICE_S:
-            self._events.append(
-                Notice(f"{self._lost} odometry frames were lost on the line: check cable and hub")
+    def _tell(self, now: float) -> None:
+        if lost := self._lost_news.since_told(self._lost, now):
+            self._notify(f"{lost} odometry frames were lost on the line: check cable and hub")
+        refused = self.refused
+        total = refused.imu + refused.displacements + refused.poses
+        if more := self._refused_news.since_told(total, now):
+            self._notify(
+                f"{more} readings cannot be true and were refused (in all {refused.imu} imu,"
+                f" {refused.displacements} odometry, {refused.poses} poses): the line changes bits,"
+                " or a limit of motion is set too low"
             )
-            self._lost, self._lost_told_at = 0, now
+
+    def _notify(self, text: str) -> None:
+        self._events.append(Notice(text))
 
     def _command(self, motion: Motion, now: float, *, expires_at: float) -> None:
         phase, mode = self._supervisor.phase, self._board.mode

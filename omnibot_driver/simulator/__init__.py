@@ -4,6 +4,7 @@ Shares no code with the driver: a misread manual must not cancel out. `Simulated
 `PtyBoard` runs it in real time; `python -m omnibot_driver.simulator` does so from the command line.
 """
 
+from omnibot_driver.simulator.faults import FaultyLine, LineFaults
 from omnibot_driver.simulator.firmware import (
     BoardMode,
     ReceivedCommand,
@@ -18,6 +19,8 @@ __all__ = [
     "BoardMode",
     "BoardPose",
     "BoardSettings",
+    "FaultyLine",
+    "LineFaults",
     "PtyBoard",
     "ReceivedCommand",
     "SentFrame",

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 
+from omnibot_driver.simulator.faults import FaultyLine, LineFaults
 from omnibot_driver.simulator.firmware import SimulatedBoard
 from omnibot_driver.simulator.pty import PtyBoard
 from omnibot_driver.simulator.settings import BoardSettings
@@ -39,8 +40,10 @@ def main(argv: list[str] | None = None) -> int:
             running=arguments.running,
         )
     )
+    faults = LineFaults(lose=arguments.lose, burst=arguments.burst, flip=arguments.flip)
+    line = FaultyLine(faults, arguments.seed)
     try:
-        with _signals_as_readable() as signalled, PtyBoard(board, arguments.link) as port:
+        with _signals_as_readable() as signalled, PtyBoard(board, arguments.link, line) as port:
             print(port.path, flush=True)
             print(
                 f"A simulated OmniBot board listens on {arguments.link or port.path}. In another "
@@ -87,7 +90,29 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--running", action="store_true", help="start in the running mode instead of booting"
     )
+    for fault, effect in (
+        ("lose", "is lost"),
+        ("burst", "begins a burst of up to 200 lost bytes"),
+        ("flip", "arrives with one bit changed"),
+    ):
+        parser.add_argument(
+            f"--{fault}",
+            type=_chance,
+            default=0.0,
+            metavar="RATE",
+            help=f"chance that a byte the board sends {effect} (default 0)",
+        )
     return parser
+
+
+def _chance(text: str) -> float:
+    try:
+        chance = float(text)
+    except ValueError:
+        chance = -1.0
+    if not 0.0 <= chance <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no chance: give a number from 0 to 1")
+    return chance
 
 
 @contextmanager
@@ -154,6 +179,8 @@ def _truth(port: PtyBoard) -> dict[str, object]:
             "odometry": asdict(board.odometry),
             "tick": board.tick,
             "dropped": port.dropped,
+            "lost": port.line.lost,
+            "flipped": port.line.flipped,
         }
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from omnibot_driver.simulator.faults import FaultyLine, LineFaults
 from omnibot_driver.simulator.firmware import SimulatedBoard
 from omnibot_driver.simulator.motors import TICK_S
 
@@ -33,15 +34,18 @@ class PtyBoard:
 
     The terminal outlives the programs that open it. Bytes that nobody reads are lost like those of
     a UART once the kernel's buffer is full; `dropped` counts them. `link` names a symbolic link to
-    be made for the terminal and removed on exit.
+    be made for the terminal and removed on exit. `line` is what the board's bytes go through first.
 
     From other threads touch `board` under `lock` only. Raises FileExistsError when `link` is taken
     by anything but a dead link or a link to a pseudo-terminal, and RuntimeError on exit (and from
     `wait_for`) when the board's thread died.
     """
 
-    def __init__(self, board: SimulatedBoard, link: str | None = None) -> None:
+    def __init__(
+        self, board: SimulatedBoard, link: str | None = None, line: FaultyLine | None = None
+    ) -> None:
         self.board = board
+        self.line = line or FaultyLine(LineFaults())
         self.path = ""
         self.dropped = 0
         self.lock = threading.RLock()
@@ -120,7 +124,7 @@ class PtyBoard:
             if time.monotonic() >= due_s:
                 due_s += TICK_S
                 with self._ticked:
-                    self._send(self.board.step())
+                    self._send(self.line.carry(self.board.step()))
                     self._ticked.notify_all()
 
     def _send(self, data: bytes) -> None:

@@ -86,6 +86,12 @@ def heading(yaw: float) -> PoseReading:
     return PoseReading(1.0, 2.0, yaw)
 
 
+def attach(odometry: Odometry, pose: PoseReading) -> list[OdometryEstimate]:
+    """The board says twice where it is."""
+    assert odometry.settle(pose) == []
+    return odometry.settle(pose)
+
+
 def last(estimates: list[OdometryEstimate]) -> Triple:
     return xyyaw(estimates[-1].pose)
 
@@ -131,7 +137,7 @@ def test_straight_ahead_is_x() -> None:
 def test_a_quarter_circle_to_the_left_ends_at_its_radius(frame: str) -> None:
     """Radius 1 m in 50 steps, exactly."""
     odometry, trip = Odometry(SETTINGS), Trip()
-    odometry.settle(trip.pose)
+    attach(odometry, trip.pose)
     step = math.pi / 2 / 50
     for _ in range(50):
         estimates = odometry.displace(trip.move(step, 0.0, step, frame), 0.0)
@@ -153,7 +159,7 @@ def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
 ) -> None:
     """A board that has driven before, or whose axes point elsewhere, gives the same odometry."""
     odometry, trip = Odometry(SETTINGS, signs), Trip(initial, signs)
-    odometry.settle(trip.pose)
+    attach(odometry, trip.pose)
     for number, move in enumerate(moves):
         estimates = odometry.displace(trip.move(*xyyaw(move)), 0.0)
         if number % 5 == 4:
@@ -176,7 +182,7 @@ def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]
 def test_the_twist_is_the_bodys_over_40_ms(move: Pose, initial: float, frame: str) -> None:
     """Of a constant twist exactly, in the body's axes, whatever came before."""
     odometry, trip = Odometry(SETTINGS), Trip(initial)
-    odometry.settle(trip.pose)
+    attach(odometry, trip.pose)
     for _ in range(3):
         (estimate,) = odometry.displace(trip.move(*xyyaw(move), frame), 0.0)
         twist = estimate.twist
@@ -190,7 +196,7 @@ def test_every_delta_gives_one_estimate_with_its_own_stamp() -> None:
     odometry = Odometry(SETTINGS)
     assert odometry.displace(earth(0.01, 0.0), 1.0) == []
     assert odometry.displace(earth(0.01, 0.0), 1.04) == []
-    stamps = [estimate.stamp_s for estimate in odometry.settle(heading(0.0))]
+    stamps = [estimate.stamp_s for estimate in attach(odometry, heading(0.0))]
     stamps += [estimate.stamp_s for estimate in odometry.displace(earth(0.01, 0.0), 1.08)]
     assert stamps == [1.0, 1.04, 1.08]
 
@@ -204,9 +210,33 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     for move in moves:
         assert odometry.displace(trip.move(*xyyaw(move)), 0.0) == []
-    estimates = odometry.settle(trip.pose)
+    estimates = attach(odometry, trip.pose)
     assert len(estimates) == len(moves)
     assert last(estimates) == close(trip.truth, 1e-8)
+    assert not odometry.heading_assumed
+
+
+def test_the_first_pose_must_be_confirmed_too() -> None:
+    """A damaged one turns nothing: the first two that agree tell the heading."""
+    odometry = Odometry(SETTINGS)
+    assert odometry.displace(earth(0.0, 0.1), 0.0) == []
+    assert odometry.settle(heading(-1.0)) == []
+    assert odometry.displace(earth(0.0, 0.1), 0.0) == []
+    assert odometry.settle(PoseReading(1.0, 2.1, math.pi / 2)) == []
+    assert odometry.displace(earth(0.0, 0.1), 0.0) == []
+    estimates = odometry.settle(PoseReading(1.0, 2.2, math.pi / 2))
+    assert len(estimates) == 3
+    assert last(estimates) == close((0.3, 0.0, 0.0))
+    assert odometry.refused_poses == 1
+
+
+def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
+    """The next one was lost; after a second it is taken for true."""
+    odometry = Odometry(SETTINGS)
+    odometry.settle(heading(math.pi / 2))
+    for _ in range(25):
+        estimates = odometry.displace(earth(0.0, 0.01), 0.0)
+    assert last(estimates) == close((0.25, 0.0, 0.0))
     assert not odometry.heading_assumed
 
 
@@ -228,7 +258,7 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
     odometry = Odometry(SETTINGS)
     for _ in range(25):
         odometry.displace(earth(0.0, 0.0), 0.0)
-    odometry.settle(heading(math.pi / 2))
+    attach(odometry, heading(math.pi / 2))
     odometry.settle(heading(math.pi / 2))
     assert last(odometry.displace(earth(0.0, 0.1), 0.0)) == close((0.1, 0.0, 0.0))
 
@@ -237,7 +267,7 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
 def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
     """One damaged pose does not turn the odometry; two that agree tell of another earth frame."""
     odometry, trip = Odometry(SETTINGS), Trip(initial)
-    odometry.settle(trip.pose)
+    attach(odometry, trip.pose)
     x, y, yaw = trip.board
     odometry.settle(PoseReading(x, y, yaw + surprise))
     assert last(odometry.displace(trip.move(0.1, 0.0, 0.0), 0.0)) == close((0.1, 0.0, 0.0))
@@ -252,7 +282,8 @@ def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) ->
 def test_two_surprising_poses_that_disagree_confirm_nothing() -> None:
     """Each is damaged in its own way."""
     odometry = Odometry(SETTINGS)
-    for yaw in (0.0, 1.0, 2.0, -1.0):
+    attach(odometry, heading(0.0))
+    for yaw in (1.0, 2.0, -1.0):
         odometry.settle(heading(yaw))
     assert last(odometry.displace(earth(1.0, 0.0), 0.0)) == close((1.0, 0.0, 0.0))
 
@@ -260,7 +291,7 @@ def test_two_surprising_poses_that_disagree_confirm_nothing() -> None:
 def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> None:
     """From +π to −π is no jump."""
     odometry = Odometry(SETTINGS)
-    odometry.settle(heading(math.pi - 0.01))
+    attach(odometry, heading(math.pi - 0.01))
     odometry.displace(earth(0.0, 0.0, 0.02), 0.0)
     odometry.settle(heading(-math.pi + 0.01))
     ahead = earth(math.cos(-math.pi + 0.01), math.sin(-math.pi + 0.01))
@@ -270,7 +301,7 @@ def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> Non
 def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -> None:
     """The pose counts, not the sum of rounded displacements; five steps take it over."""
     odometry = Odometry(SETTINGS)
-    odometry.settle(PoseReading(0.0, 0.0, 0.0))
+    attach(odometry, PoseReading(0.0, 0.0, 0.0))
     odometry.settle(PoseReading(0.01, -0.005, 0.02))
     ways = [last(odometry.displace(earth(0.0, 0.0), 0.0)) for _ in range(5)]
     assert ways[0] == close((0.002, -0.001, 0.004))
@@ -283,7 +314,7 @@ def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
     odometry = Odometry(SETTINGS)
     odometry.displace(earth(0.0, 0.1), 0.0)
     assert odometry.settle(PoseReading(0.0, 0.0, bad)) == []
-    assert len(odometry.settle(heading(math.pi / 2))) == 1
+    assert len(attach(odometry, heading(math.pi / 2))) == 1
     odometry.settle(PoseReading(0.0, 0.0, bad))
     odometry.settle(PoseReading(0.0, 0.0, bad))
     assert last(odometry.displace(earth(0.0, 0.1), 0.0)) == close((0.2, 0.0, 0.0))
@@ -303,7 +334,7 @@ def test_a_board_that_restarts_goes_on_from_here(
 ) -> None:
     """It counts from zero; the odometry knows no seam."""
     odometry, trip = Odometry(SETTINGS, signs), Trip(initial, signs)
-    odometry.settle(trip.pose)
+    attach(odometry, trip.pose)
     for move in before:
         odometry.displace(trip.move(*xyyaw(move)), 0.0)
     trip.board = (0.0, 0.0, 0.0)
@@ -320,7 +351,7 @@ def test_a_board_that_restarts_goes_on_from_here(
 def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
     """Pose and covariance; forward is forward afterwards too."""
     odometry, trip = Odometry(SETTINGS), Trip(0.7)
-    odometry.settle(trip.pose)
+    attach(odometry, trip.pose)
     for _ in range(10):
         odometry.displace(trip.move(0.02, 0.01, 0.1), 0.0)
     odometry.reset()
@@ -338,7 +369,7 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
         odometry.displace(trip.move(0.02, 0.0, 0.1), 0.0)
     odometry.reset()
     reading = trip.move(0.01, 0.0, 0.0)
-    estimates = odometry.displace(reading, 0.0) + odometry.settle(trip.pose)
+    estimates = odometry.displace(reading, 0.0) + attach(odometry, trip.pose)
     assert last(estimates) == close((0.01, 0.0, 0.0))
 
 

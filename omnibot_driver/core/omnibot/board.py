@@ -37,9 +37,11 @@ from omnibot_driver.core.omnibot.frames import (
 )
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
 from omnibot_driver.core.omnibot.sequence import Sequence
+from omnibot_driver.core.omnibot.suspicion import Suspicion
 from omnibot_driver.core.se2 import Pose
 
 TICK_S: Final = 0.01
+IMUS_PER_DELTA: Final = 4
 DELTA_LSB: Final = (1e-4, 1e-4, 1e-4)
 """m, m, rad."""
 POSE_LSB_M: Final = 1e-3
@@ -79,6 +81,7 @@ class OmniBot:
     def __init__(self, settings: OmniBotSettings) -> None:
         self.settings = settings
         self._sequence = Sequence()
+        self._suspicion = Suspicion()
         self.connect()
 
     def connect(self) -> None:
@@ -89,6 +92,7 @@ class OmniBot:
         self._modes = ModeTracker()
         self._sequence.reconnect()
         self._paused_count: int | None = None
+        self._imus = 0
 
     @property
     def mode(self) -> Mode:
@@ -107,6 +111,11 @@ class OmniBot:
         if not begun.startswith(frames.IMU_HEADER):
             return None
         return max(0, frames.IMU_LENGTH - len(begun)) * frames.BYTE_S
+
+    @property
+    def advice(self) -> str | None:
+        """Which parameter is set wrong, by what the board sends."""
+        return self._suspicion.advice
 
     def receive(self, data: bytes, now: float) -> list[Reading]:
         """The readings that these bytes complete, in the order of the line."""
@@ -187,19 +196,22 @@ class OmniBot:
         self._modes.hear(frame)
         match frame:
             case ImuFrame(accel, gyro):
+                self._imus += 1
                 scale = self.settings.imu
                 return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro))
             case DeltaFrame():
                 return self._displacement(frame, now)
             case PoseFrame(x, y, theta, seq):
                 step = self._sequence.pose(seq, now)
-                return PoseReading(
+                pose = PoseReading(
                     x * POSE_LSB_M,
                     y * POSE_LSB_M,
                     theta * POSE_LSB_RAD,
                     lost=step.lost,
                     restarted=step.restarted,
                 )
+                self._suspicion.posed(frame, pose, self.settings.pose_byte_order)
+                return pose
             case PausedFrame(count):
                 before, self._paused_count = self._paused_count, count
                 self._sequence.pause()
@@ -207,13 +219,14 @@ class OmniBot:
 
     def _displacement(self, frame: DeltaFrame, now: float) -> DisplacementReading:
         self._paused_count = None
-        step = self._sequence.delta(frame.seq, now)
+        step = self._sequence.delta(frame.seq, now, whole=self._imus == IMUS_PER_DELTA)
+        self._imus = 0
         words = (frame.dx, frame.dy, frame.dtheta)
         if self.settings.delta_frame == "wheel_counts":
             dx, dy, dyaw = self._rolled(words)
         else:
             dx, dy, dyaw = (word * unit for word, unit in zip(words, DELTA_LSB, strict=True))
-        return DisplacementReading(
+        displacement = DisplacementReading(
             dx,
             dy,
             dyaw,
@@ -222,6 +235,8 @@ class OmniBot:
             lost=step.lost,
             restarted=step.restarted,
         )
+        self._suspicion.displaced(displacement)
+        return displacement
 
     def _rolled(self, counts: Words) -> Vector3:
         """The body's displacement from the wheels' counts (manual, "Odometry equation")."""

@@ -43,6 +43,8 @@ class Sequence:
         self._regular = False
         """Five deltas to a pose were seen; only then is a sixth missed."""
         self._paused = self._reconnected = False
+        self._ahead = False
+        """The last count was ahead of the time, and once the time is believed: a bit flipped."""
 
     def pause(self) -> None:
         """The board said that it is paused: what comes next takes up the count, or begins anew."""
@@ -52,8 +54,8 @@ class Sequence:
         """The line is new."""
         self._reconnected, self._pose = True, None
 
-    def delta(self, count: int, now: float) -> Step:
-        """A delta with this count came in."""
+    def delta(self, count: int, now: float, *, whole: bool = False) -> Step:
+        """A delta with this count came in; ``whole``: with all that belongs to one period."""
         before, self._delta = self._delta, count
         elapsed_s, self._delta_at = now - self._delta_at, now
         paused, self._paused = self._paused, False
@@ -71,6 +73,12 @@ class Sequence:
         if lost and late_s > LATE_S and (from_zero or reconnected):
             self._pose = None
             return Step(0, None, restarted=True)
+        latest_s = (lost + 1) * DELTA_PERIOD_S - (DELTA_PERIOD_S / 2 if whole else LATE_S)
+        ahead = lost > 0 and elapsed_s < latest_s
+        self._ahead = ahead and not self._ahead
+        if self._ahead:
+            lost = max(0, round(elapsed_s / DELTA_PERIOD_S) - 1)
+            self._delta = (before + lost + 1) % WRAP
         lost -= min(lost, told)
         self._since_pose += lost + 1
         return Step(lost)
@@ -89,6 +97,6 @@ class Sequence:
         if from_zero and abs(passed - counted) > 2 * DELTAS_PER_POSE:
             return Step(0, None, restarted=True)
         missing = max(0, passed - counted)
-        in_time = missing * DELTA_PERIOD_S <= now - self._delta_at + EARLY_S
+        in_time = missing * DELTA_PERIOD_S <= now - self._delta_at + DELTA_PERIOD_S
         self._told = missing if in_time else 0
         return Step(self._told)

@@ -1,0 +1,93 @@
+"""Settings that what the board sends contradicts: the user is told, nothing is switched by itself.
+
+Poses that make sense only in the other byte order; deltas that lead to the next pose only in the
+other frame. This module knows what the wire says in each setting; not how anybody is told.
+"""
+
+import math
+import struct
+from dataclasses import replace
+from typing import Final, Literal
+
+from omnibot_driver.core.backlog import advanced
+from omnibot_driver.core.board import DisplacementReading, PoseReading
+from omnibot_driver.core.omnibot.frames import ByteOrder, PoseFrame
+from omnibot_driver.core.se2 import Pose
+
+SURE: Final = 10
+"""So many poses that speak against a setting, and none for it: two seconds."""
+SMALLEST: Final = 1e-6
+LARGEST: Final = 1e7
+"""Of a coordinate in mm or mrad that is not 0: beyond, it is other bytes misread."""
+CLEARLY_M: Final = 0.01
+TIMES: Final = 4.0
+"""One frame leads so far away from the pose, and so many times further than the other."""
+
+_OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}
+_OTHER_FRAME: Final[dict[str, Literal["earth", "body"]]] = {"earth": "body", "body": "earth"}
+
+
+class Suspicion:
+    """``advice``: a sentence for the user, once there is reason for it."""
+
+    def __init__(self) -> None:
+        self.advice: str | None = None
+        self._against_order = self._against_frame = 0
+        self._from: Pose | None = None
+        self._moved: list[DisplacementReading] = []
+
+    def displaced(self, reading: DisplacementReading) -> None:
+        """A delta, as the settings read it."""
+        self._moved.append(reading)
+        if reading.lost or reading.restarted or reading.duration_s is None:
+            self._from = None
+        if self._from is None:
+            self._moved.clear()
+
+    def posed(self, frame: PoseFrame, reading: PoseReading, order: ByteOrder) -> None:
+        """A pose, as the settings read it."""
+        values = (frame.x, frame.y, frame.theta)
+        makes_sense, swapped = _makes_sense(values), _makes_sense(_swapped(values))
+        if makes_sense != swapped:
+            self._against_order = 0 if makes_sense else self._against_order + 1
+        if self._against_order == SURE:
+            self.advice = (
+                "the board's poses make sense only in the other byte order: set the parameter"
+                f" `pose_byte_order` to {_OTHER_ORDER[order]}"
+            )
+        if makes_sense:
+            self._compare(Pose(reading.x_m, reading.y_m, reading.yaw_rad))
+
+    def _compare(self, told: Pose) -> None:
+        before, self._from = self._from, told
+        moved, self._moved = self._moved, []
+        if before is None or not moved:
+            return
+        frame = moved[0].frame
+        said, other = (
+            _distance(before, [replace(reading, frame=meant) for reading in moved], told)
+            for meant in (frame, _OTHER_FRAME[frame])
+        )
+        if said > max(CLEARLY_M, TIMES * other):
+            self._against_frame += 1
+        elif other > max(CLEARLY_M, TIMES * said):
+            self._against_frame = 0
+        if self._against_frame == SURE:
+            self.advice = (
+                "the board's deltas lead to its poses only in the other frame: set the parameter"
+                f" `delta_frame` to {_OTHER_FRAME[frame]}"
+            )
+
+
+def _makes_sense(values: tuple[float, ...]) -> bool:
+    return all(value == 0.0 or SMALLEST < abs(value) < LARGEST for value in values)
+
+
+def _swapped(values: tuple[float, ...]) -> tuple[float, ...]:
+    return struct.unpack("<3f", struct.pack(">3f", *values))
+
+
+def _distance(start: Pose, moved: list[DisplacementReading], told: Pose) -> float:
+    for reading in moved:
+        start = advanced(start, reading)
+    return math.hypot(told.x_m - start.x_m, told.y_m - start.y_m)

@@ -1,0 +1,225 @@
+"""Readings that no robot can have made: what framing cannot see, because no byte is missing.
+
+Two things are impossible. A displacement faster than the robot can go; and a leap of a single
+reading, away from all before it and back again with the next. A leap that lasts, or goes on
+leaping, is a shock, and true. So what leaps waits for the next reading of its kind, and comes out
+with it unless it is refused; nothing else ever waits.
+
+A refused displacement is as if it had been lost on the line. This module knows readings and the
+robot's limits; it knows no bytes and no clock.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import hypot
+from typing import Final
+
+from omnibot_driver.core.board import (
+    DisplacementReading,
+    ImuReading,
+    PausedReading,
+    PoseReading,
+    Reading,
+)
+
+Stamped = tuple[Reading, float]
+"""A reading and its time in s."""
+
+OUT_OF_PROPORTION: Final = 3.0
+"""A leap is so many times larger than any step of the last while."""
+CALMING: Final = 0.95
+"""What a reading leaves of the largest step before it: after 20 of them a third."""
+STILL: Final = 0.08
+"""Part of a leap by which the sensor's other words may move, and all of them when it is over. A
+knock, however short, moves more."""
+BACK: Final = 0.25
+"""Part of a leap that may be left when a robot that drives is back where it was."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionLimits:
+    """What the robot can never exceed, pushed by hand too.
+
+    ``force_step_mps2``: the least change of specific force, from one reading to the next, that is
+    looked at twice.
+    """
+
+    fastest_mps: float = 2.0
+    fastest_radps: float = 8.0
+    fastest_mps2: float = 15.0
+    fastest_radps2: float = 50.0
+    force_step_mps2: float = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """How many readings that cannot be true were not believed since the driver began."""
+
+    imu: int
+    displacements: int
+    poses: int
+
+
+class Plausibility:
+    """``limits`` may be replaced at any time; ``tick_s`` is the time between two ImuReadings."""
+
+    def __init__(self, limits: MotionLimits, tick_s: float) -> None:
+        self.limits = limits
+        self.refused_imu = self.refused_displacements = 0
+        self._tick_s = tick_s
+        self._imu_leaps = _Leaps(STILL, knocked=3)
+        self._motion_leaps = _Leaps(BACK, knocked=0)
+        self._held_imu: list[Stamped] = []
+        self._held_motion: list[Stamped] = []
+        """A displacement that leaps, and the poses after it."""
+        self._displaced_at_s: float | None = None
+        self._lost = 0
+        self._restarted = self._time_unknown = False
+
+    def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
+        """The readings that are sure now, each kind in the order in which it came."""
+        match reading:
+            case ImuReading():
+                return self._admit_imu(reading, stamp_s)
+            case DisplacementReading():
+                return self._admit_displacement(reading, stamp_s)
+            case PoseReading() if self._held_motion:
+                self._held_motion.append((reading, stamp_s))
+                return []
+            case PoseReading():
+                return [(self._told_of_losses(reading), stamp_s)]
+            case PausedReading():
+                return [*self.release(), (reading, stamp_s)]
+
+    def release(self) -> list[Stamped]:
+        """What waits, for nothing will come that could speak against it."""
+        released = [*self._held_imu, *self._held_motion]
+        self._held_imu, self._held_motion = [], []
+        self._imu_leaps.forget()
+        self._motion_leaps.forget()
+        return released
+
+    def _admit_imu(self, reading: ImuReading, stamp_s: float) -> list[Stamped]:
+        turn = self.limits.fastest_radps2 * self._tick_s
+        values = [value / self.limits.force_step_mps2 for value in reading.specific_force]
+        values += [value / turn for value in reading.angular_velocity]
+        was_flip, leaps = self._imu_leaps.judge(values)
+        held, self._held_imu = self._held_imu, []
+        if was_flip:
+            self.refused_imu += 1
+            held = []
+        if leaps:
+            self._held_imu = [(reading, stamp_s)]
+            return held
+        return [*held, (reading, stamp_s)]
+
+    def _admit_displacement(self, reading: DisplacementReading, stamp_s: float) -> list[Stamped]:
+        before_s, self._displaced_at_s = self._displaced_at_s, stamp_s
+        seconds = reading.duration_s
+        if seconds is None:
+            self._motion_leaps.forget()
+            seconds = None if before_s is None else stamp_s - before_s
+        if seconds is not None and not self._possible(reading, seconds):
+            self._refuse(reading)
+            return []
+        was_flip = leaps = False
+        if reading.duration_s is not None:
+            turn = self.limits.fastest_radps2 * reading.duration_s**2
+            way = self.limits.fastest_mps2 * reading.duration_s**2
+            values = [reading.dx_m / way, reading.dy_m / way, reading.dyaw_rad / turn]
+            periods = reading.lost + self._lost + 1
+            was_flip, leaps = self._motion_leaps.judge(values, periods)
+        released, self._held_motion = self._held_motion, []
+        if was_flip:
+            refused, _ = released.pop(0)
+            assert isinstance(refused, DisplacementReading)
+            self._refuse(refused)
+        released = [(self._told_of_losses(held), at_s) for held, at_s in released]
+        reading = self._made_good(reading)
+        if leaps:
+            self._held_motion = [(reading, stamp_s)]
+            return released
+        return [*released, (reading, stamp_s)]
+
+    def _possible(self, reading: DisplacementReading, seconds: float) -> bool:
+        return (
+            hypot(reading.dx_m, reading.dy_m) <= self.limits.fastest_mps * seconds
+            and abs(reading.dyaw_rad) <= self.limits.fastest_radps * seconds
+        )
+
+    def _refuse(self, reading: DisplacementReading) -> None:
+        self.refused_displacements += 1
+        self._lost += reading.lost + 1
+        self._restarted |= reading.restarted
+        self._time_unknown |= reading.duration_s is None
+
+    def _told_of_losses(self, reading: Reading) -> Reading:
+        """A pose includes what was refused before it."""
+        if not isinstance(reading, PoseReading) or not self._lost:
+            return reading
+        lost, self._lost = self._lost, 0
+        return replace(reading, lost=reading.lost + lost)
+
+    def _made_good(self, reading: DisplacementReading) -> DisplacementReading:
+        """What is known of the refused ones before it is now known of this one."""
+        if not (self._lost or self._restarted or self._time_unknown):
+            return reading
+        unknown = self._time_unknown or reading.duration_s is None
+        made_good = replace(
+            reading,
+            lost=0 if unknown else reading.lost + self._lost,
+            duration_s=None if unknown else reading.duration_s,
+            restarted=self._restarted or reading.restarted,
+        )
+        self._lost, self._restarted, self._time_unknown = 0, False, False
+        return made_good
+
+
+class _Leaps:
+    """Finds single leaps in a row of values, each in units of what it may change by at once.
+
+    ``left``: what may be left of a leap that is over, as a part of it; ``knocked``: so many of the
+    first values may leap in a knock and be back, and then others move too; the rest never can.
+    """
+
+    def __init__(self, left: float, *, knocked: int) -> None:
+        self._left = left
+        self._knocked = knocked
+        self.forget()
+
+    def forget(self) -> None:
+        """What comes next has nothing to do with what came before."""
+        self._sure: Sequence[float] | None = None
+        self._leaping: Sequence[float] | None = None
+        self._restless = 0.0
+
+    def judge(self, values: Sequence[float], periods: int = 1) -> tuple[bool, bool]:
+        """Whether the leap before was a single one, and whether these values leap themselves."""
+        leaping, self._leaping = self._leaping, None
+        was_single = False
+        if leaping is not None and self._sure is not None:
+            leapt = max(_steps(self._sure, leaping))
+            was_single = max(_steps(self._sure, values)) <= self._left * leapt
+            if was_single:  # the next one is a shock after all, unless it is larger
+                self._restless = max(self._restless, leapt / OUT_OF_PROPORTION)
+            else:
+                self._restless = max(self._restless, leapt)
+                self._sure = leaping
+        if self._sure is None:
+            self._sure = values
+            return False, False
+        steps = _steps(self._sure, values)
+        least = max(periods, OUT_OF_PROPORTION * self._restless)
+        *others, largest = sorted(steps)
+        alone = others[-1] <= self._left * largest
+        if max(steps[self._knocked :]) > least or (alone and largest > least):
+            self._leaping = values
+            return was_single, True
+        self._restless = max(CALMING * self._restless, largest)
+        self._sure = values
+        return was_single, False
+
+
+def _steps(before: Sequence[float], after: Sequence[float]) -> list[float]:
+    """How far each value moved."""
+    return [abs(new - old) for old, new in zip(before, after, strict=True)]

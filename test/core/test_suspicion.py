@@ -1,0 +1,65 @@
+"""Settings that the wire contradicts: told in one sentence, and only when they are wrong."""
+
+import math
+
+import pytest
+from bench import Bench
+
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.simulator import BoardPose, BoardSettings, SimulatedBoard
+
+DRIVE = bytes.fromhex("FF FE 01 00 15 00 0E 00 C8")
+"""0.3 m/s ahead, 0.2 m/s to the left, 0.4 rad/s."""
+
+
+def advice(board: BoardSettings, settings: OmniBotSettings, seconds: float = 6.0) -> str | None:
+    """After a drive on this board, read with these settings."""
+    sender, driver = SimulatedBoard(board), OmniBot(settings)
+    sender.receive(DRIVE)
+    for tick in range(round(seconds * 100)):
+        driver.receive(sender.step(), tick / 100)
+    return driver.advice
+
+
+@pytest.mark.parametrize(("sent", "read"), [("big", "little"), ("little", "big")])
+def test_a_wrong_byte_order_of_poses_is_noticed(sent: str, read: str) -> None:
+    """After two seconds of poses that make sense only the other way round."""
+    board = BoardSettings(running=True, pose_byte_order=sent)
+    told = advice(board, OmniBotSettings(pose_byte_order=read))
+    assert told is not None
+    assert f"`pose_byte_order` to {sent}" in told
+
+
+@pytest.mark.parametrize(("sent", "read"), [("earth", "body"), ("body", "earth")])
+def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str) -> None:
+    """As soon as the robot has turned and drives."""
+    board = BoardSettings(running=True, frame=sent, initial_pose=BoardPose(0.0, 0.0, 1500.0))
+    told = advice(board, OmniBotSettings(delta_frame=read))
+    assert told is not None
+    assert f"`delta_frame` to {sent}" in told
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
+@pytest.mark.parametrize("order", ["big", "little"])
+@pytest.mark.parametrize("start", [BoardPose(), BoardPose(1e5, -3.0, 2e4), BoardPose(1e-12, 500.0)])
+def test_nobody_is_told_anything_of_right_settings(
+    frame: str, order: str, start: BoardPose
+) -> None:
+    """Far away, at zero, and where one coordinate is nothing but the rounding of the board."""
+    board = BoardSettings(running=True, frame=frame, pose_byte_order=order, initial_pose=start)
+    assert advice(board, OmniBotSettings(delta_frame=frame, pose_byte_order=order), 30.0) is None
+
+
+def test_the_user_is_told_once_and_odom_goes_on_by_deltas() -> None:
+    """No absurd pose moves it."""
+    start = BoardPose(3000.0, -2000.0, 0.0)
+    bench = Bench(BoardSettings(running=True, pose_byte_order="little", initial_pose=start))
+    bench.open()
+    bench.run(2.0)
+    for _ in range(20):
+        bench.drive(0.3, 0.0, 0.2)
+        bench.run(0.2)
+    (told,) = [text for text in bench.notices if "pose_byte_order" in text]
+    assert told.endswith("set the parameter `pose_byte_order` to little")
+    pose, true = bench.odometry[-1].pose, bench.board.truth
+    assert math.hypot(pose.x_m - true.x_m, pose.y_m - true.y_m) < 0.03

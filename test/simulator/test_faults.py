@@ -1,0 +1,66 @@
+"""The bad line of the simulated board."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.simulator import FaultyLine, LineFaults
+from omnibot_driver.simulator.__main__ import main
+
+SENT = bytes(range(256)) * 400
+
+
+def bits(value: int) -> int:
+    return value.bit_count()
+
+
+def test_a_line_without_faults_changes_nothing() -> None:
+    """Nor does it count anything."""
+    line = FaultyLine(LineFaults())
+    assert line.carry(SENT) == SENT
+    assert (line.lost, line.flipped) == (0, 0)
+
+
+@given(st.lists(st.integers(0, 2000), max_size=5).map(sorted), st.integers(0, 3))
+def test_the_fate_of_a_byte_does_not_depend_on_how_the_stream_is_cut(
+    cuts: list[int], seed: int
+) -> None:
+    """Bursts go on over the cuts."""
+    faults, data = LineFaults(lose=0.01, burst=0.005, flip=0.01), SENT[:2000]
+    line = FaultyLine(faults, seed)
+    parts = [
+        line.carry(data[start:end]) for start, end in zip([0, *cuts], [*cuts, 2000], strict=True)
+    ]
+    assert b"".join(parts) == FaultyLine(faults, seed).carry(data)
+
+
+def test_single_bytes_are_lost_at_the_given_rate() -> None:
+    """One in a hundred, and none changed."""
+    line = FaultyLine(LineFaults(lose=0.01))
+    assert len(line.carry(SENT)) == len(SENT) - line.lost
+    assert line.lost == pytest.approx(len(SENT) / 100, rel=0.2)
+
+
+def test_bursts_of_1_to_200_bytes_are_lost() -> None:
+    """A hundred bytes each on average."""
+    line = FaultyLine(LineFaults(burst=0.0005))
+    arrived = line.carry(SENT)
+    assert len(arrived) == len(SENT) - line.lost
+    assert line.lost == pytest.approx(len(SENT) * 0.0005 * 100.5, rel=0.5)
+
+
+def test_a_flip_changes_one_bit_and_no_length() -> None:
+    """One byte in a hundred."""
+    line = FaultyLine(LineFaults(flip=0.01))
+    arrived = line.carry(SENT)
+    changes = [bits(was ^ now) for was, now in zip(SENT, arrived, strict=True)]
+    assert max(changes) == 1
+    assert sum(changes) == line.flipped == pytest.approx(len(SENT) / 100, rel=0.2)
+
+
+@pytest.mark.parametrize("rate", ["-0.1", "1.1", "nan", "often"])
+def test_a_rate_that_is_no_chance_is_refused(rate: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """With a sentence, before anything starts."""
+    with pytest.raises(SystemExit):
+        main(["--lose", rate])
+    assert "give a number from 0 to 1" in capsys.readouterr().err

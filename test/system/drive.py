@@ -1,0 +1,258 @@
+"""A drive over a bad line, end to end: what was published against what the board really sent.
+
+``python test/system/drive.py SECONDS --lose 0.001`` runs the driver as a process of its own on a
+simulated board, drives curves over ``cmd_vel``, and prints how many messages are wrong and how far
+``odom`` is off. Every message must be found among the board's frames: an Imu by its six words, an
+Odometry by the length and turn of its displacement; and its pose must be the board's own.
+"""
+
+import argparse
+import math
+import os
+import struct
+import sys
+from bisect import bisect_left
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+ACCEL_LSB = 9.80665 / 16384
+GYRO_LSB = math.radians(1 / 131)
+TICK_S, PERIOD_S = 0.01, 0.04
+SIDEWAYS = 50
+"""Frames that a stamp may be off by, before and after a loss has been counted."""
+LONGEST_STALL = 1000
+"""IMU frames that time may jump by where the machine, and the board with it, stood still."""
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Of a drive. Errors in m and rad, of ``odom`` against the board's own pose."""
+
+    seconds: float
+    way_m: float
+    bytes_lost: int
+    bytes_flipped: int
+    imu_sent: int
+    imu_received: int
+    imu_wrong: int
+    odom_sent: int
+    odom_received: int
+    odom_wrong: int
+    worst_m: float
+    worst_rad: float
+    last_m: float
+    last_rad: float
+
+    def __str__(self) -> str:
+        return (
+            f"driven      {self.way_m:.1f} m in {self.seconds:.0f} s\n"
+            f"line        {self.bytes_lost} bytes lost, {self.bytes_flipped} bits flipped\n"
+            f"imu         {self.imu_received} of {self.imu_sent}, {self.imu_wrong} wrong\n"
+            f"odom        {self.odom_received} of {self.odom_sent}, {self.odom_wrong} wrong\n"
+            f"pose error  {1000 * self.worst_m:.1f} mm, {1000 * self.worst_rad:.1f} mrad at worst; "
+            f"{1000 * self.last_m:.1f} mm, {1000 * self.last_rad:.1f} mrad at the end"
+        )
+
+
+def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float = 0.0) -> Outcome:
+    """Drive for so long, stand still for two seconds, and compare. Needs an initialised rclpy."""
+    from driver_process import Driver
+    from geometry_msgs.msg import Twist
+    from nav_msgs.msg import Odometry
+    from probe import Probe
+    from sensor_msgs.msg import Imu
+
+    from omnibot_driver.simulator import (
+        BoardSettings,
+        FaultyLine,
+        LineFaults,
+        PtyBoard,
+        SimulatedBoard,
+    )
+
+    board = SimulatedBoard(BoardSettings(seed=1))
+    board.sent = deque()  # all of them
+    line = FaultyLine(LineFaults(lose=lose, burst=burst, flip=flip), seed=1)
+    with ExitStack() as stack:
+        port = stack.enter_context(PtyBoard(board, line=line))
+        driver = stack.enter_context(Driver(port=port.path))
+        probe = stack.enter_context(Probe(driver.namespace))
+        imu, odom = probe.listen(Imu, "imu/data_raw"), probe.listen(Odometry, "odom")
+        probe.wait_for_state("nominal")
+        cmd_vel = probe.publisher(Twist, "cmd_vel")
+        random = Random("drive")
+        phases = [random.uniform(0.0, math.tau) for _ in range(3)]
+        start_tick = board.tick
+        ticks = {"left": round(seconds / TICK_S)}
+
+        def steer(_board: SimulatedBoard) -> bool:
+            ticks["left"] -= 1
+            if ticks["left"] % 5 == 0:
+                t, twist = ticks["left"] * TICK_S, Twist()
+                twist.linear.x = 0.3 * math.sin(0.9 * t + phases[0])
+                twist.linear.y = 0.3 * math.sin(1.3 * t + phases[1])
+                twist.angular.z = 0.45 * math.sin(0.5 * t + phases[2])
+                cmd_vel.publish(twist)
+            return ticks["left"] <= 0
+
+        port.wait_for(steer, 2 * seconds + 10.0)
+        cmd_vel.publish(Twist())
+        port.wait_for(lambda board: board.tick >= start_tick + (seconds + 2.0) / TICK_S, 20.0)
+        with port.lock:
+            sent = [frame.data for frame in board.sent]
+        return compare(sent, list(imu), list(odom), seconds, line)
+
+
+def compare(
+    sent: Sequence[bytes], imu: Sequence[Any], odom: Sequence[Any], seconds: float, line: Any
+) -> Outcome:
+    words = [struct.unpack(">6h", data[2:]) for data in sent if data[:2] == b"\xff\xfa"]
+    imu_at = [_stamp(message) for message in imu]
+    imu_found = trace(words, [_words(message) for message in imu], imu_at)
+    deltas, poses, numbers = board_poses(sent)
+    keys = [(round(math.hypot(dx, dy), 3), turn) for dx, dy, turn in deltas]
+    odom_found: list[int | None] = []
+    last = -1
+    for message in odom:
+        middle = bisect_left(numbers, expected(_stamp(message), imu_found, imu_at))
+        key = _displacement(message)
+        around = outwards(middle, SIDEWAYS)
+        number = next((n for n in around if last < n < len(keys) and keys[n] == key), None)
+        odom_found.append(number)
+        last = last if number is None else number
+    errors = []
+    for message, number in zip(odom, odom_found, strict=True):
+        if number is not None:
+            x, y, yaw = poses[number]
+            position, turn = message.pose.pose.position, message.pose.pose.orientation
+            off_yaw = math.remainder(2 * math.atan2(turn.z, turn.w) - yaw, math.tau)
+            errors.append((math.hypot(position.x - x, position.y - y), abs(off_yaw)))
+    way_m = sum(math.hypot(dx, dy) * 1e-4 for dx, dy, _ in deltas)
+    return Outcome(
+        seconds,
+        way_m,
+        line.lost,
+        line.flipped,
+        len(words),
+        len(imu),
+        imu_found.count(None),
+        len(deltas),
+        len(odom),
+        odom_found.count(None),
+        max(error for error, _ in errors),
+        max(error for _, error in errors),
+        *errors[-1],
+    )
+
+
+def trace(
+    sent: Sequence[object], got: Sequence[object], stamps_s: Sequence[float]
+) -> list[int | None]:
+    """Which of the sent IMU frames each message is; None where it is none that was still to come.
+
+    The nearest one by time; noise makes each of them unlike all others.
+    """
+    found: list[int | None] = []
+    at, at_s = -1, stamps_s[0]
+    for key, stamp_s in zip(got, stamps_s, strict=True):
+        middle = at + max(1, round((stamp_s - at_s) / TICK_S))
+        around = outwards(middle, LONGEST_STALL)
+        number = next((n for n in around if at < n < len(sent) and sent[n] == key), None)
+        if number is not None:
+            at, at_s = number, stamp_s
+        found.append(number)
+    return found
+
+
+def outwards(middle: int, reach: int) -> Iterator[int]:
+    """The numbers about this one, the nearest first."""
+    yield middle
+    for distance in range(1, reach + 1):
+        yield from (middle + distance, middle - distance)
+
+
+def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[float]) -> int:
+    """The IMU frame of this time, by the nearest that was found."""
+    place = min(bisect_left(stamps_s, stamp_s), len(stamps_s) - 1)
+    while (number := found[place]) is None:
+        place -= 1
+    return number + round((stamp_s - stamps_s[place]) / TICK_S)
+
+
+def board_poses(
+    sent: Sequence[bytes],
+) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
+    """The words of every delta, the board's pose after it, to the rounding of four deltas, and the
+    number of the IMU frame right before it.
+    """
+    deltas: list[tuple[int, int, int]] = []
+    poses: list[Triple] = []
+    numbers: list[int] = []
+    x = y = yaw = 0.0
+    number = -1
+    for data in sent:
+        number += data[:2] == b"\xff\xfa"
+        if data[:2] == b"\xff\xfb":
+            dx, dy, turn = struct.unpack(">3h", data[2:8])
+            x, y, yaw = x + dx * 1e-4, y + dy * 1e-4, yaw + turn * 1e-4
+            deltas.append((dx, dy, turn))
+            poses.append((x, y, yaw))
+            numbers.append(number)
+        elif data[:2] == b"\xff\xfc":
+            x, y, yaw = (value / 1000 for value in struct.unpack(">3f", data[2:14]))
+            poses[-1] = (x, y, yaw)
+    return deltas, poses, numbers
+
+
+def _words(message: Any) -> tuple[int, ...]:
+    force, rate = message.linear_acceleration, message.angular_velocity
+    return (
+        *(round(value / ACCEL_LSB) for value in (force.x, force.y, force.z)),
+        *(round(value / GYRO_LSB) for value in (rate.x, rate.y, rate.z)),
+    )
+
+
+def _displacement(message: Any) -> tuple[float, int]:
+    """Length in 0.1 mm and turn in 0.1 mrad of the displacement that the twist was made of."""
+    twist = message.twist.twist
+    turn = twist.angular.z * PERIOD_S
+    shrink = math.sin(turn / 2) / (turn / 2) if turn else 1.0
+    length = math.hypot(twist.linear.x, twist.linear.y) * PERIOD_S * shrink
+    return round(length * 1e4, 3), round(turn * 1e4)
+
+
+def _stamp(message: Any) -> float:
+    stamp = message.header.stamp
+    return float(stamp.sec + stamp.nanosec * 1e-9)
+
+
+def main() -> int:
+    """Print the outcome; 1 where a message was wrong."""
+    parser = argparse.ArgumentParser(description="A drive over a bad line, end to end.")
+    parser.add_argument("seconds", type=float)
+    for fault in ("lose", "burst", "flip"):
+        parser.add_argument(f"--{fault}", type=float, default=0.0, metavar="RATE")
+    arguments = parser.parse_args()
+    os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 101))
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    import rclpy
+
+    rclpy.init()
+    try:
+        outcome = drive(
+            arguments.seconds, lose=arguments.lose, burst=arguments.burst, flip=arguments.flip
+        )
+    finally:
+        rclpy.try_shutdown()
+    print(outcome)
+    return 1 if outcome.imu_wrong or outcome.odom_wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

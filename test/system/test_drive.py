@@ -1,0 +1,14 @@
+"""The driver on a line that loses bytes, end to end: process, pseudo-terminal, topics."""
+
+from drive import drive
+
+
+def test_over_a_bad_line_every_message_is_what_the_board_sent_and_odom_is_its_pose() -> None:
+    """Twenty seconds; one byte in a thousand is lost, and bursts (``drive.py`` goes on longer)."""
+    outcome = drive(20.0, lose=0.001, burst=0.0005)
+    assert outcome.bytes_lost > 100, outcome
+    assert outcome.imu_received > 0.85 * outcome.imu_sent, outcome
+    assert outcome.odom_received > 0.85 * outcome.odom_sent, outcome
+    assert outcome.imu_wrong + outcome.odom_wrong <= 1, outcome
+    assert outcome.worst_m < 0.1, outcome
+    assert outcome.way_m > 4.0, outcome
