@@ -55,8 +55,12 @@ class Probe:
 
     def wait_for(self, predicate: Callable[[], object]) -> None:
         """Until the predicate holds; it is asked again whenever a message comes in."""
+        assert self.comes_about(predicate), "it did not come about"
+
+    def comes_about(self, predicate: Callable[[], object]) -> bool:
+        """Whether it did, in reasonable time."""
         with self._changed:
-            assert self._changed.wait_for(predicate, PATIENCE_S), "it did not come about"
+            return bool(self._changed.wait_for(predicate, PATIENCE_S))
 
     def wait_for_state(self, state: str) -> None:
         if "omnibot_driver/state" not in self._received:
