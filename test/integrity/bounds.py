@@ -77,3 +77,11 @@ def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
     for scenario in SCENARIOS:
         total += scores[fault, chunker, scenario]
     return total
+
+
+def over_chunkers(scores: Scores, fault: str, scenario: str) -> Score:
+    """The sum of all."""
+    total = Score()
+    for chunker in CHUNKERS:
+        total += scores[fault, chunker, scenario]
+    return total
