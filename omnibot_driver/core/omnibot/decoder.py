@@ -41,8 +41,8 @@ DOUBT_BYTES: Final = 170
 FRAMES_TO_STEP_IN: Final = 2
 FRAMES_TO_SETTLE: Final = 3
 """So many sure frames behind a doubtful one, and nothing more will be learnt about it."""
-FRAMES_TO_RECONSIDER: Final = 2
-"""Where a chain of frames breaks, its last ones are in doubt."""
+FRAMES_TO_RECONSIDER: Final = 8
+"""Where a chain of frames breaks, its last ones are in doubt: those since the last delta, at least."""
 
 IDLE_S: Final = 0.1
 """Longer than any adapter keeps a byte back (16 ms), and ten times the board's 10 ms tick."""
@@ -133,6 +133,8 @@ class FrameDecoder:
             known = self._between >= PAUSES_TO_TRUST
             sharp = self._sharp >= PAUSES_TO_TRUST
             if pause_s > TICK_S:
+                if known:
+                    self._context = self._context.damaged()
                 sharp = sharp or known  # bytes were lost here, and hardly whole frames
                 self._trust(sharp=False, between=False)
             place = len(self._held)
@@ -174,7 +176,7 @@ class FrameDecoder:
             frame = decode_measured(held[at:end], order)
             cost, after = weigh(frame, context)
             if cost >= SPOKEN_AGAINST and (
-                cost >= evidence.LOOK_ALIKE or not self._goes_on(end, closed)
+                cost >= evidence.JUMP or not self._goes_on(end, closed)
             ):
                 break
             whole_burst = self._sharp >= PAUSES_TO_TRUST and self._arrived >= length
@@ -237,6 +239,7 @@ class FrameDecoder:
                 self._in_step = True
             else:
                 self._drop(piece.end - at)
+                self._in_step = piece.margin_of_place >= SURE
             at = piece.end
         if half and not at:
             at = min(half, pieces[0].start) if pieces else half
@@ -276,6 +279,7 @@ class FrameDecoder:
         self.statistics.discarded_bytes += count
         self.statistics.faults += self._in_step
         self._in_step = False
+        self._context = self._context.damaged()
         self._forget(count)
 
     def _forget(self, count: int) -> None:
