@@ -32,13 +32,12 @@ from omnibot_driver.core.omnibot.frames import (
 )
 from omnibot_driver.core.omnibot.lattice import Gap, Piece, read
 
-SURE: Final = 4.0
-"""One reading in fifty as likely as the best is too many."""
+SURE: Final = 3.5
+"""One reading in thirty as likely as the best is too many."""
 SPOKEN_AGAINST: Final = 3.0
 """A content of this cost waits for what follows."""
 DOUBT_BYTES: Final = 170
 """100 ms of the nominal stream."""
-FRAMES_TO_STEP_IN: Final = 2
 FRAMES_TO_SETTLE: Final = 3
 """So many sure frames behind a doubtful one, and nothing more will be learnt about it."""
 FRAMES_TO_RECONSIDER: Final = 8

@@ -14,13 +14,13 @@ from typing import Final, NamedTuple
 from omnibot_driver.core.omnibot.frames import DeltaFrame, Frame, ImuFrame, PoseFrame, Words
 
 # What the line does.
-ONE_BYTE: Final = 5.0
-"""A frame that lost or gained one byte: one in 150, which is a byte in two thousand."""
-TWO_BYTES: Final = 8.0
+ONE_BYTE: Final = 5.5
+"""A frame that lost or gained one byte: one in 250, which is a byte in three thousand."""
+TWO_BYTES: Final = 8.5
 """The same twice in one frame: rarer, but both faults come in bad times."""
-BROKEN_OFF: Final = 8.5
+BROKEN_OFF: Final = 9.0
 """A frame of which the last three bytes or more are missing: a burst was lost."""
-HEADER_BYTE: Final = 7.0
+HEADER_BYTE: Final = 7.5
 """A frame that lost half of its header: two places among the 9 to 15 where it may lose a byte."""
 HEADER_IN_PLACE: Final = 4.0
 """A frame that gained bytes, though a header stands where it would end without them."""
@@ -41,14 +41,14 @@ BAD_TEXT: Final = 4.0
 KNOWN_GAP: Final = 11.0
 """... and so far the pauses of this line have always stood between frames. Too much to believe the
 frame; not enough to forget that it may be the pause that deceives."""
-SPLICED: Final = 7.0
+SPLICED: Final = 6.0
 """An IMU frame that is the front of one and the back of another: a burst cut out a whole number of
 frames' lengths. Nothing tells but the count of what is missing, at the next delta."""
 CUT_SHORT: Final = 6.0
 """The line was closed within a frame."""
 
 # What the board sends. An IMU frame that is no look-alike adds up to 6.5 at the most, a delta or a
-# pose to 8.
+# pose to 7.
 LEAPS: Final = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
 """So many words far from the ones before them. One makes a frame odd, a shock moves several."""
 AFTERSHOCK: Final = 1.5
@@ -58,7 +58,7 @@ WEIGHTLESS: Final = 2.5
 LOOK_ALIKE: Final = 12.0
 """Weightless, with an IMU header among the accelerations: in a run of IMU frames a gyro that reads
 -6 makes a second, shifted run, which has its gyro where the accelerometer should be."""
-JUMP: Final = 6.0
+JUMP: Final = 5.0
 """A counter that is not the next one, and no damage in sight: whole frames were lost, and nothing
 of their neighbours."""
 POSE_JUMP: Final = 2.5
