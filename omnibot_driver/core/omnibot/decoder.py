@@ -40,8 +40,8 @@ DOUBT_BYTES: Final = 170
 """100 ms of the nominal stream."""
 FRAMES_TO_SETTLE: Final = 3
 """So many sure frames behind a doubtful one, and nothing more will be learnt about it."""
-FRAMES_TO_RECONSIDER: Final = 8
-"""Where a chain of frames breaks, its last ones are in doubt: those since the last delta, at least."""
+FRAMES_TO_RECONSIDER: Final = 2
+"""Where a chain of frames breaks, its last ones are in doubt."""
 
 IDLE_S: Final = 0.1
 """Longer than any adapter keeps a byte back (16 ms), and ten times the board's 10 ms tick."""
@@ -132,8 +132,6 @@ class FrameDecoder:
             known = self._between >= PAUSES_TO_TRUST
             sharp = self._sharp >= PAUSES_TO_TRUST
             if pause_s > TICK_S:
-                if known:
-                    self._context = self._context.damaged()
                 sharp = sharp or known  # bytes were lost here, and hardly whole frames
                 self._trust(sharp=False, between=False)
             place = len(self._held)
@@ -175,7 +173,7 @@ class FrameDecoder:
             frame = decode_measured(held[at:end], order)
             cost, after = weigh(frame, context)
             if cost >= SPOKEN_AGAINST and (
-                cost >= evidence.JUMP or not self._goes_on(end, closed)
+                cost >= evidence.LOOK_ALIKE or not self._goes_on(end, closed)
             ):
                 break
             whole_burst = self._sharp >= PAUSES_TO_TRUST and self._arrived >= length
@@ -238,7 +236,6 @@ class FrameDecoder:
                 self._in_step = True
             else:
                 self._drop(piece.end - at)
-                self._in_step = piece.margin_of_place >= SURE
             at = piece.end
         if half and not at:
             at = min(half, pieces[0].start) if pieces else half

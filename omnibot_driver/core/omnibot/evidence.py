@@ -8,7 +8,6 @@ Content is soft evidence: all of a frame's together stays below what it costs to
 damaged, so a true shock between two whole frames is delivered.
 """
 
-from math import log
 from typing import Final, NamedTuple
 
 from omnibot_driver.core.omnibot.frames import DeltaFrame, Frame, ImuFrame, PoseFrame, Words
@@ -41,14 +40,11 @@ BAD_TEXT: Final = 4.0
 KNOWN_GAP: Final = 11.0
 """... and so far the pauses of this line have always stood between frames. Too much to believe the
 frame; not enough to forget that it may be the pause that deceives."""
-SPLICED: Final = 6.0
-"""An IMU frame that is the front of one and the back of another: a burst cut out a whole number of
-frames' lengths. Nothing tells but the count of what is missing, at the next delta."""
 CUT_SHORT: Final = 6.0
 """The line was closed within a frame."""
 
 # What the board sends. An IMU frame that is no look-alike adds up to 6.5 at the most, a delta or a
-# pose to 7.
+# pose to 4.5.
 LEAPS: Final = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
 """So many words far from the ones before them. One makes a frame odd, a shock moves several."""
 AFTERSHOCK: Final = 1.5
@@ -58,15 +54,12 @@ WEIGHTLESS: Final = 2.5
 LOOK_ALIKE: Final = 12.0
 """Weightless, with an IMU header among the accelerations: in a run of IMU frames a gyro that reads
 -6 makes a second, shifted run, which has its gyro where the accelerometer should be."""
-JUMP: Final = 5.0
-"""A counter that is not the next one, and no damage in sight: whole frames were lost, and nothing
-of their neighbours."""
-POSE_JUMP: Final = 2.5
-"""The same of the poses, which count on their own."""
+JUMP: Final = 2.5
+"""A counter that is not the next one: something before it was lost."""
 IMPOSSIBLE: Final = 2.0
 """A movement that no robot of this kind makes."""
 OFF_BEAT: Final = 1.0
-"""Not five deltas to a pose."""
+"""Not four IMU frames to a delta, or not five deltas to a pose."""
 
 IMU_HEADER_WORD: Final = -6
 """FF FA, read as a signed word."""
@@ -90,16 +83,10 @@ class Context(NamedTuple):
     """Deltas since the last pose."""
     shaken: bool = False
     """The last IMU frame was a leap, or weightless."""
-    beats: int = 0
-    """How often four IMU frames stood between two deltas; halved when they did not."""
 
     def damaged(self) -> "Context":
         """Nobody knows how much was lost."""
-        return Context(self.imu, deltas=self.deltas, shaken=self.shaken, beats=self.beats)
-
-    def off_beat(self) -> float:
-        """The price of a delta that comes too soon or too late, by the rule of succession."""
-        return min(log(1 + self.beats), JUMP)
+        return Context(self.imu, deltas=self.deltas, shaken=self.shaken)
 
 
 NOTHING_KNOWN: Final = Context()
@@ -119,16 +106,15 @@ class Expectation:
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
         """The cost of a whole frame's content, and what is known after it."""
         if type(frame) is ImuFrame:
-            last, seq, pose, imus, deltas, shaken, beats = before
+            last, seq, pose, imus, deltas, shaken = before
             ax, ay, az = frame.accel
             cost = 0.0
             norm = ax * ax + ay * ay + az * az
             if not self._lightest < norm < self._heaviest:
                 if norm < self._lightest and IMU_HEADER_WORD in frame.accel:
-                    after = Context(frame, seq, pose, imus + 1, deltas, True, beats)
-                    return LOOK_ALIKE, after
+                    return LOOK_ALIKE, Context(frame, seq, pose, imus + 1, deltas, True)
                 cost = AFTERSHOCK if shaken else WEIGHTLESS
-            after = Context(frame, seq, pose, imus + 1, deltas, cost > 0.0, beats)
+            after = Context(frame, seq, pose, imus + 1, deltas, cost > 0.0)
             if last is None:
                 return cost, after
             (px, py, pz), (pu, pv, pw) = last.accel, last.gyro
@@ -144,7 +130,7 @@ class Expectation:
             ):
                 return cost, after
             leaps = _leaps(frame.accel, last.accel, far) + _leaps(frame.gyro, last.gyro, turned)
-            after = Context(frame, seq, pose, imus + 1, deltas, True, beats)
+            after = Context(frame, seq, pose, imus + 1, deltas, True)
             return (AFTERSHOCK if shaken else cost + LEAPS[leaps]), after
         if type(frame) is DeltaFrame:
             return self._weigh_delta(frame, before)
@@ -157,31 +143,24 @@ class Expectation:
         cost = 0.0
         if max(abs(frame.dx), abs(frame.dy), abs(frame.dtheta)) > LARGEST_DELTA:
             cost = IMPOSSIBLE
-        last, seq, pose, imus, deltas, _, beats = before
-        if seq is None:
-            off, counted = imus > 4, False
-        elif frame.seq == (seq + 1) & 255:
-            off, counted = imus != 4, True
-        else:
-            cost, off, counted = cost + JUMP, False, False
-        if off:
-            cost += before.off_beat()
-            beats >>= 1
-        elif counted:
-            beats += 1
-        return cost, Context(last, frame.seq, pose, 0, deltas + 1, beats=beats)
+        after = Context(before.imu, frame.seq, before.pose, 0, before.deltas + 1)
+        if before.seq is None:
+            return cost, after
+        if frame.seq != (before.seq + 1) & 255:
+            return cost + JUMP, after
+        return (cost if before.imus == 4 else cost + OFF_BEAT), after
 
     @staticmethod
     def _weigh_pose(frame: PoseFrame, before: Context) -> tuple[float, Context]:
-        after = Context(before.imu, before.seq, frame, before.imus, 0, beats=before.beats)
+        after = Context(before.imu, before.seq, frame, before.imus, 0)
         x, y, theta = frame.x, frame.y, frame.theta
         if not (abs(x) < FARTHEST_POSE and abs(y) < FARTHEST_POSE and abs(theta) < FARTHEST_POSE):
-            return IMPOSSIBLE + POSE_JUMP, after
+            return IMPOSSIBLE + JUMP, after
         last = before.pose
         if last is None:
             return 0.0, after
         if frame.seq != (last.seq + 1) & 255:
-            return POSE_JUMP, after
+            return JUMP, after
         moved = max(abs(x - last.x), abs(y - last.y), abs(theta - last.theta))
         cost = IMPOSSIBLE if moved > LONGEST_STEP else 0.0
         return (cost if before.deltas == 5 and before.imus == 0 else cost + OFF_BEAT), after

@@ -1,10 +1,10 @@
 """All readings of a stretch of bytes at once, the cheapest of them, and how far it is ahead.
 
-Nodes are the places between bytes, each three times: within a bad run, as a boundary of frames, and
-as a boundary after a loss that left no other trace (until the next delta, which counts). Edges are
-whole frames, damaged ones, bad bytes. A shortest path is the best reading; the shortest path that
-reads the same byte in another way tells how sure a frame of it is. This module knows the shapes that
-a line gives to frames; prices are in ``evidence``. Work and memory are proportional to the stretch.
+Nodes are the places between bytes, each twice: as a boundary of frames, and within a bad run.
+Edges are whole frames, damaged ones, bad bytes. A shortest path is the best reading; the shortest
+path that reads the same byte in another way tells how sure a frame of it is. This module knows the
+shapes that a line gives to frames; prices are in ``evidence``. Work and memory are proportional to
+the stretch.
 
 The context of a node (for the price of content) is that of the cheapest way to it.
 """
@@ -18,9 +18,7 @@ from omnibot_driver.core.omnibot import evidence
 from omnibot_driver.core.omnibot.evidence import Context, Expectation
 from omnibot_driver.core.omnibot.frames import (
     ByteOrder,
-    DeltaFrame,
     Frame,
-    ImuFrame,
     decode_measured,
     measure,
 )
@@ -43,11 +41,7 @@ _TEXT: Final = 0x50
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A whole frame of the best reading.
-
-    ``margin``: what any other reading of its bytes costs more; ``margin_of_place``: the same of the
-    readings in which no frame stands there, be it whole or spliced.
-    """
+    """A whole frame of the best reading; ``margin``: what any other reading of it costs more."""
 
     start: int
     end: int
@@ -55,7 +49,6 @@ class Piece:
     before: Context
     after: Context
     margin: float
-    margin_of_place: float
 
 
 _Edge = tuple[int, int, float, Frame | None, Context]
@@ -95,9 +88,8 @@ class _Search:
         self._gaps = gaps
         self._pose_byte_order = pose_byte_order
         size = len(data)
-        # Before byte n, node 3 n: in a bad run; 3 n + 1: at a boundary; 3 n + 2: at one after an
-        # unseen loss. The last: the end.
-        self._end = 3 * size + 3
+        # Node 2 n: in a bad run before byte n; 2 n + 1: at a boundary there; the last: the end.
+        self._end = 2 * size + 2
         self._cost = [inf] * (self._end + 1)
         self._by = [-1] * (self._end + 1)
         self._contexts = [context] * (self._end + 1)
@@ -108,29 +100,27 @@ class _Search:
         cost[0], cost[1] = inf if in_step else evidence.UNKNOWN_START, 0.0
         for at in range(size):
             byte = data[at]
-            bad, boundary = 3 * at, 3 * at + 1
-            looks_begun = byte in (_HEADER, _TEXT)
-            if cost[bad] < inf and looks_begun:
-                self._edge(bad, boundary, 0.0)
+            bad, boundary = 2 * at, 2 * at + 1
             header = byte == _HEADER and at + 1 < size and data[at + 1] in _LENGTHS
             price = evidence.BAD_BYTE
             if byte == _TEXT and measure(data, at) > 0:
                 price += evidence.BAD_TEXT
             if cost[bad] < inf:
-                odd = evidence.BAD_HEADER if header else 0.0
-                self._edge(bad, bad + 3, price + odd)
+                if byte in (_HEADER, _TEXT):
+                    self._edge(bad, boundary, 0.0)
+                self._edge(bad, bad + 2, price + evidence.BAD_HEADER if header else price)
             if cost[boundary] < inf:
                 price += evidence.BAD_RUN if header else evidence.BAD_RUN + evidence.BAD_TAIL
-                self._edge(boundary, bad + 3, price, None, self._contexts[boundary].damaged())
+                self._edge(boundary, bad + 2, price, None, self._contexts[boundary].damaged())
                 self._frames_from(at, closed)
-        for node in (3 * size, 3 * size + 1, 3 * size + 2):
+        for node in (2 * size, 2 * size + 1):
             if cost[node] < inf:
                 self._edge(node, self._end, 0.0)
 
     def _frames_from(self, at: int, closed: bool) -> None:
         data, size = self._data, len(self._data)
         byte = data[at]
-        node = 3 * at + 1
+        node = 2 * at + 1
         if byte == _TEXT:
             length = measure(data, at)
             if length > 0:
@@ -172,31 +162,17 @@ class _Search:
 
     def _whole(self, at: int, length: int) -> None:
         frame = decode_measured(self._data[at : at + length], self._pose_byte_order)
-        idle = self._idle_within(at, at + length)
-        boundary, lost = 3 * at + 1, 3 * at + 2
-        onward = 3 * length
-        before = self._contexts[boundary]
-        price, after = self._expectation.weigh(frame, before)
-        if self._cost[lost] < inf:
-            lost_price, lost_after = self._expectation.weigh(frame, self._contexts[lost])
-            counted = type(frame) is DeltaFrame
-            end = (boundary if counted else lost) + onward
-            self._edge(lost, end, lost_price + idle, frame, lost_after)
-        self._edge(boundary, boundary + onward, price + idle, frame, after)
-        if type(frame) is ImuFrame and before.seq is not None and before.imus < 4:
-            spliced = after.damaged()._replace(imus=1)
-            self._edge(boundary, lost + onward, price + idle + evidence.SPLICED, None, spliced)
+        price, after = self._expectation.weigh(frame, self._contexts[2 * at + 1])
+        price += self._idle_within(at, at + length)
+        self._edge(2 * at + 1, 2 * (at + length) + 1, price, frame, after)
 
     def _damaged(self, node: int, at: int, end: int, price: float) -> None:
         price += self._idle_within(at, end)
-        self._edge(node, 3 * end + 1, price, None, self._contexts[node].damaged())
+        self._edge(node, 2 * end + 1, price, None, self._contexts[node].damaged())
 
     def _open(self, at: int, price: float) -> None:
         """A frame, whole or damaged, whose end has not come yet."""
-        price += self._idle_within(at, len(self._data))
-        for node in (3 * at + 1, 3 * at + 2):
-            if self._cost[node] < inf:
-                self._edge(node, self._end, price)
+        self._edge(2 * at + 1, self._end, price + self._idle_within(at, len(self._data)))
 
     def _idle_within(self, start: int, end: int) -> float:
         return sum(
@@ -230,8 +206,7 @@ class _Search:
         path = [index for index in reversed(path) if edges[index][3] is not None]
         if not path:
             return []
-        starts = [edges[index][0] // 3 for index in path]
-        ends = [edges[index][1] // 3 for index in path]
+        starts = [edges[index][0] >> 1 for index in path]
         next_piece = [0] * (len(self._data) + 2)
         number = 0
         for at in range(len(next_piece)):
@@ -240,28 +215,24 @@ class _Search:
             next_piece[at] = number
         rest = [inf] * (self._end + 1)
         rest[self._end] = 0.0
-        spliced, other = [inf] * len(path), [inf] * len(path)
+        others = [inf] * len(path)
         for index in range(len(edges) - 1, -1, -1):
-            start, end, price, frame, _ = edges[index]
+            start, end, price, _, _ = edges[index]
             onward = price + rest[end]
             if onward < rest[start]:
                 rest[start] = onward
-            total = cost[start] + onward
-            first, last = start // 3, end // 3
-            number = next_piece[first]
-            while number < len(starts) and starts[number] < last:
-                if first != starts[number] or last != ends[number]:
-                    other[number] = min(other[number], total)
-                elif frame is None:
-                    spliced[number] = min(spliced[number], total)
+            covers_to = end >> 1
+            number = next_piece[start >> 1]
+            while number < len(starts) and starts[number] < covers_to:
+                if path[number] != index and cost[start] + onward < others[number]:
+                    others[number] = cost[start] + onward
                 number += 1
         best = cost[self._end]
         found = []
         for number, index in enumerate(path):
-            start, _, _, frame, after = edges[index]
+            start, end, _, frame, after = edges[index]
             assert frame is not None
             before = self._contexts[start]
-            place = other[number] - best
-            margin = min(place, spliced[number] - best)
-            found.append(Piece(starts[number], ends[number], frame, before, after, margin, place))
+            margin = others[number] - best
+            found.append(Piece(start >> 1, end >> 1, frame, before, after, margin))
         return found
