@@ -251,12 +251,12 @@ def single_bytes(received: Received, random: Random) -> Chunks:
 def few_bytes(received: Received, random: Random) -> Chunks:
     """One to eight bytes with the arrival time of the last, wherever the line was idle.
 
-    But no adapter keeps a byte for a tenth of a second.
+    But no adapter keeps a byte for longer than 16 ms.
     """
     times, chunks, at = received.times_s, [], 0
     while at < len(times):
         start, at = at, min(len(times), at + random.randint(1, 8))
-        while times[at - 1] - times[start] > 0.1:
+        while times[at - 1] - times[start] > 0.016:
             at -= 1
         chunks.append((at, times[at - 1]))
     return chunks
