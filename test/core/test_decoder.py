@@ -211,6 +211,19 @@ def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
     assert made.feed(b"\xff", 0.0) == [doubtful]
 
 
+def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
+    """An IMU frame that ends in FB or FC, before a delta: the rest of the tick is silent."""
+    made, waited = FrameDecoder(), []
+    for tick in range(60):
+        imu = encode(ImuFrame((120, -80, -16384), (1, 2, -4 - tick % 2)))
+        delta = encode(DeltaFrame(0, 0, 0, tick // 4)) if tick % 4 == 3 else b""
+        for place, byte in enumerate(imu + delta):
+            found = made.feed(bytes([byte]), tick * TICK_S + place * BYTE_S)
+            if place == len(imu) - 1:
+                waited.append(not found)
+    assert waited[30:] == [tick % 4 == 3 for tick in range(30, 60)]
+
+
 # Starting in the middle
 
 
