@@ -10,7 +10,10 @@ from truth import CHUNKERS, FAULTS, GAPS_VISIBLE, SCENARIOS, generate, receive
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """At most one wrong frame in so many (None: none at all), at least this share delivered."""
+    """At most one wrong frame in so many (None: none at all), at least this share delivered.
+
+    All means all after the first two.
+    """
 
     one_wrong_in_visible: int | None
     one_wrong_in_hidden: int | None
@@ -28,8 +31,9 @@ class Bound:
             return True
         one_in = self.one_wrong_in(chunker)
         few = score.wrong == 0 if one_in is None else score.wrong * one_in <= score.out
-        complete = self.delivered < 1.0 or score.missed_beyond_two == 0
-        return few and complete and score.delivered >= min(self.delivered, 0.999) * score.intact
+        if self.delivered == 1.0:
+            return few and score.missed_beyond_two == 0
+        return few and score.delivered_share >= self.delivered
 
 
 BOUNDS: dict[str, Bound] = dict(
@@ -75,5 +79,13 @@ def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
     """The sum of all."""
     total = Score()
     for scenario in SCENARIOS:
+        total += scores[fault, chunker, scenario]
+    return total
+
+
+def over_chunkers(scores: Scores, fault: str, scenario: str) -> Score:
+    """The sum of all."""
+    total = Score()
+    for chunker in CHUNKERS:
         total += scores[fault, chunker, scenario]
     return total

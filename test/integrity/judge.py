@@ -20,14 +20,29 @@ class Score:
     wrong: int = 0
     intact: int = 0
     delivered: int = 0
+    texts: int = 0
+    """Intact ones, among the intact frames."""
+    texts_delivered: int = 0
     missed_beyond_two: int = 0
     """Streams in which an intact frame after the first two is missing."""
+
+    @property
+    def wrong_share(self) -> float:
+        """Of the frames that came out."""
+        return self.wrong / max(1, self.out)
+
+    @property
+    def delivered_share(self) -> float:
+        """Of the frames that arrived intact."""
+        return self.delivered / max(1, self.intact)
 
     def __iadd__(self, other: "Score") -> "Score":
         self.out += other.out
         self.wrong += other.wrong
         self.intact += other.intact
         self.delivered += other.delivered
+        self.texts += other.texts
+        self.texts_delivered += other.texts_delivered
         self.missed_beyond_two += other.missed_beyond_two
         return self
 
@@ -60,6 +75,9 @@ def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
                     score.wrong += 1
         start = end
     whole = [bool(g) for g, i in zip(got, intact, strict=True) if i]
+    texts = [i and frame[0][0] == "text" for frame, i in zip(frames, intact, strict=True)]
+    score.texts = sum(texts)
+    score.texts_delivered = sum(text and bool(g) for text, g in zip(texts, got, strict=True))
     score.missed_beyond_two = int(not all(whole[2:]))
     return score
 

@@ -63,6 +63,8 @@ class Scenario:
     accel_mean: Words = (250, -130, -16380)
     accel_noise: float = 46.0
     gyro_noise: float = 6.5
+    pauses: bool = False
+    """Now and then the board is paused for some seconds: a text each second, and silence."""
 
 
 SCENARIOS: dict[str, Scenario] = {
@@ -72,7 +74,9 @@ SCENARIOS: dict[str, Scenario] = {
     "IMU only, noisy gyro": Scenario(imu_only=True),
     "IMU only, gyro stuck": Scenario(imu_only=True, gyro_stuck=(-6, -5, -4)),
     "tilted": Scenario(accel_mean=(-5, -16383, -5), accel_noise=12.0),
+    "paused now and then": Scenario(driving=True, pauses=True),
 }
+WITH_TEXTS = "paused now and then"
 
 
 def generate(scenario: Scenario, seed: int, seconds: float) -> Truth:
@@ -84,9 +88,19 @@ def generate(scenario: Scenario, seed: int, seconds: float) -> Truth:
     sent = [0, 0, 0]
     delta_seq, pose_seq = random.randrange(256), random.randrange(256)
     truth = Truth()
-    deltas = random.randrange(5)
+    deltas, texts = random.randrange(5), 0
+    paused, toggles_at = False, random.randrange(100, 500)
     for tick in range(round(seconds / TICK_S)):
         now = tick * TICK_S + random.uniform(0, 1e-4)
+        if scenario.pauses and tick == toggles_at:
+            paused, texts = not paused, 0
+            toggles_at += random.randrange(100, 500)
+        if paused:
+            if (toggles_at - tick) % 100 == 0:
+                packed = b"Paused: %d \n" % texts
+                _append(truth, ("text", texts), packed, now)
+                texts += 1
+            continue
         ax, ay = motion.step()
         mean = scenario.accel_mean
         accel = (
@@ -100,15 +114,15 @@ def generate(scenario: Scenario, seed: int, seconds: float) -> Truth:
             round(gauss(bias[1], scenario.gyro_noise)),
             round(gauss(bias[2] + rate, scenario.gyro_noise)),
         )
-        at = len(truth.data)
-        _append(truth, ("imu", accel, gyro), struct.pack(">BB6h", 0xFF, 0xFA, *accel, *gyro))
+        packed = struct.pack(">BB6h", 0xFF, 0xFA, *accel, *gyro)
+        now = _append(truth, ("imu", accel, gyro), packed, now)
         if not scenario.imu_only and tick % 4 == 3:
             counts = [round(value * 1e4) for value in motion.pose]
             dx, dy, dtheta = (c - s for c, s in zip(counts, sent, strict=True))
             sent = counts
             delta_seq = (delta_seq + 1) % 256
             packed = struct.pack(">BB3hB", 0xFF, 0xFB, dx, dy, dtheta, delta_seq)
-            _append(truth, ("delta", dx, dy, dtheta, delta_seq), packed)
+            now = _append(truth, ("delta", dx, dy, dtheta, delta_seq), packed, now)
             deltas += 1
             if deltas % 5 == 0:
                 pose_seq = (pose_seq + 1) % 256
@@ -116,15 +130,17 @@ def generate(scenario: Scenario, seed: int, seconds: float) -> Truth:
                     ">BB3fB", 0xFF, 0xFC, *(value * 1e3 for value in motion.pose), pose_seq
                 )
                 floats = struct.unpack(">3f", packed[2:14])
-                _append(truth, ("pose", *floats, pose_seq), packed)
-        truth.times_s += [now + n * BYTE_S for n in range(1, len(truth.data) - at + 1)]
+                _append(truth, ("pose", *floats, pose_seq), packed, now)
     return truth
 
 
-def _append(truth: Truth, key: Key, packed: bytes) -> None:
+def _append(truth: Truth, key: Key, packed: bytes, now: float) -> float:
+    """A frame that begins now; when its last byte has arrived."""
     at = len(truth.data)
     truth.data += packed
     truth.frames.append((key, at, at + len(packed)))
+    truth.times_s += [now + n * BYTE_S for n in range(1, len(packed) + 1)]
+    return truth.times_s[-1]
 
 
 # What happens to the bytes on their way. Each fault tells, for each byte that arrives, where it
@@ -233,11 +249,16 @@ def single_bytes(received: Received, random: Random) -> Chunks:
 
 
 def few_bytes(received: Received, random: Random) -> Chunks:
-    """One to eight bytes with the arrival time of the last, wherever the line was idle."""
-    chunks, at = [], 0
-    while at < len(received.data):
-        at = min(len(received.data), at + random.randint(1, 8))
-        chunks.append((at, received.times_s[at - 1]))
+    """One to eight bytes with the arrival time of the last, wherever the line was idle.
+
+    But no adapter keeps a byte for longer than 16 ms.
+    """
+    times, chunks, at = received.times_s, [], 0
+    while at < len(times):
+        start, at = at, min(len(times), at + random.randint(1, 8))
+        while times[at - 1] - times[start] > 0.016:
+            at -= 1
+        chunks.append((at, times[at - 1]))
     return chunks
 
 

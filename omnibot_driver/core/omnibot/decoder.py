@@ -24,6 +24,7 @@ from omnibot_driver.core.omnibot.frames import (
     INCOMPLETE,
     NO_FRAME,
     ByteOrder,
+    DeltaFrame,
     Frame,
     ImuFrame,
     PausedFrame,
@@ -32,13 +33,12 @@ from omnibot_driver.core.omnibot.frames import (
 )
 from omnibot_driver.core.omnibot.lattice import Gap, Piece, read
 
-SURE: Final = 4.0
-"""One reading in fifty as likely as the best is too many."""
+SURE: Final = 3.5
+"""One reading in thirty as likely as the best is too many."""
 SPOKEN_AGAINST: Final = 3.0
 """A content of this cost waits for what follows."""
 DOUBT_BYTES: Final = 170
 """100 ms of the nominal stream."""
-FRAMES_TO_STEP_IN: Final = 2
 FRAMES_TO_SETTLE: Final = 3
 """So many sure frames behind a doubtful one, and nothing more will be learnt about it."""
 FRAMES_TO_RECONSIDER: Final = 2
@@ -56,6 +56,9 @@ TICK_BYTES: Final = 14 + 9 + 15
 """All that one tick can bring. More at once after a pause means that we were late, not the line."""
 PAUSES_TO_TRUST: Final = 16
 """So many pauses that stood where they should, and they are taken for the line's own."""
+
+IMUS_ONLY: Final = 8
+"""So many IMU frames without a delta, and none is expected."""
 
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
 
@@ -161,6 +164,7 @@ class FrameDecoder:
         at, size = 0, len(held)
         steps: list[tuple[int, Frame, Context]] = []
         idle = self._gaps[0][0] if self._gaps else size + 1
+        sharp = self._sharp >= PAUSES_TO_TRUST
         while at < size:
             length = measure(held, at)
             end = at + length
@@ -177,8 +181,9 @@ class FrameDecoder:
                 cost >= evidence.LOOK_ALIKE or not self._goes_on(end, closed)
             ):
                 break
-            whole_burst = self._sharp >= PAUSES_TO_TRUST and self._arrived >= length
-            lent = end == size and not whole_burst and _may_end_in_a_header(frame, context)
+            lent = end == size and _may_end_in_a_header(frame, context)
+            if lent and sharp:  # what the board sends at once begins after a pause of its own
+                lent = self._arrived < length and _more_is_due(frame, context)
             if lent and not closed:
                 self._take(steps, context, found)
                 return True
@@ -276,6 +281,7 @@ class FrameDecoder:
         self.statistics.discarded_bytes += count
         self.statistics.faults += self._in_step
         self._in_step = False
+        self._context = self._context.damaged()
         self._forget(count)
 
     def _forget(self, count: int) -> None:
@@ -306,3 +312,10 @@ def _may_end_in_a_header(frame: Frame, before: Context) -> bool:
         said = before.imu is not None and frame.gyro[2] == before.imu.gyro[2]
         return lent and (frame.gyro[2] & 0xFF == 0xFF or not said)
     return not isinstance(frame, PausedFrame) and frame.seq in LENT
+
+
+def _more_is_due(frame: Frame, before: Context) -> bool:
+    """The board may send another frame in the same tick, without a pause."""
+    if isinstance(frame, ImuFrame):
+        return before.imus >= 3 if before.seq is not None else before.imus < IMUS_ONLY
+    return isinstance(frame, DeltaFrame) and (before.pose is None or before.deltas >= 4)

@@ -13,23 +13,25 @@ from typing import Final, NamedTuple
 from omnibot_driver.core.omnibot.frames import DeltaFrame, Frame, ImuFrame, PoseFrame, Words
 
 # What the line does.
-ONE_BYTE: Final = 5.0
-"""A frame that lost or gained one byte: one in 150, which is a byte in two thousand."""
-TWO_BYTES: Final = 8.0
+ONE_BYTE: Final = 5.5
+"""A frame that lost or gained one byte: one in 250, which is a byte in three thousand."""
+TWO_BYTES: Final = 8.5
 """The same twice in one frame: rarer, but both faults come in bad times."""
-BROKEN_OFF: Final = 8.5
+BROKEN_OFF: Final = 9.0
 """A frame of which the last three bytes or more are missing: a burst was lost."""
-HEADER_BYTE: Final = 7.0
+HEADER_BYTE: Final = 7.5
 """A frame that lost half of its header: two places among the 9 to 15 where it may lose a byte."""
 HEADER_IN_PLACE: Final = 4.0
 """A frame that gained bytes, though a header stands where it would end without them."""
 BAD_RUN: Final = 6.0
 """A run of bytes that nobody explains begins: a burst was lost, or noise."""
+BAD_TAIL: Final = 2.5
+"""... right after a whole frame, with no header of its own: a burst seldom begins just there."""
 UNKNOWN_START: Final = 1.0
 """Out of step, the first bytes are a part of a frame: most silences are between frames."""
 BAD_BYTE: Final = 0.35
 """Each byte of such a run; sooner a frame of odd content than 14 unexplained bytes."""
-BAD_HEADER: Final = 0.5
+BAD_HEADER: Final = 1.0
 """A header within such a run: chance makes few, a gyro at rest some."""
 GAP: Final = 5.0
 """The line was idle within a frame, though the board sends each without a pause..."""
@@ -81,6 +83,10 @@ class Context(NamedTuple):
     """Deltas since the last pose."""
     shaken: bool = False
     """The last IMU frame was a leap, or weightless."""
+
+    def damaged(self) -> "Context":
+        """Nobody knows how much was lost."""
+        return Context(self.imu, deltas=self.deltas, shaken=self.shaken)
 
 
 NOTHING_KNOWN: Final = Context()

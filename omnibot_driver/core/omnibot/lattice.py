@@ -101,19 +101,17 @@ class _Search:
         for at in range(size):
             byte = data[at]
             bad, boundary = 2 * at, 2 * at + 1
-            looks_begun = byte in (_HEADER, _TEXT)
-            if cost[bad] < inf and looks_begun:
-                self._edge(bad, boundary, 0.0)
+            header = byte == _HEADER and at + 1 < size and data[at + 1] in _LENGTHS
             price = evidence.BAD_BYTE
-            if byte == _HEADER and at + 1 < size and data[at + 1] in _LENGTHS:
-                price += evidence.BAD_HEADER
-            elif byte == _TEXT and measure(data, at) > 0:
+            if byte == _TEXT and measure(data, at) > 0:
                 price += evidence.BAD_TEXT
             if cost[bad] < inf:
-                self._edge(bad, bad + 2, price)
+                if byte in (_HEADER, _TEXT):
+                    self._edge(bad, boundary, 0.0)
+                self._edge(bad, bad + 2, price + evidence.BAD_HEADER if header else price)
             if cost[boundary] < inf:
-                price += evidence.BAD_RUN
-                self._edge(boundary, bad + 2, price, None, _after_damage(self._contexts[boundary]))
+                price += evidence.BAD_RUN if header else evidence.BAD_RUN + evidence.BAD_TAIL
+                self._edge(boundary, bad + 2, price, None, self._contexts[boundary].damaged())
                 self._frames_from(at, closed)
         for node in (2 * size, 2 * size + 1):
             if cost[node] < inf:
@@ -170,7 +168,7 @@ class _Search:
 
     def _damaged(self, node: int, at: int, end: int, price: float) -> None:
         price += self._idle_within(at, end)
-        self._edge(node, 2 * end + 1, price, None, _after_damage(self._contexts[node]))
+        self._edge(node, 2 * end + 1, price, None, self._contexts[node].damaged())
 
     def _open(self, at: int, price: float) -> None:
         """A frame, whole or damaged, whose end has not come yet."""
@@ -238,8 +236,3 @@ class _Search:
             margin = others[number] - best
             found.append(Piece(start >> 1, end >> 1, frame, before, after, margin))
         return found
-
-
-def _after_damage(context: Context) -> Context:
-    """Nobody knows how much was lost."""
-    return Context(context.imu, deltas=context.deltas, shaken=context.shaken)
