@@ -30,7 +30,7 @@ BLOCKS_KEPT: Final = 75
 """An adapter's timer and the board's tick beat against each other, within 100 ppm, every 20 s."""
 LARGEST_SKEW: Final = 1.2e-4
 """Of the board's crystal against the host's: 100 ppm, and a little."""
-SUPPORT: Final = 0.75
+SUPPORT: Final = 0.5
 """The line touches the points on both sides of this part of their span: late enough to follow what
 has lately been found out, early enough not to follow the last second's jitter."""
 LARGEST_LOSS_TICKS: Final = 25
@@ -48,9 +48,6 @@ Point = tuple[int, float]
 
 class DeviceClock:
     """``period_s``: the board's nominal tick; each brings one ImuReading."""
-
-    _beat_least_s: float
-    _beat_most_s: float
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s
@@ -71,32 +68,29 @@ class DeviceClock:
         self._points: deque[Point] = deque(maxlen=BLOCKS_KEPT)
         self._best: Point | None = None
         self._block_from = self._tick
-        self._settled = False
         self._seen_tick: int | None = None
-        self._usual_lag_s = self._period_s
-        self._begin_beat(trusted=True)
+        self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
 
     def stamps(
-        self, readings: Sequence[Reading], now: float, missing_s: float | None = None
+        self, readings: Sequence[Reading], now: float, newest: tuple[int, float] | None = (0, 0.0)
     ) -> list[float]:
         """When each of these readings, all that one read at ``now`` completed, was sampled.
 
-        ``missing_s``: how long the line still needs for a sample of which the read brought the
-        beginning. From tick to tick stamps increase, and none is later than ``now``; a displacement
-        has the stamp of its tick's ImuReading.
+        ``newest``: see ``Board``. From tick to tick stamps increase, and none is later than
+        ``now``; a displacement has the stamp of its tick's ImuReading.
         """
-        kinds = [type(reading) for reading in readings]
         ticks = self._count(readings)
-        displaced, alone = DisplacementReading in kinds, kinds.count(ImuReading) <= 1
+        if self._anchor is None:
+            self._anchor = (self._tick, now)
         short = 0
-        if missing_s is not None:
-            short = self._compare(self._tick + 1, now + missing_s, displaced=displaced, alone=alone)
-        elif displaced or ImuReading in kinds:
-            short = self._compare(self._tick, now, displaced=displaced, alone=alone)
+        if newest is not None:
+            ahead, missing_s = newest
+            if ahead or any(isinstance(reading, ImuReading) for reading in readings):
+                short = self._compare(self._tick + ahead, now + missing_s)
         stamps = []
-        for left, tick, kind in zip(range(len(ticks), 0, -1), ticks, kinds, strict=True):
+        for left, tick, reading in zip(range(len(ticks), 0, -1), ticks, readings, strict=True):
             own = tick + short != self._stamped_tick
-            if kind is ImuReading or (kind is DisplacementReading and own):
+            if isinstance(reading, ImuReading) or (isinstance(reading, DisplacementReading) and own):
                 latest_s = now - max(0, ticks[-1] - tick) * self._period_s
                 self._stamp(tick + short, latest_s, (now - self._stamp_s) / (left + 1))
             stamps.append(self._stamp_s)
@@ -108,11 +102,9 @@ class DeviceClock:
         settled = 0
         for reading in readings:
             if isinstance(reading, ImuReading):
-                self._tick += 1
+                self._tick += 1 + reading.lost
             elif isinstance(reading, DisplacementReading):
                 missing = self._missing(reading)
-                if missing < 0:
-                    self._doubt(overcounted=True)
                 ticks[settled:] = [tick + missing for tick in ticks[settled:]]
                 settled = len(ticks) + 1
                 self._tick += missing
@@ -130,71 +122,46 @@ class DeviceClock:
         passed = self._displacement_ticks * (reading.lost + 1)
         return self._displaced_tick + passed - self._tick
 
-    def _compare(self, tick: int, arrival: float, *, displaced: bool, alone: bool) -> int:
-        """Hold the last tick against its arrival; by how many the count was found to be short."""
+    def _compare(self, tick: int, arrival: float) -> int:
+        """Hold the newest tick against its arrival; by how many the count was found to be short."""
         if tick == self._seen_tick:
             return 0  # its beginning has been seen before, and told more
-        if self._anchor is None:
-            self._anchor = (tick, arrival)
         lag_s = arrival - self._line(tick)
+        period_s, lags_s = self._period_s, self._lags_s
         short = 0
-        usual_s = self._usual_lag_s if alone and not displaced else 2 * self._period_s
-        if lag_s > usual_s + 0.5 * self._period_s:
-            short = max(1, math.floor(lag_s / self._period_s) - 1)
-        elif lag_s < -0.5 * self._period_s and self._settled:
-            short = round(lag_s / self._period_s)
-            self._usual_lag_s = self._period_s
+        if len(lags_s) == BEAT_READS:
+            if lag_s < -period_s / 2:
+                short = round(lag_s / period_s)
+            elif lag_s > min(max(lags_s), period_s / 2) + 0.95 * period_s:
+                short = max(1, math.floor(lag_s / period_s))
+            elif min(lags_s) > period_s / 2:
+                short = round(min(lags_s) / period_s)
         if short > LARGEST_LOSS_TICKS:
             self.restart()
-            return self._compare(tick, arrival, displaced=displaced, alone=alone)
+            self._anchor = (tick, arrival)
+            return self._compare(tick, arrival)
         if short:
-            self._recount(short, counter_too=displaced)
-        else:
-            self._learn(tick, arrival, lag_s)
-        self._seen_tick = tick + short
+            self._tick += short
+            if self._displaced_tick is not None:
+                self._displaced_tick += short
+            tick += short
+            lag_s -= short * self._slope_s
+            lags_s.clear()
+        lags_s.append(lag_s)
+        self._learn(tick, arrival, lag_s)
+        self._seen_tick = tick
         return short
 
-    def _recount(self, short: int, *, counter_too: bool) -> None:
-        self._tick += short
-        if counter_too and self._displaced_tick is not None:
-            self._displaced_tick += short
-        self._doubt(overcounted=short < 0)
-
-    def _doubt(self, *, overcounted: bool) -> None:
-        """The next beat teaches nothing, and neither does this block if its ticks came too soon."""
-        self._begin_beat(trusted=False)
-        if overcounted:
-            self._best = None
-
     def _learn(self, tick: int, arrival: float, lag_s: float) -> None:
-        self._beat_reads += 1
-        self._beat_least_s = min(self._beat_least_s, lag_s)
-        self._beat_most_s = max(self._beat_most_s, lag_s)
-        if self._beat_trusted:
-            if lag_s < 0.0:
-                self._anchor = (tick, arrival)
-            if self._best is None or arrival < self._best[1] + self._slope_s * (
-                tick - self._best[0]
-            ):
-                self._best = (tick, arrival)
-            if tick - self._block_from >= BLOCK_TICKS:
-                if not self._points or self._points[-1][0] < self._best[0]:
-                    self._points.append(self._best)
-                self._lay_line()
-                self._best, self._block_from = None, tick
-        if self._beat_reads == BEAT_READS:
-            self._settled = True
-            short = round(self._beat_least_s / self._period_s)
-            self._usual_lag_s = min(self._period_s, self._beat_most_s)
-            self._begin_beat(trusted=True)
-            if short > 0:
-                self._recount(short, counter_too=True)
-
-    def _begin_beat(self, *, trusted: bool) -> None:
-        self._beat_trusted = trusted
-        self._beat_reads = 0
-        self._beat_least_s = math.inf
-        self._beat_most_s = 0.0
+        if lag_s < 0.0:
+            self._anchor = (tick, arrival)
+        if self._best is None or arrival < self._best[1] + self._slope_s * (tick - self._best[0]):
+            self._best = (tick, arrival)
+        if tick - self._block_from >= BLOCK_TICKS:
+            if not self._points or self._points[-1][0] < self._best[0]:
+                self._points.append(self._best)
+            self._lay_line()
+            self._best, self._block_from = None, tick
 
     def _line(self, tick: int) -> float:
         assert self._anchor is not None

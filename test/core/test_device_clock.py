@@ -65,7 +65,7 @@ def stamp(clock: DeviceClock, board: Board, reads: Iterable[Read]) -> Stamped:
     last_s = -math.inf
     for now, data in reads:
         readings = omnibot.receive(data, now)
-        stamps_s = clock.stamps(readings, now, omnibot.missing_s)
+        stamps_s = clock.stamps(readings, now, omnibot.newest)
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
             if isinstance(reading, ImuReading):
                 assert last_s < stamp_s <= now

@@ -34,6 +34,7 @@ from omnibot_driver.core.omnibot.frames import (
     Words,
 )
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
+from omnibot_driver.core.omnibot.rhythm import Rhythm
 from omnibot_driver.core.omnibot.sequence import Sequence
 
 TICK_S: Final = 0.01
@@ -81,6 +82,7 @@ class OmniBot:
             self.settings.pose_byte_order, ACCEL_COUNTS_PER_G[self.settings.imu.accel_range_g]
         )
         self._modes = ModeTracker()
+        self._rhythm = Rhythm()
         self._sequence.reconnect()
         self._paused_count: int | None = None
 
@@ -95,20 +97,22 @@ class OmniBot:
         return TICK_S
 
     @property
-    def missing_s(self) -> float | None:
+    def newest(self) -> tuple[int, float] | None:
         """The line's time for the rest of an IMU frame in hand."""
         begun = self._decoder.begun
-        if not begun.startswith(frames.IMU_HEADER):
+        if begun is None:
             return None
-        return max(0, frames.IMU_LENGTH - len(begun)) * frames.BYTE_S
+        if begun.startswith(frames.IMU_HEADER):
+            return 1, max(0, frames.IMU_LENGTH - len(begun)) * frames.BYTE_S
+        return (0, 0.0) if self._decoder.fresh else None
 
     def receive(self, data: bytes, now: float) -> list[Reading]:
         """The readings that these bytes complete, in the order of the line."""
-        return [self._read(frame, now) for frame in self._decoder.feed(data, now)]
+        return self._read_all(self._decoder.feed(data, now), now)
 
     def flush(self, now: float) -> list[Reading]:
         """The line is closed: what was held is all there will be."""
-        return [self._read(frame, now) for frame in self._decoder.flush(now)]
+        return self._read_all(self._decoder.flush(now), now)
 
     def silence(self) -> None:
         """Nothing was understood for so long that the mode is unknown again."""
@@ -163,12 +167,17 @@ class OmniBot:
         a, b, c = to_words(counts)
         return frames.encode(CommandFrame(mode, (a, b, c))) if (a, b, c) != (0, 0, 0) else STOP
 
-    def _read(self, frame: Frame, now: float) -> Reading:
+    def _read_all(self, found: list[Frame], now: float) -> list[Reading]:
+        skipped = self._decoder.skipped
+        return [self._read(frame, now, n) for frame, n in zip(found, skipped, strict=True)]
+
+    def _read(self, frame: Frame, now: float, skipped: int = 0) -> Reading:
         self._modes.hear(frame)
+        lost = self._rhythm.hear(type(frame), skipped)
         match frame:
             case ImuFrame(accel, gyro):
                 scale = self.settings.imu
-                return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro))
+                return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro), lost)
             case DeltaFrame():
                 return self._displacement(frame, now)
             case PoseFrame(x, y, theta, seq):
