@@ -97,17 +97,13 @@ class DeviceClock:
         return stamps
 
     def _count(self, readings: Sequence[Reading]) -> list[int]:
-        """The ticks of the readings; a counter corrects what came since the displacement before."""
+        """The ticks of the readings, by what is known of losses; the counter is right."""
         ticks: list[int] = []
-        settled = 0
         for reading in readings:
             if isinstance(reading, ImuReading):
                 self._tick += 1 + reading.lost
             elif isinstance(reading, DisplacementReading):
-                missing = self._missing(reading)
-                ticks[settled:] = [tick + missing for tick in ticks[settled:]]
-                settled = len(ticks) + 1
-                self._tick += missing
+                self._tick += self._missing(reading)
                 self._displaced_tick = self._tick
             elif isinstance(reading, PoseReading) and self._displaced_tick is not None:
                 self._displaced_tick += reading.lost * self._displacement_ticks

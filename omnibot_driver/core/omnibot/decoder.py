@@ -122,10 +122,11 @@ class FrameDecoder:
 
         None while in doubt, or if nothing new is known of when a frame came.
         """
-        held = len(self._held)
-        if not self._in_step or held > TICK_BYTES // 2:
+        held = self._held
+        doubt = not self._in_step or len(held) > TICK_BYTES // 2
+        if doubt or (held and measure(held, 0) == NO_FRAME):
             return None
-        return bytes(self._held)
+        return bytes(held)
 
     @property
     def fresh(self) -> bool:
