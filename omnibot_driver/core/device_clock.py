@@ -30,7 +30,7 @@ BLOCKS_KEPT: Final = 75
 """An adapter's timer and the board's tick beat against each other, within 100 ppm, every 20 s."""
 LARGEST_SKEW: Final = 1.2e-4
 """Of the board's crystal against the host's: 100 ppm, and a little."""
-SUPPORT: Final = 0.5
+SUPPORT: Final = 0.75
 """The line touches the points on both sides of this part of their span: late enough to follow what
 has lately been found out, early enough not to follow the last second's jitter."""
 LARGEST_LOSS_TICKS: Final = 25
@@ -42,7 +42,7 @@ LARGEST_RISE: Final = 0.02
 SMALLEST_STEP_S: Final = 1e-6
 """Between two stamps for which even their arrivals leave no room."""
 
-Point = tuple[int, float]
+Point = tuple[int, float, bool]
 """A tick and the time of its arrival."""
 
 
@@ -81,12 +81,12 @@ class DeviceClock:
         """
         ticks = self._count(readings)
         if self._anchor is None:
-            self._anchor = (self._tick, now)
+            self._anchor = (self._tick, now, False)
         short = 0
         if newest is not None:
             ahead, missing_s = newest
             if ahead or any(isinstance(reading, ImuReading) for reading in readings):
-                short = self._compare(self._tick + ahead, now + missing_s)
+                short = self._compare((self._tick + ahead, now + missing_s, missing_s > 0.0))
         stamps = []
         for left, tick, reading in zip(range(len(ticks), 0, -1), ticks, readings, strict=True):
             own = tick + short != self._stamped_tick
@@ -118,8 +118,9 @@ class DeviceClock:
         passed = self._displacement_ticks * (reading.lost + 1)
         return self._displaced_tick + passed - self._tick
 
-    def _compare(self, tick: int, arrival: float) -> int:
+    def _compare(self, point: Point) -> int:
         """Hold the newest tick against its arrival; by how many the count was found to be short."""
+        tick, arrival, cut = point
         if tick == self._seen_tick:
             return 0  # its beginning has been seen before, and told more
         lag_s = arrival - self._line(tick)
@@ -134,8 +135,8 @@ class DeviceClock:
                 short = round(min(lags_s) / period_s)
         if short > LARGEST_LOSS_TICKS:
             self.restart()
-            self._anchor = (tick, arrival)
-            return self._compare(tick, arrival)
+            self._anchor = point
+            return self._compare(point)
         if short:
             self._tick += short
             if self._displaced_tick is not None:
@@ -144,16 +145,19 @@ class DeviceClock:
             lag_s -= short * self._slope_s
             lags_s.clear()
         lags_s.append(lag_s)
-        self._learn(tick, arrival, lag_s)
+        self._learn((tick, arrival, cut), lag_s)
         self._seen_tick = tick
         return short
 
-    def _learn(self, tick: int, arrival: float, lag_s: float) -> None:
+    def _learn(self, point: Point, lag_s: float) -> None:
+        tick, arrival, _ = point
         if lag_s < 0.0:
-            self._anchor = (tick, arrival)
-        if self._best is None or arrival < self._best[1] + self._slope_s * (tick - self._best[0]):
-            self._best = (tick, arrival)
+            self._anchor = point
+        best = self._best
+        if best is None or arrival < best[1] + self._slope_s * (tick - best[0]):
+            self._best = point
         if tick - self._block_from >= BLOCK_TICKS:
+            assert self._best is not None
             if not self._points or self._points[-1][0] < self._best[0]:
                 self._points.append(self._best)
             self._lay_line()
@@ -166,7 +170,7 @@ class DeviceClock:
     def _lay_line(self) -> None:
         """Under all points, as high as it goes over their middle, within the crystals' skew."""
         hull: list[Point] = []
-        for point in self._points:
+        for point in [point for point in self._points if point[2]] or self._points:
             while len(hull) > 1 and _slope(hull[-2], point) <= _slope(hull[-2], hull[-1]):
                 hull.pop()
             hull.append(point)
