@@ -69,6 +69,7 @@ class DeviceClock:
         self._best: Point | None = None
         self._block_from = self._tick
         self._seen_tick: int | None = None
+        self._settled = False
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
 
     def stamps(
@@ -85,14 +86,17 @@ class DeviceClock:
         short = 0
         if newest is not None:
             ahead, missing_s = newest
-            if ahead or any(isinstance(reading, ImuReading) for reading in readings):
-                short = self._compare((self._tick + ahead, now + missing_s, missing_s > 0.0))
+            came = ahead + sum(isinstance(reading, ImuReading) for reading in readings)
+            if came:
+                point = (self._tick + ahead, now + missing_s, missing_s > 0.0)
+                counted = any(isinstance(reading, DisplacementReading) for reading in readings)
+                short = self._compare(point, alone=came == 1, counted=counted)
         stamps = []
         for left, tick, reading in zip(range(len(ticks), 0, -1), ticks, readings, strict=True):
             own = tick + short != self._stamped_tick
             if isinstance(reading, ImuReading) or (isinstance(reading, DisplacementReading) and own):
-                latest_s = now - max(0, ticks[-1] - tick) * self._period_s
-                self._stamp(tick + short, latest_s, (now - self._stamp_s) / (left + 1))
+                later_s = max((ticks[-1] - tick) * self._period_s, left * SMALLEST_STEP_S)
+                self._stamp(tick + short, now - later_s, (now - self._stamp_s) / (left + 1))
             stamps.append(self._stamp_s)
         return stamps
 
@@ -118,7 +122,7 @@ class DeviceClock:
         passed = self._displacement_ticks * (reading.lost + 1)
         return self._displaced_tick + passed - self._tick
 
-    def _compare(self, point: Point) -> int:
+    def _compare(self, point: Point, *, alone: bool, counted: bool) -> int:
         """Hold the newest tick against its arrival; by how many the count was found to be short."""
         tick, arrival, cut = point
         if tick == self._seen_tick:
@@ -126,24 +130,25 @@ class DeviceClock:
         lag_s = arrival - self._line(tick)
         period_s, lags_s = self._period_s, self._lags_s
         short = 0
-        if len(lags_s) == BEAT_READS:
-            if lag_s < -period_s / 2:
-                short = round(lag_s / period_s)
-            elif lag_s > min(max(lags_s), period_s / 2) + 0.95 * period_s:
+        if self._settled and lag_s < -period_s / 2:
+            short = round(lag_s / period_s)
+        elif len(lags_s) == BEAT_READS:
+            self._settled = True
+            if alone and lag_s > min(max(lags_s), period_s / 2) + 0.95 * period_s:
                 short = max(1, math.floor(lag_s / period_s))
             elif min(lags_s) > period_s / 2:
-                short = round(min(lags_s) / period_s)
+                short, counted = round(min(lags_s) / period_s), True
+                lags_s.clear()
         if short > LARGEST_LOSS_TICKS:
             self.restart()
             self._anchor = point
-            return self._compare(point)
+            return self._compare(point, alone=alone, counted=counted)
         if short:
             self._tick += short
-            if self._displaced_tick is not None:
+            if counted and self._displaced_tick is not None:
                 self._displaced_tick += short
             tick += short
             lag_s -= short * self._slope_s
-            lags_s.clear()
         lags_s.append(lag_s)
         self._learn((tick, arrival, cut), lag_s)
         self._seen_tick = tick

@@ -224,9 +224,9 @@ def test_whatever_comes_stamps_increase_and_are_not_later_than_arrival() -> None
                 lost = rng.choice([0] * 20 + [1, 255])
                 readings += [SAMPLE] * rng.choice([3, 4, 4, 4, 5])
                 readings.append(DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, lost))
-            missing_s = rng.choice([None, None, 0.0, 0.001])
+            newest = rng.choice([None, (0, 0.0), (1, 0.0), (1, 0.001)])
             for reading, stamp_s in zip(
-                readings, clock.stamps(readings, now, missing_s), strict=True
+                readings, clock.stamps(readings, now, newest), strict=True
             ):
                 assert stamp_s <= now
                 assert last_s < stamp_s if reading is SAMPLE else last_s <= stamp_s
