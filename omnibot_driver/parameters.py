@@ -368,6 +368,7 @@ def check_all(given: Mapping[str, object]) -> dict[str, Value]:
 def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
     """What the board's translator needs of checked values."""
     return OmniBotSettings(
+        baudrate=values["baudrate"],
         linear_scale=values["linear_scale"],
         angular_scale=values["angular_scale"],
         wheel_radius_m=values["wheel_radius"],

@@ -3,15 +3,18 @@
 The board samples once a tick by a crystal of its own. Its bytes reach us with a delay that is
 unknown and ever changing, but never before they were sent. Two questions follow.
 
-*Which tick is it?* IMU readings are counted. What is lost between them is told exactly by the
-counter that displacements carry; until the next of those, or without any, by arrival: a read takes
-all that has come, so the last tick in it is hardly older than one period.
+*Which tick is it?* IMU readings are counted, with those that the board says were lost. What no byte
+told of is told exactly by the counter that displacements carry; until the next of those, or without
+any, by arrival: a read takes all that has come, so the newest tick in it is hardly older than one
+period, and never from the future.
 
 *When was it?* Drawn over their ticks, arrivals lie on or above a straight line whose slope is the
 true period. The least delayed arrival of every second is kept, and the line is laid under those of
 the last while as close as it goes: it is an edge of their lower convex hull. An arrival below the
 line moves it at once. Bursts, stalls and losses only make points above the line. What stays in the
-stamps is the least delay that ever happens: one constant.
+stamps is the least delay that ever happens: one constant. A sample that was cut by its read has not
+waited at all, so if there are such points the line is laid under them alone: what waits for a
+timer may for seconds keep that timer's pace.
 
 This module knows readings and times. It reads no clock and knows no board's bytes.
 """
@@ -43,7 +46,7 @@ SMALLEST_STEP_S: Final = 1e-6
 """Between two stamps for which even their arrivals leave no room."""
 
 Point = tuple[int, float, bool]
-"""A tick and the time of its arrival."""
+"""A tick, the time of its arrival, and whether a read cut it: the rest had not arrived yet."""
 
 
 class DeviceClock:
@@ -93,8 +96,9 @@ class DeviceClock:
                 short = self._compare(point, alone=came == 1, counted=counted)
         stamps = []
         for left, tick, reading in zip(range(len(ticks), 0, -1), ticks, readings, strict=True):
-            own = tick + short != self._stamped_tick
-            if isinstance(reading, ImuReading) or (isinstance(reading, DisplacementReading) and own):
+            is_new = tick + short != self._stamped_tick
+            is_displacement = isinstance(reading, DisplacementReading)
+            if isinstance(reading, ImuReading) or (is_displacement and is_new):
                 later_s = max((ticks[-1] - tick) * self._period_s, left * SMALLEST_STEP_S)
                 self._stamp(tick + short, now - later_s, (now - self._stamp_s) / (left + 1))
             stamps.append(self._stamp_s)
@@ -123,7 +127,11 @@ class DeviceClock:
         return self._displaced_tick + passed - self._tick
 
     def _compare(self, point: Point, *, alone: bool, counted: bool) -> int:
-        """Hold the newest tick against its arrival; by how many the count was found to be short."""
+        """Hold the newest tick against its arrival; by how many the count was found to be short.
+
+        ``alone``: the read brought no other sample, so it was not late; ``counted``: a counter told
+        this tick.
+        """
         tick, arrival, cut = point
         if tick == self._seen_tick:
             return 0  # its beginning has been seen before, and told more
@@ -155,6 +163,7 @@ class DeviceClock:
         return short
 
     def _learn(self, point: Point, lag_s: float) -> None:
+        """Keep the least delayed arrival of each block."""
         tick, arrival, _ = point
         if lag_s < 0.0:
             self._anchor = point

@@ -79,9 +79,7 @@ def spread(errors: list[float], part: float = 0.99) -> float:
     return min(high - low for low, high in ends) / 2
 
 
-def stamp(
-    line: str, scenario: str, loss: float, skew: float, seed: int, seconds: float
-) -> Stamped:
+def stamp(line: str, scenario: str, loss: float, skew: float, seed: int, seconds: float) -> Stamped:
     """One stream from somewhere in its first second on."""
     random = Random(f"{line} {loss} {skew} {seed}")
     truth = generate(SCENARIOS[scenario], seed, seconds)

@@ -53,11 +53,13 @@ WAKE: Final = bytes(8)
 class OmniBotSettings:
     """What cannot be known from the wire.
 
+    ``baudrate``: at ten bits to the byte.
     ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per rad/s; ``delta_frame``: whether deltas
     are differences of positions in the board's earth frame, motion along its own axes, or (older
     firmware) encoder counts of the wheels A, B, C.
     """
 
+    baudrate: int = 115200
     linear_scale: float = 70.0
     angular_scale: float = 500.0
     wheel_radius_m: float = 0.029
@@ -98,12 +100,12 @@ class OmniBot:
 
     @property
     def newest(self) -> tuple[int, float] | None:
-        """The line's time for the rest of an IMU frame in hand."""
+        """By the IMU frame in hand, whole or begun."""
         begun = self._decoder.begun
         if begun is None:
             return None
         if begun.startswith(frames.IMU_HEADER):
-            return 1, max(0, frames.IMU_LENGTH - len(begun)) * frames.BYTE_S
+            return 1, max(0, frames.IMU_LENGTH - len(begun)) * 10 / self.settings.baudrate
         return (0, 0.0) if self._decoder.fresh else None
 
     def receive(self, data: bytes, now: float) -> list[Reading]:
@@ -173,14 +175,16 @@ class OmniBot:
 
     def _read(self, frame: Frame, now: float, skipped: int = 0) -> Reading:
         self._modes.hear(frame)
-        lost = self._rhythm.hear(type(frame), skipped)
         match frame:
             case ImuFrame(accel, gyro):
+                lost = self._rhythm.hear(ImuFrame, skipped)
                 scale = self.settings.imu
                 return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro), lost)
             case DeltaFrame():
+                self._rhythm.hear(DeltaFrame, skipped)
                 return self._displacement(frame, now)
             case PoseFrame(x, y, theta, seq):
+                self._rhythm.hear(PoseFrame, skipped)
                 step = self._sequence.pose(seq, now)
                 return PoseReading(
                     x * POSE_LSB_M,
@@ -192,6 +196,7 @@ class OmniBot:
             case PausedFrame(count):
                 before, self._paused_count = self._paused_count, count
                 self._sequence.pause()
+                self._rhythm = Rhythm()
                 return PausedReading(continues=before is not None and count == (before + 1) % 256)
 
     def _displacement(self, frame: DeltaFrame, now: float) -> DisplacementReading:

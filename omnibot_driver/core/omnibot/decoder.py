@@ -118,10 +118,7 @@ class FrameDecoder:
 
     @property
     def begun(self) -> bytes | None:
-        """What has come of the next frame after one whose last byte came with the last call too.
-
-        None while in doubt, or if nothing new is known of when a frame came.
-        """
+        """What has come of the next frame; None while in doubt about it."""
         held = self._held
         doubt = not self._in_step or len(held) > TICK_BYTES // 2
         if doubt or (held and measure(held, 0) == NO_FRAME):
@@ -130,6 +127,7 @@ class FrameDecoder:
 
     @property
     def fresh(self) -> bool:
+        """Whether bytes of the last frame that came out were in the last call."""
         return len(self._held) < self._arrived
 
     def _close(self, found: list[Frame]) -> None:

@@ -1,41 +1,36 @@
 """The order in which a running board sends, and what it tells of bytes that made no frame.
 
 In nominal mode a delta follows every fourth IMU frame, and a pose every fifth delta; in IMU-only
-mode there is nothing but IMU frames. So bytes that were thrown away between two frames tell by their
-number which frames they were, also when a few of them are missing. This is soft knowledge: SEQ and
-arrival times correct it.
+mode there are IMU frames alone. So the number of bytes between two frames tells which frames they
+were, also when a few of them are missing. It is soft knowledge: SEQ and arrival times correct it.
 """
 
 from typing import Final
 
 from omnibot_driver.core.omnibot.frames import DeltaFrame, Frame, ImuFrame, PoseFrame
+from omnibot_driver.core.omnibot.modes import IMU_FRAMES_ALONE
 
 Kind = type[Frame]
 
 LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
-NOMINAL: Final[tuple[Kind, ...]] = (*(ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame) * 5, PoseFrame)
+_DELTA_PERIOD: Final[tuple[Kind, ...]] = (*(ImuFrame,) * 4, DeltaFrame)
+NOMINAL: Final[tuple[Kind, ...]] = (*_DELTA_PERIOD * 5, PoseFrame)
 IMU_ONLY: Final[tuple[Kind, ...]] = (ImuFrame,)
-IMUS_ALONE: Final = 25
-"""So many IMU frames without a delta, and none is expected any more."""
 
 
 class Rhythm:
-    """Where in its cycle the board is."""
+    """Where in its cycle a board is; one for each stretch in which it runs."""
 
     def __init__(self) -> None:
         self._cycle = IMU_ONLY
         self._next = 0
-        self._imus = 0
-        self._lost = 0
+        self._imus = self._lost = 0
 
     def hear(self, kind: Kind, skipped: int) -> int:
-        """This frame came in after so many bytes that made none.
+        """A frame came in after so many bytes that made none: how many IMU frames they were.
 
-        How many IMU frames they were, since the last frame that was an IMU frame or a delta.
+        With those that a pose came after, but not beyond a delta: its SEQ counts what is before it.
         """
-        if kind not in LENGTH:
-            self.__init__()
-            return 0
         while skipped >= LENGTH[self._cycle[self._next]] / 2:
             passed = self._cycle[self._next]
             skipped -= LENGTH[passed]
@@ -44,7 +39,7 @@ class Rhythm:
         self._imus = self._imus + 1 if kind is ImuFrame else 0
         if kind is not ImuFrame:
             self._cycle = NOMINAL
-        elif self._imus > IMUS_ALONE:
+        elif self._imus >= IMU_FRAMES_ALONE:
             self._cycle, self._next = IMU_ONLY, 0
         while self._cycle[self._next] is not kind:
             self._advance()
