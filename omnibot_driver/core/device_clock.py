@@ -94,12 +94,14 @@ class DeviceClock:
                 point = (self._tick + ahead, now + missing_s, missing_s > 0.0)
                 counted = any(isinstance(reading, DisplacementReading) for reading in readings)
                 short = self._compare(point, alone=came == 1, counted=counted)
+        # Where a counter took ticks back, the order of the readings must still find room.
+        least_s = 0.0 if ticks == sorted(ticks) else SMALLEST_STEP_S
         stamps = []
         for left, tick, reading in zip(range(len(ticks), 0, -1), ticks, readings, strict=True):
             is_new = tick + short != self._stamped_tick
             is_displacement = isinstance(reading, DisplacementReading)
             if isinstance(reading, ImuReading) or (is_displacement and is_new):
-                later_s = max((ticks[-1] - tick) * self._period_s, left * SMALLEST_STEP_S)
+                later_s = max((ticks[-1] - tick) * self._period_s, left * least_s)
                 self._stamp(tick + short, now - later_s, (now - self._stamp_s) / (left + 1))
             stamps.append(self._stamp_s)
         return stamps
