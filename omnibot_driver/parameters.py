@@ -456,6 +456,7 @@ def _require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
 def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
     """What the board's translator needs of checked values."""
     return OmniBotSettings(
+        baudrate=values["baudrate"],
         linear_scale=values["linear_scale"],
         angular_scale=values["angular_scale"],
         position_scale=values["position_scale"],

@@ -31,10 +31,14 @@ class Mode(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ImuReading:
-    """Specific force in m/s² and angular velocity in rad/s, in the sensor's own axes."""
+    """Specific force in m/s² and angular velocity in rad/s, in the sensor's own axes.
+
+    ``lost`` readings of this kind seem to be missing before it, by what was received of them.
+    """
 
     specific_force: Vector3
     angular_velocity: Vector3
+    lost: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +99,12 @@ class Board(Protocol):
         """The nominal time from one ImuReading to the next."""
 
     @property
-    def missing_s(self) -> float | None:
-        """How long the line needs for the rest of an ImuReading that has begun; None if none has.
+    def newest(self) -> tuple[int, float] | None:
+        """The newest sample of which bytes are in hand, and when it will all have come.
 
-        The beginning tells when the reading was sampled better than an end that is delivered late.
+        How many samples after the last ImuReading (0, 1), and how many seconds the line still needs
+        for its rest: the beginning of a sample tells when it was taken better than an end that is
+        delivered late. None while the framing is in doubt, or the last read told nothing new.
         """
 
     @property

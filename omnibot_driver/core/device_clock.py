@@ -3,15 +3,18 @@
 The board samples once a tick by a crystal of its own. Its bytes reach us with a delay that is
 unknown and ever changing, but never before they were sent. Two questions follow.
 
-*Which tick is it?* IMU readings are counted. What is lost between them is told exactly by the
-counter that displacements carry; until the next of those, or without any, by arrival: a read takes
-all that has come, so the last tick in it is hardly older than one period.
+*Which tick is it?* IMU readings are counted, with those that the board says were lost. What no byte
+told of is told exactly by the counter that displacements carry; until the next of those, or without
+any, by arrival: a read takes all that has come, so the newest tick in it is hardly older than one
+period, and never from the future.
 
 *When was it?* Drawn over their ticks, arrivals lie on or above a straight line whose slope is the
 true period. The least delayed arrival of every second is kept, and the line is laid under those of
 the last while as close as it goes: it is an edge of their lower convex hull. An arrival below the
 line moves it at once. Bursts, stalls and losses only make points above the line. What stays in the
-stamps is the least delay that ever happens: one constant.
+stamps is the least delay that ever happens: one constant. A sample that was cut by its read has not
+waited at all, so if there are such points the line is laid under them alone: what waits for a
+timer may for seconds keep that timer's pace.
 
 This module knows readings and times. It reads no clock and knows no board's bytes.
 """
@@ -42,15 +45,12 @@ LARGEST_RISE: Final = 0.02
 SMALLEST_STEP_S: Final = 1e-6
 """Between two stamps for which even their arrivals leave no room."""
 
-Point = tuple[int, float]
-"""A tick and the time of its arrival."""
+Point = tuple[int, float, bool]
+"""A tick, the time of its arrival, and whether a read cut it: the rest had not arrived yet."""
 
 
 class DeviceClock:
     """``period_s``: the board's nominal tick; each brings one ImuReading."""
-
-    _beat_least_s: float
-    _beat_most_s: float
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s
@@ -71,51 +71,49 @@ class DeviceClock:
         self._points: deque[Point] = deque(maxlen=BLOCKS_KEPT)
         self._best: Point | None = None
         self._block_from = self._tick
-        self._settled = False
         self._seen_tick: int | None = None
-        self._usual_lag_s = self._period_s
-        self._begin_beat(trusted=True)
+        self._settled = False
+        self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
 
     def stamps(
-        self, readings: Sequence[Reading], now: float, missing_s: float | None = None
+        self, readings: Sequence[Reading], now: float, newest: tuple[int, float] | None = (0, 0.0)
     ) -> list[float]:
         """When each of these readings, all that one read at ``now`` completed, was sampled.
 
-        ``missing_s``: how long the line still needs for a sample of which the read brought the
-        beginning. From tick to tick stamps increase, and none is later than ``now``; a displacement
-        has the stamp of its tick's ImuReading.
+        ``newest``: see ``Board``. From tick to tick stamps increase, and none is later than
+        ``now``; a displacement has the stamp of its tick's ImuReading.
         """
-        kinds = [type(reading) for reading in readings]
         ticks = self._count(readings)
-        displaced, alone = DisplacementReading in kinds, kinds.count(ImuReading) <= 1
+        if self._anchor is None:
+            self._anchor = (self._tick, now, False)
         short = 0
-        if missing_s is not None:
-            short = self._compare(self._tick + 1, now + missing_s, displaced=displaced, alone=alone)
-        elif displaced or ImuReading in kinds:
-            short = self._compare(self._tick, now, displaced=displaced, alone=alone)
+        if newest is not None:
+            ahead, missing_s = newest
+            came = ahead + sum(isinstance(reading, ImuReading) for reading in readings)
+            if came:
+                point = (self._tick + ahead, now + missing_s, missing_s > 0.0)
+                counted = any(isinstance(reading, DisplacementReading) for reading in readings)
+                short = self._compare(point, alone=came == 1, counted=counted)
+        # Where a counter took ticks back, the order of the readings must still find room.
+        least_s = 0.0 if ticks == sorted(ticks) else SMALLEST_STEP_S
         stamps = []
-        for left, tick, kind in zip(range(len(ticks), 0, -1), ticks, kinds, strict=True):
-            own = tick + short != self._stamped_tick
-            if kind is ImuReading or (kind is DisplacementReading and own):
-                latest_s = now - max(0, ticks[-1] - tick) * self._period_s
-                self._stamp(tick + short, latest_s, (now - self._stamp_s) / (left + 1))
+        for left, tick, reading in zip(range(len(ticks), 0, -1), ticks, readings, strict=True):
+            is_new = tick + short != self._stamped_tick
+            is_displacement = isinstance(reading, DisplacementReading)
+            if isinstance(reading, ImuReading) or (is_displacement and is_new):
+                later_s = max((ticks[-1] - tick) * self._period_s, left * least_s)
+                self._stamp(tick + short, now - later_s, (now - self._stamp_s) / (left + 1))
             stamps.append(self._stamp_s)
         return stamps
 
     def _count(self, readings: Sequence[Reading]) -> list[int]:
-        """The ticks of the readings; a counter corrects what came since the displacement before."""
+        """The ticks of the readings, by what is known of losses; the counter is right."""
         ticks: list[int] = []
-        settled = 0
         for reading in readings:
             if isinstance(reading, ImuReading):
-                self._tick += 1
+                self._tick += 1 + reading.lost
             elif isinstance(reading, DisplacementReading):
-                missing = self._missing(reading)
-                if missing < 0:
-                    self._doubt(overcounted=True)
-                ticks[settled:] = [tick + missing for tick in ticks[settled:]]
-                settled = len(ticks) + 1
-                self._tick += missing
+                self._tick += self._missing(reading)
                 self._displaced_tick = self._tick
             elif isinstance(reading, PoseReading) and self._displaced_tick is not None:
                 self._displaced_tick += reading.lost * self._displacement_ticks
@@ -130,71 +128,56 @@ class DeviceClock:
         passed = self._displacement_ticks * (reading.lost + 1)
         return self._displaced_tick + passed - self._tick
 
-    def _compare(self, tick: int, arrival: float, *, displaced: bool, alone: bool) -> int:
-        """Hold the last tick against its arrival; by how many the count was found to be short."""
+    def _compare(self, point: Point, *, alone: bool, counted: bool) -> int:
+        """Hold the newest tick against its arrival; by how many the count was found to be short.
+
+        ``alone``: the read brought no other sample, so it was not late; ``counted``: a counter told
+        this tick.
+        """
+        tick, arrival, cut = point
         if tick == self._seen_tick:
             return 0  # its beginning has been seen before, and told more
-        if self._anchor is None:
-            self._anchor = (tick, arrival)
         lag_s = arrival - self._line(tick)
+        period_s, lags_s = self._period_s, self._lags_s
         short = 0
-        usual_s = self._usual_lag_s if alone and not displaced else 2 * self._period_s
-        if lag_s > usual_s + 0.5 * self._period_s:
-            short = max(1, math.floor(lag_s / self._period_s) - 1)
-        elif lag_s < -0.5 * self._period_s and self._settled:
-            short = round(lag_s / self._period_s)
-            self._usual_lag_s = self._period_s
+        if self._settled and lag_s < -period_s / 2:
+            short = round(lag_s / period_s)
+        elif len(lags_s) == BEAT_READS:
+            self._settled = True
+            if alone and lag_s > min(max(lags_s), period_s / 2) + 0.95 * period_s:
+                short = max(1, math.floor(lag_s / period_s))
+            elif min(lags_s) > period_s / 2:
+                short, counted = round(min(lags_s) / period_s), True
+                lags_s.clear()
         if short > LARGEST_LOSS_TICKS:
             self.restart()
-            return self._compare(tick, arrival, displaced=displaced, alone=alone)
+            self._anchor = point
+            return self._compare(point, alone=alone, counted=counted)
         if short:
-            self._recount(short, counter_too=displaced)
-        else:
-            self._learn(tick, arrival, lag_s)
-        self._seen_tick = tick + short
+            self._tick += short
+            if counted and self._displaced_tick is not None:
+                self._displaced_tick += short
+            tick += short
+            lag_s -= short * self._slope_s
+        lags_s.append(lag_s)
+        self._learn((tick, arrival, cut), lag_s)
+        self._seen_tick = tick
         return short
 
-    def _recount(self, short: int, *, counter_too: bool) -> None:
-        self._tick += short
-        if counter_too and self._displaced_tick is not None:
-            self._displaced_tick += short
-        self._doubt(overcounted=short < 0)
-
-    def _doubt(self, *, overcounted: bool) -> None:
-        """The next beat teaches nothing, and neither does this block if its ticks came too soon."""
-        self._begin_beat(trusted=False)
-        if overcounted:
-            self._best = None
-
-    def _learn(self, tick: int, arrival: float, lag_s: float) -> None:
-        self._beat_reads += 1
-        self._beat_least_s = min(self._beat_least_s, lag_s)
-        self._beat_most_s = max(self._beat_most_s, lag_s)
-        if self._beat_trusted:
-            if lag_s < 0.0:
-                self._anchor = (tick, arrival)
-            if self._best is None or arrival < self._best[1] + self._slope_s * (
-                tick - self._best[0]
-            ):
-                self._best = (tick, arrival)
-            if tick - self._block_from >= BLOCK_TICKS:
-                if not self._points or self._points[-1][0] < self._best[0]:
-                    self._points.append(self._best)
-                self._lay_line()
-                self._best, self._block_from = None, tick
-        if self._beat_reads == BEAT_READS:
-            self._settled = True
-            short = round(self._beat_least_s / self._period_s)
-            self._usual_lag_s = min(self._period_s, self._beat_most_s)
-            self._begin_beat(trusted=True)
-            if short > 0:
-                self._recount(short, counter_too=True)
-
-    def _begin_beat(self, *, trusted: bool) -> None:
-        self._beat_trusted = trusted
-        self._beat_reads = 0
-        self._beat_least_s = math.inf
-        self._beat_most_s = 0.0
+    def _learn(self, point: Point, lag_s: float) -> None:
+        """Keep the least delayed arrival of each block."""
+        tick, arrival, _ = point
+        if lag_s < 0.0:
+            self._anchor = point
+        best = self._best
+        if best is None or arrival < best[1] + self._slope_s * (tick - best[0]):
+            self._best = point
+        if tick - self._block_from >= BLOCK_TICKS:
+            assert self._best is not None
+            if not self._points or self._points[-1][0] < self._best[0]:
+                self._points.append(self._best)
+            self._lay_line()
+            self._best, self._block_from = None, tick
 
     def _line(self, tick: int) -> float:
         assert self._anchor is not None
@@ -203,7 +186,7 @@ class DeviceClock:
     def _lay_line(self) -> None:
         """Under all points, as high as it goes over their middle, within the crystals' skew."""
         hull: list[Point] = []
-        for point in self._points:
+        for point in [point for point in self._points if point[2]] or self._points:
             while len(hull) > 1 and _slope(hull[-2], point) <= _slope(hull[-2], hull[-1]):
                 hull.pop()
             hull.append(point)

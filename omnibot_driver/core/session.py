@@ -296,7 +296,7 @@ class Session:
         return self._supervisor.phase is Phase.CLOSED
 
     def _take_in(self, readings: list[Reading], now: float) -> None:
-        stamps_s = self._clock.stamps(readings, now, self._board.missing_s)
+        stamps_s = self._clock.stamps(readings, now, self._board.newest)
         if not readings:
             return
         self._heard_at, self._silent = now, False

@@ -8,6 +8,8 @@ from itertools import pairwise
 from statistics import fmean
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from serial_line import Board, Chunker, Read, blocks, bursts, crumbs, ftdi, late, singles
 
 from omnibot_driver.core.board import DisplacementReading, ImuReading
@@ -65,7 +67,7 @@ def stamp(clock: DeviceClock, board: Board, reads: Iterable[Read]) -> Stamped:
     last_s = -math.inf
     for now, data in reads:
         readings = omnibot.receive(data, now)
-        stamps_s = clock.stamps(readings, now, omnibot.missing_s)
+        stamps_s = clock.stamps(readings, now, omnibot.newest)
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
             if isinstance(reading, ImuReading):
                 assert last_s < stamp_s <= now
@@ -224,13 +226,40 @@ def test_whatever_comes_stamps_increase_and_are_not_later_than_arrival() -> None
                 lost = rng.choice([0] * 20 + [1, 255])
                 readings += [SAMPLE] * rng.choice([3, 4, 4, 4, 5])
                 readings.append(DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, lost))
-            missing_s = rng.choice([None, None, 0.0, 0.001])
-            for reading, stamp_s in zip(
-                readings, clock.stamps(readings, now, missing_s), strict=True
-            ):
+            newest = rng.choice([None, (0, 0.0), (1, 0.0), (1, 0.001)])
+            for reading, stamp_s in zip(readings, clock.stamps(readings, now, newest), strict=True):
                 assert stamp_s <= now
                 assert last_s < stamp_s if reading is SAMPLE else last_s <= stamp_s
                 last_s = stamp_s
+
+
+imu_readings = st.builds(
+    ImuReading, st.just((0.0, 0.0, 0.0)), st.just((0.0, 0.0, 0.0)), st.integers(0, 40)
+)
+displacements = st.builds(
+    DisplacementReading,
+    *[st.just(0.0)] * 3,
+    st.just("earth"),
+    st.sampled_from([None, 0.04]),
+    st.integers(0, 255),
+)
+newest = st.none() | st.tuples(st.integers(0, 1), st.floats(0.0, 0.0013))
+reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, max_size=30), newest)
+
+
+@given(st.lists(reads, max_size=60))
+def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
+    reads: list[tuple[float, list[ImuReading | DisplacementReading], tuple[int, float] | None]],
+) -> None:
+    """Whatever counters and framing say."""
+    clock = DeviceClock(0.01)
+    now, last_s = 1000.0, -math.inf
+    for passed_s, readings, newest in reads:
+        now += passed_s
+        for reading, stamp_s in zip(readings, clock.stamps(readings, now, newest), strict=True):
+            assert stamp_s <= now
+            assert last_s < stamp_s if isinstance(reading, ImuReading) else last_s <= stamp_s
+            last_s = stamp_s
 
 
 def test_displacements_alone_are_stamped_forwards() -> None:

@@ -36,6 +36,7 @@ from omnibot_driver.core.omnibot.frames import (
     Words,
 )
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
+from omnibot_driver.core.omnibot.rhythm import Rhythm
 from omnibot_driver.core.omnibot.sequence import Sequence
 from omnibot_driver.core.omnibot.suspicion import Suspicion
 from omnibot_driver.core.se2 import Pose
@@ -57,12 +58,14 @@ WAKE: Final = bytes(8)
 class OmniBotSettings:
     """What cannot be known from the wire.
 
+    ``baudrate``: at ten bits to the byte;
     ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per rad/s; ``position_scale`` and
     ``heading_scale``: LSB per m and rad of a commanded pose; ``delta_frame``: whether deltas
     are differences of positions in the board's earth frame, motion along its own axes, or (older
     firmware) encoder counts of the wheels A, B, C.
     """
 
+    baudrate: int = 115200
     linear_scale: float = 70.0
     angular_scale: float = 500.0
     position_scale: float = 1000.0
@@ -90,6 +93,7 @@ class OmniBot:
             self.settings.pose_byte_order, ACCEL_COUNTS_PER_G[self.settings.imu.accel_range_g]
         )
         self._modes = ModeTracker()
+        self._rhythm = Rhythm()
         self._sequence.reconnect()
         self._paused_count: int | None = None
         self._imus = 0
@@ -105,12 +109,14 @@ class OmniBot:
         return TICK_S
 
     @property
-    def missing_s(self) -> float | None:
-        """The line's time for the rest of an IMU frame in hand."""
+    def newest(self) -> tuple[int, float] | None:
+        """By the IMU frame in hand, whole or begun."""
         begun = self._decoder.begun
-        if not begun.startswith(frames.IMU_HEADER):
+        if begun is None:
             return None
-        return max(0, frames.IMU_LENGTH - len(begun)) * frames.BYTE_S
+        if begun.startswith(frames.IMU_HEADER):
+            return 1, max(0, frames.IMU_LENGTH - len(begun)) * 10 / self.settings.baudrate
+        return (0, 0.0) if self._decoder.fresh else None
 
     @property
     def advice(self) -> str | None:
@@ -119,11 +125,11 @@ class OmniBot:
 
     def receive(self, data: bytes, now: float) -> list[Reading]:
         """The readings that these bytes complete, in the order of the line."""
-        return [self._read(frame, now) for frame in self._decoder.feed(data, now)]
+        return self._read_all(self._decoder.feed(data, now), now)
 
     def flush(self, now: float) -> list[Reading]:
         """The line is closed: what was held is all there will be."""
-        return [self._read(frame, now) for frame in self._decoder.flush(now)]
+        return self._read_all(self._decoder.flush(now), now)
 
     def silence(self) -> None:
         """Nothing was understood for so long that the mode is unknown again."""
@@ -192,16 +198,23 @@ class OmniBot:
         a, b, c = to_words(counts)
         return frames.encode(CommandFrame(mode, (a, b, c))) if (a, b, c) != (0, 0, 0) else STOP
 
-    def _read(self, frame: Frame, now: float) -> Reading:
+    def _read_all(self, found: list[Frame], now: float) -> list[Reading]:
+        skipped = self._decoder.skipped
+        return [self._read(frame, now, n) for frame, n in zip(found, skipped, strict=True)]
+
+    def _read(self, frame: Frame, now: float, skipped: int = 0) -> Reading:
         self._modes.hear(frame)
         match frame:
             case ImuFrame(accel, gyro):
                 self._imus += 1
+                lost = self._rhythm.hear(ImuFrame, skipped)
                 scale = self.settings.imu
-                return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro))
+                return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro), lost)
             case DeltaFrame():
+                self._rhythm.hear(DeltaFrame, skipped)
                 return self._displacement(frame, now)
             case PoseFrame(x, y, theta, seq):
+                self._rhythm.hear(PoseFrame, skipped)
                 step = self._sequence.pose(seq, now)
                 pose = PoseReading(
                     x * POSE_LSB_M,
@@ -215,6 +228,7 @@ class OmniBot:
             case PausedFrame(count):
                 before, self._paused_count = self._paused_count, count
                 self._sequence.pause()
+                self._rhythm = Rhythm()
                 return PausedReading(continues=before is not None and count == (before + 1) % 256)
 
     def _displacement(self, frame: DeltaFrame, now: float) -> DisplacementReading:

@@ -80,6 +80,9 @@ class FrameDecoder:
         self, pose_byte_order: ByteOrder = "big", accel_counts_per_g: float = 16384.0
     ) -> None:
         self.statistics = DecoderStatistics()
+        self.skipped: list[int] = []
+        """For each frame of the last call, how many bytes before it were none."""
+        self._dropped = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
         self._expectation = Expectation(accel_counts_per_g)
         self._context = NOTHING_KNOWN
@@ -97,6 +100,7 @@ class FrameDecoder:
         ``now``: arrival time of ``data`` in seconds, of any steady clock.
         """
         found: list[Frame] = []
+        self.skipped = []
         if not data:
             return found
         self._arrived = len(data)
@@ -111,14 +115,23 @@ class FrameDecoder:
         """The line is closed, or was silent: what can still be told from what is held."""
         self._last_arrival_s = now
         found: list[Frame] = []
+        self.skipped = []
         self._close(found)
         return found
 
     @property
-    def begun(self) -> bytes:
-        """What has come of the next frame; nothing while in doubt."""
-        sure = self._in_step and len(self._held) <= TICK_BYTES // 2
-        return bytes(self._held) if sure else b""
+    def begun(self) -> bytes | None:
+        """What has come of the next frame; None while in doubt about it."""
+        held = self._held
+        doubt = not self._in_step or len(held) > TICK_BYTES // 2
+        if doubt or (held and measure(held, 0) == NO_FRAME):
+            return None
+        return bytes(held)
+
+    @property
+    def fresh(self) -> bool:
+        """Whether bytes of the last frame that came out were in the last call."""
+        return len(self._held) < self._arrived
 
     def _close(self, found: list[Frame]) -> None:
         if self._held:
@@ -220,6 +233,8 @@ class FrameDecoder:
             if type(frame) is ImuFrame and before.imu is not None and not before.imus & 3:
                 self._expectation.learn(frame, before.imu)
         found += [frame for _, frame, _ in steps]
+        self.skipped += [self._dropped] + [0] * (len(steps) - 1)
+        self._dropped = 0
         self._context = after
         if self._gaps:
             start = 0
@@ -279,6 +294,7 @@ class FrameDecoder:
         if not count:
             return
         self.statistics.discarded_bytes += count
+        self._dropped += count
         self.statistics.faults += self._in_step
         self._in_step = False
         self._context = self._context.damaged()

@@ -35,8 +35,6 @@ _PAUSED_COUNT_BEGUN: Final = re.compile(rb"\d{0,3} ?\r?")
 _HEADER_BEGIN: Final = IMU_HEADER[0]
 _TEXT_BEGIN: Final = _PAUSED_WORD[0]
 IMU_LENGTH: Final = _IMU.size
-BYTE_S: Final = 10 / 115200
-"""One byte on the line: eight data bits, a start and a stop bit, at the board's 115200 baud."""
 _LENGTH_BY_TYPE: Final[dict[int, int]] = {
     IMU_HEADER[1]: _IMU.size,
     DELTA_HEADER[1]: _DELTA.size,
