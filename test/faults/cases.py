@@ -9,9 +9,9 @@ from functools import partial
 from random import Random
 from typing import Final
 
+from breakable_line import Damage, cut, gaining, late, losing, losing_bursts, noise
 from driver_process import Driver
 from geometry_msgs.msg import Twist
-from line import Damage, cut, gaining, late, losing, losing_bursts, noise
 from rig import TICK_S, TIMEOUT_S, Rig
 from std_msgs.msg import Bool, Float32MultiArray
 from std_srvs.srv import SetBool, Trigger

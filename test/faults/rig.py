@@ -16,9 +16,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, Self
 
+from breakable_line import TICK_S, BreakableLine
 from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import Twist
-from line import TICK_S, BreakableLine
 from nav_msgs.msg import Odometry
 from probe import Probe
 from sensor_msgs.msg import Imu

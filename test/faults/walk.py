@@ -8,7 +8,7 @@ from collections.abc import Callable
 from random import Random
 from typing import Final
 
-from line import Damage, cut, gaining, late, losing, losing_bursts, noise
+from breakable_line import Damage, cut, gaining, late, losing, losing_bursts, noise
 from rig import Rig
 from std_srvs.srv import SetBool, Trigger
 
