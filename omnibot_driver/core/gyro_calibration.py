@@ -56,8 +56,7 @@ class Moments:
     def mean(self) -> Vector3:
         """Of at least one."""
         x, y, z = (
-            first + total / self.count
-            for first, total in zip(self._first, self._sum, strict=True)
+            first + total / self.count for first, total in zip(self._first, self._sum, strict=True)
         )
         return x, y, z
 
