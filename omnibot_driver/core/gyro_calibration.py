@@ -1,8 +1,8 @@
-"""The gyro's bias: measured on request, refined at standstill, never learnt from a robot that moves.
+"""The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-A gyro at rest reads its bias and noise. Whether the robot is at rest is told by three witnesses: the
-wheels (displacements that add up to nothing), the gyro (readings that hardly vary) and the
-accelerometer (likewise). A steady turn without wheels is not seen by any of them, so what comes out
+A gyro at rest reads its bias and noise. Whether the robot is at rest is told by three witnesses:
+the wheels (displacements that add up to nothing), the gyro (readings that hardly vary) and the
+accelerometer (likewise). A steady turn without wheels is seen by none of them, so what comes out
 must also be a bias that the sensor may have. By the way the length of gravity is found.
 
 This module knows readings and times. It reads no clock, and does not know when one should measure.

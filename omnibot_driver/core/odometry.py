@@ -56,7 +56,7 @@ class OdometryEstimate:
     pose: Pose
     twist: BodyTwist | None
     covariance: Covariance
-    rolled: Pose = Pose()
+    rolled: Pose = field(default_factory=Pose)
     rolling: BodyTwist | None = None
 
 

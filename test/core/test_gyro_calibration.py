@@ -165,7 +165,7 @@ def test_a_measurement_that_is_given_up_says_why_once() -> None:
 
 @given(biases)
 def test_standstills_refine_the_bias_little_by_little(bias: Vector3) -> None:
-    """Towards what is seen, by no more than a twentieth of the way a second, and there in the end."""
+    """Towards what is seen, by a twentieth of the way a second, and there in the end."""
     calibration = GyroCalibration(NONE, refine=True)
     rates = noisy(bias, NOISE_RADPS)
     stand(calibration, rates, 1.05)
