@@ -42,7 +42,7 @@ def save(path: Path, values: Mapping[str, Value]) -> None:
     try:
         with open(descriptor, "w", encoding="utf-8") as file:
             os.fchmod(descriptor, 0o644)
-            yaml.safe_dump(content, file, sort_keys=False, allow_unicode=True)
+            yaml.safe_dump(content, file, sort_keys=False, default_flow_style=None)
             file.flush()
             os.fsync(descriptor)
         os.replace(name, path)
