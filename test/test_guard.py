@@ -27,6 +27,11 @@ class Line:
         tty.setraw(self.near)
         os.set_blocking(self.near, False)
         self.heard = b""
+        self._others = children()
+
+    def children(self) -> list[int]:
+        """The processes begun since this line was made, zombies included."""
+        return [pid for pid in children() if pid not in self._others]
 
     def hear(self, words: bytes) -> bytes:
         """Everything so far, once these words are in it."""
@@ -63,7 +68,7 @@ def line() -> Iterator[Line]:
     yield line
     line.close()
     assert len(os.listdir("/proc/self/fd")) == descriptors
-    assert children() == [], "a process is left behind, or a zombie"
+    assert line.children() == [], "a process is left behind, or a zombie"
 
 
 def children() -> list[int]:
@@ -147,18 +152,18 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
     """And the new one guards."""
     keeper = Keeper(line.near, LAST_WORDS)
-    (first,) = children()
+    (first,) = line.children()
     os.kill(first, signal.SIGKILL)
     end = time.monotonic() + PATIENCE_S
-    while children() in ([first], []):
+    while line.children() in ([first], []):
         assert time.monotonic() < end
         alive(keeper, 0.1)
     assert "exit code -9" in keeper.trouble
     assert "another one is started" in keeper.trouble
     keeper.trouble = ""
-    (second,) = children()
+    (second,) = line.children()
     os.kill(second, signal.SIGKILL)
-    while children() in ([second], []):
+    while line.children() in ([second], []):
         assert time.monotonic() < end
         alive(keeper, 0.1)
     assert keeper.trouble == ""
@@ -176,7 +181,7 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
         keeper.beat(1000.0)
     assert "no guard process can be started" in keeper.trouble
     keeper.beat(1000.5)
-    assert children() == []
+    assert line.children() == []
     keeper.beat(1001.5)
     keeper.end(stopped=False)
     line.hear(LAST_WORDS)
@@ -185,7 +190,7 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
 def test_a_guard_that_is_stopped_blocks_neither_beating_nor_ending(line: Line) -> None:
     """Its pipe fills up, and it does not hear the good-bye."""
     keeper = Keeper(line.near, LAST_WORDS)
-    (pid,) = children()
+    (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)
     for _ in range(70_000):
         keeper.beat(1000.0)
@@ -196,7 +201,7 @@ def test_a_guard_that_is_stopped_blocks_neither_beating_nor_ending(line: Line) -
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
     """Ctrl-C does not reach its session; SIGTERM to a whole group does, and is not for it."""
     keeper = Keeper(line.near, LAST_WORDS)
-    (pid,) = children()
+    (pid,) = line.children()
     assert os.getsid(pid) == pid
     started(pid)
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -208,7 +213,7 @@ def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
 def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
     """None of the driver's sockets and files; no module but a few of Python's own."""
     keeper = Keeper(line.near, LAST_WORDS)
-    (pid,) = children()
+    (pid,) = line.children()
     started(pid)
     opened = [os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir()]
     resident_kb = int(status_of(pid, "VmRSS"))

@@ -16,9 +16,12 @@ CASES = survivable(seed=0)
 
 @pytest.fixture(scope="module", autouse=True)
 def _ros() -> Iterator[None]:
-    rclpy.init()
+    ours = not rclpy.ok()
+    if ours:
+        rclpy.init()
     yield
-    rclpy.shutdown()
+    if ours:
+        rclpy.shutdown()
 
 
 @pytest.fixture(scope="module")

@@ -177,7 +177,6 @@ class FrameDecoder:
         at, size = 0, len(held)
         steps: list[tuple[int, Frame, Context]] = []
         idle = self._gaps[0][0] if self._gaps else size + 1
-        sharp = self._sharp >= PAUSES_TO_TRUST
         while at < size:
             length = measure(held, at)
             end = at + length
@@ -194,9 +193,9 @@ class FrameDecoder:
                 cost >= evidence.LOOK_ALIKE or not self._goes_on(end, closed)
             ):
                 break
-            lent = end == size and _may_end_in_a_header(frame, context)
-            if lent and sharp:  # what the board sends at once begins after a pause of its own
-                lent = self._arrived < length and _more_is_due(frame, context)
+            sharp = self._sharp >= PAUSES_TO_TRUST  # what is sent at once begins after a pause
+            last = sharp and (self._arrived >= length or not _more_is_due(frame, context))
+            lent = end == size and not last and _may_end_in_a_header(frame, context)
             if lent and not closed:
                 self._take(steps, context, found)
                 return True

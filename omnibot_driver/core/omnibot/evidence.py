@@ -31,7 +31,7 @@ UNKNOWN_START: Final = 1.0
 """Out of step, the first bytes are a part of a frame: most silences are between frames."""
 BAD_BYTE: Final = 0.35
 """Each byte of such a run; sooner a frame of odd content than 14 unexplained bytes."""
-BAD_HEADER: Final = 1.0
+BAD_HEADER: Final = 0.5
 """A header within such a run: chance makes few, a gyro at rest some."""
 GAP: Final = 5.0
 """The line was idle within a frame, though the board sends each without a pause..."""
