@@ -58,7 +58,7 @@ def _read(path: Path) -> dict[Any, Any]:
     except FileNotFoundError:
         return {}
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise _bad(path, f"cannot be read ({error})") from error
+        raise _bad(path, f"cannot be read ({' '.join(str(error).split())})") from error
     if content is None:
         return {}
     if not isinstance(content, dict):
