@@ -146,7 +146,7 @@ class Link:
         self._deliver(events)
 
     def _guarded(self, port: Port) -> tuple[Keeper | None, list[Notice]]:
-        if self._last_words is None:
+        if self._last_words is None or port.ends_with_us:
             return None, []
         if port.descriptor is not None:
             return Keeper(port.descriptor, self._last_words), []
