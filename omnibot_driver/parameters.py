@@ -86,7 +86,8 @@ PARAMETERS: Final = (
         "port",
         "/dev/ttyUSB0",
         "",
-        "Serial device, or any pyserial URL such as socket://host:port.",
+        "Serial device, or any pyserial URL such as socket://host:port; sim:// is a simulated board"
+        " inside the driver, replay://bag a recorded wire.",
         fixed=True,
     ),
     Parameter(
