@@ -5,6 +5,7 @@ orientation).
 """
 
 import math
+from array import array
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -13,7 +14,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Quaternion, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
-from std_msgs.msg import Header
+from std_msgs.msg import Header, UInt8MultiArray
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
@@ -159,6 +160,11 @@ def age(stamp: Time, now_ns: int) -> float:
     """Seconds since the stamp by the clock that gave both; 0 for a zero stamp, which is none."""
     stamp_ns = stamp.sec * 10**9 + stamp.nanosec
     return (now_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
+
+
+def raw_message(data: bytes) -> UInt8MultiArray:
+    """Bytes as they are, without a layout."""
+    return UInt8MultiArray(data=array("B", data))
 
 
 def time_message(nanoseconds: int) -> Time:

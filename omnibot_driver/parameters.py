@@ -138,6 +138,14 @@ PARAMETERS: Final = (
         fixed=True,
     ),
     Parameter(
+        "publish_raw",
+        False,
+        "",
+        "Publish what every read and every write of the port brought, on ~/raw_rx and ~/raw_tx: a"
+        " bag then holds the wire itself, and replay:// plays it.",
+        fixed=True,
+    ),
+    Parameter(
         "linear_scale",
         70.0,
         "LSB/(m/s)",

@@ -22,7 +22,7 @@ RAW_NAME: Final = "/raw_rx"
 class Recording:
     """One topic of one bag: a folder, or a single .mcap or .db3 file.
 
-    ``speed``: times faster than it was; ``delay_s``: until it begins.
+    ``speed``: so many times faster, infinity for as fast as can be; ``delay_s``: until it begins.
     """
 
     path: Path
@@ -55,8 +55,8 @@ def open_recording(url: str) -> Recording:
     """The recording that a URL means. Raises ParameterError, which says what is wrong with it."""
     location, _, query = url[len(SCHEME) :].partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))
-    speed = _number(url, "speed", options.pop("speed", "1"), above=0.0)
-    delay_s = _number(url, "delay", options.pop("delay", "1"))
+    speed = _number(url, "speed", options.pop("speed", "1"), 0.01, math.inf)
+    delay_s = _number(url, "delay", options.pop("delay", "1"), 0.0, 3600.0)
     topic = options.pop("topic", "")
     if options:
         known = "speed, delay and topic"
@@ -87,13 +87,13 @@ def _find_topic(url: str, path: Path, wanted: str) -> str:
     raise _refusal(url, f"choose one of its topics with topic={' or topic='.join(raw)}")
 
 
-def _number(url: str, name: str, text: str, *, above: float = -math.inf) -> float:
+def _number(url: str, name: str, text: str, low: float, high: float) -> float:
     try:
         number = float(text)
     except ValueError:
         number = math.nan
-    if not (number >= 0.0 and number > above):
-        raise _refusal(url, f"{name} must be a number{' above' if above == 0.0 else ' from'} 0")
+    if not low <= number <= high:
+        raise _refusal(url, f"{name} must be {low:g} to {high:g}, not {text!r}")
     return number
 
 

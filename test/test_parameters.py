@@ -52,6 +52,7 @@ PROMISED: dict[str, object] = {
     "use_board_pose": True,
     "accel_range": 2,
     "gyro_range": 250,
+    "publish_raw": False,
 }
 """Names and defaults that users rely on."""
 
