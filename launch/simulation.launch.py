@@ -1,26 +1,20 @@
-"""Starts a simulated board and the driver on it; takes the arguments of driver.launch.py."""
-
-import tempfile
-import uuid
-from pathlib import Path
+"""Starts the driver with a simulated board inside; takes the arguments of driver.launch.py."""
 
 from launch import LaunchDescription
-from launch.actions import ExecuteProcess, IncludeLaunchDescription
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import PathJoinSubstitution
-from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.substitutions import FindPackageShare
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return board and driver, joined by a link that no other launch has."""
-    link = str(Path(tempfile.gettempdir(), f"omnibot_sim_{uuid.uuid4().hex[:12]}"))
+    """Return the driver on a board of its own."""
     return LaunchDescription(
         [
-            # Not a Node: launch_ros would append ROS arguments, and the board knows no ROS.
-            ExecuteProcess(
-                cmd=[ExecutableInPackage("simulator", "omnibot_driver"), "--link", link],
-                name="simulator",
-                output="screen",
+            DeclareLaunchArgument(
+                "port",
+                default_value="sim://",
+                description="The simulated board with its options: sim://?imu_only&seed=1",
             ),
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(
@@ -28,7 +22,7 @@ def generate_launch_description() -> LaunchDescription:
                         [FindPackageShare("omnibot_driver"), "launch", "driver.launch.py"]
                     )
                 ),
-                launch_arguments={"port": link}.items(),
+                launch_arguments={"port": LaunchConfiguration("port")}.items(),
             ),
         ]
     )

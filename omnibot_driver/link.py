@@ -35,7 +35,8 @@ class Link:
     ``last_words`` are what stops the board when this process cannot; None: no guard is wanted.
     ``deliver`` gets the session's events on whichever thread they came up; ``report`` gets a
     sentence about the port whenever it cannot be had or is lost, and None when it is open;
-    ``failed`` gets the exception that ended a thread, which nothing but a defect can do.
+    ``failed`` gets the exception that ended a thread, which nothing but a defect can do;
+    ``on_read`` and ``on_write`` get the bytes of each read and each write as they were.
     """
 
     def __init__(
@@ -49,6 +50,8 @@ class Link:
         deliver: Callable[[Sequence[Event]], None],
         report: Callable[[str | None], None],
         failed: Callable[[BaseException], None],
+        on_read: Callable[[bytes], None] = lambda _data: None,
+        on_write: Callable[[bytes], None] = lambda _data: None,
     ) -> None:
         self._session = session
         self._url = url
@@ -60,6 +63,7 @@ class Link:
         self._deliver = deliver
         self._report = report
         self._failed = failed
+        self._on_read, self._on_write = on_read, on_write
         self._changed = threading.Condition(threading.Lock())
         self._closing = threading.Event()
         self._port: Port | None = None
@@ -165,7 +169,7 @@ class Link:
         self._deliver(events)
 
     def _guarded(self, port: Port) -> tuple[Keeper | None, list[Notice]]:
-        if self._last_words is None:
+        if self._last_words is None or port.ends_with_us:
             return None, []
         if port.descriptor is not None:
             return Keeper(port.descriptor, self._last_words), []
@@ -175,7 +179,8 @@ class Link:
 
     def _read(self, port: Port) -> None:
         while not self._closing.is_set():
-            data = port.read()
+            if data := port.read():
+                self._on_read(data)
             with self._changed:
                 if self._write_error is not None:
                     raise self._write_error
@@ -254,6 +259,8 @@ class Link:
         except LinkError as error:
             self._write_error = error
             self._interrupt()
+        else:
+            self._on_write(data)
 
     def _interrupt(self) -> None:
         if self._port is not None:

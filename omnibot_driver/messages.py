@@ -5,6 +5,7 @@ orientation).
 """
 
 import math
+from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -14,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Quaternion, Transform, TransformStamped, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Header
+from std_msgs.msg import Header, UInt8MultiArray
 
 from omnibot_driver.core.diagnosis import Status
 from omnibot_driver.core.errors import CommandRefused
@@ -211,6 +212,11 @@ def age(stamp: Time, now_ns: int) -> float:
     """Seconds since the stamp by the clock that gave both; 0 for a zero stamp, which is none."""
     stamp_ns = stamp.sec * 10**9 + stamp.nanosec
     return (now_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
+
+
+def raw_message(data: bytes) -> UInt8MultiArray:
+    """Bytes as they are, without a layout."""
+    return UInt8MultiArray(data=array("B", data))
 
 
 def time_message(nanoseconds: int) -> Time:

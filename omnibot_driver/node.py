@@ -4,6 +4,7 @@ Nothing is computed here. Measurements are published by the link's reader thread
 the executor sleeps unless a message, a service call or a parameter wakes it.
 """
 
+import contextlib
 import math
 import re
 import threading
@@ -29,7 +30,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Bool, Float32MultiArray, String
+from std_msgs.msg import Bool, Float32MultiArray, String, UInt8MultiArray
 from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver import calibration, messages, parameters, selfcheck
@@ -48,9 +49,13 @@ from omnibot_driver.core.session import (
 from omnibot_driver.core.supervisor import Request
 from omnibot_driver.diagnostics import Diagnostics
 from omnibot_driver.link import Link
+from omnibot_driver.recording import is_recording, open_recording
+from omnibot_driver.replay import Replay
 from omnibot_driver.transforms import transform_publisher
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+RAW_DEPTH = 1000
+"""A recorder that is kept waiting for seconds still gets every byte."""
 LOOK_EVERY_S = WARN_EVERY_S = 2.0
 UNHEARD = ("disconnected", "connecting")
 MessageInfo = dict[str, int]
@@ -88,9 +93,30 @@ class OmniBotDriver(Node):
             Notice: self._warn,
             StateChanged: lambda _event, _clock_offset_ns: self._publish_state(),
         }
-        self._link = Link(
+        self._link = self._make_link()
+        self._create_publishers()
+        self._create_inputs()
+        port = self._values["port"]
+        if isinstance(self._link, Link):  # a recording is no link to be judged
+            self._diagnostics = Diagnostics(self, self._link, lambda: self._refusals, port)
+        if advice := selfcheck.clock_advice(port, self.get_parameter("use_sim_time").value):
+            self.get_logger().warning(advice)
+        self._publish_state()
+        self._link.start()
+
+    def _make_link(self) -> Link | Replay:
+        port = self._values["port"]
+        if is_recording(port):
+            return Replay(
+                self._session,
+                open_recording(port),
+                deliver=self._publish,
+                report=self._report_port,
+                failed=self.report_defect,
+            )
+        return Link(
             self._session,
-            self._values["port"],
+            port,
             self._values["baudrate"],
             last_words=(self._board.wake() + self._board.emergency_stop())
             if self._values["guard"]
@@ -99,15 +125,8 @@ class OmniBotDriver(Node):
             deliver=self._deliver,
             report=self._report_port,
             failed=self.report_defect,
+            **self._taps(),
         )
-        self._create_publishers()
-        self._create_inputs()
-        port = self._values["port"]
-        self._diagnostics = Diagnostics(self, self._link, lambda: self._refusals, port)
-        if advice := selfcheck.clock_advice(port, self.get_parameter("use_sim_time").value):
-            self.get_logger().warning(advice)
-        self._publish_state()
-        self._link.start()
 
     def close(self) -> None:
         """Stop the robot and give the port back; ROS entities live on until ``destroy_node``."""
@@ -175,6 +194,22 @@ class OmniBotDriver(Node):
         self._estop_active = self.create_publisher(Bool, "~/estop_active", LATCHED)
         self._published: tuple[str, bool] | None = None
 
+    def _taps(self) -> dict[str, Callable[[bytes], None]]:
+        """What a link says of the wire itself, where that is wanted."""
+        if not self._values["publish_raw"]:
+            return {}
+
+        def publishing(topic: str) -> Callable[[bytes], None]:
+            publisher = self.create_publisher(UInt8MultiArray, topic, RAW_DEPTH)
+
+            def publish(data: bytes) -> None:
+                with contextlib.suppress(RCLError):  # the last words outlive ROS
+                    publisher.publish(messages.raw_message(data))
+
+            return publish
+
+        return {"on_read": publishing("~/raw_rx"), "on_write": publishing("~/raw_tx")}
+
     def _deliver(self, events: Sequence[Event]) -> None:
         if not events or not self.context.ok():
             return
@@ -183,8 +218,13 @@ class OmniBotDriver(Node):
         self._clock_offset_ns = messages.clock_offset(
             self._clock_offset_ns, before_ns, wall_ns, time.monotonic_ns()
         )
+        self._publish(events, self._clock_offset_ns)
+
+    def _publish(self, events: Sequence[Event], clock_offset_ns: int) -> None:
+        if not self.context.ok():
+            return
         for event in events:
-            self._handlers[type(event)](event, self._clock_offset_ns)
+            self._handlers[type(event)](event, clock_offset_ns)
 
     def _publish_imu(self, estimate: ImuEstimate, clock_offset_ns: int) -> None:
         stamp = messages.time_message(round(estimate.stamp_s * 1e9) + clock_offset_ns)

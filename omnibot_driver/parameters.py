@@ -101,7 +101,8 @@ PARAMETERS: Final = (
         "port",
         "/dev/ttyUSB0",
         "",
-        "Serial device, or any pyserial URL such as socket://host:port.",
+        "Serial device, or any pyserial URL such as socket://host:port; sim:// is a simulated board"
+        " inside the driver, replay://bag a recorded wire.",
         fixed=True,
     ),
     Parameter(
@@ -149,6 +150,14 @@ PARAMETERS: Final = (
         True,
         "",
         "Have a small process of its own stop the robot when the driver is killed or hangs.",
+        fixed=True,
+    ),
+    Parameter(
+        "publish_raw",
+        False,
+        "",
+        "Publish what every read and every write of the port brought, on ~/raw_rx and ~/raw_tx: a"
+        " bag then holds the wire itself, and replay:// plays it.",
         fixed=True,
     ),
     Parameter(

@@ -30,6 +30,8 @@ PEER_TIMEOUT_MS: Final = 5000
 PSEUDO_TERMINALS: Final = range(136, 144)
 """Linux's major device numbers of them."""
 
+serial.protocol_handler_packages.append("omnibot_driver.urls")
+
 
 class Port:
     """An open port, exclusively ours. Raises LinkError when it cannot be opened.
@@ -51,6 +53,8 @@ class Port:
                 write_timeout=None if url.startswith("rfc2217:") else WRITE_TIMEOUT_S,
                 exclusive=True,
             )
+        except LinkError:
+            raise
         except Exception as error:  # its URL handlers raise whatever they stumble over
             raise LinkError(_explain(url, error)) from error
         try:
@@ -66,6 +70,11 @@ class Port:
             return int(self._serial.fileno())
         except io.UnsupportedOperation:
             return None
+
+    @property
+    def ends_with_us(self) -> bool:
+        """Nothing outside this process hears what is written."""
+        return self._url.lower().startswith("sim://")
 
     def read(self) -> bytes:
         """All that has come in, waiting for the first byte; nothing after a while without one.
@@ -147,14 +156,14 @@ def _explain(url: str, error: Exception) -> str:
     if isinstance(error, misread) or isinstance(error.__context__, misread):
         return (
             f"port '{url}' is not understood: give a device like /dev/ttyUSB0"
-            " or a pyserial URL like socket://host:port"
+            " or a pyserial URL like socket://host:port, or sim:// for a simulated board"
         )
     if isinstance(error, termios.error) or isinstance(error.__context__, termios.error):
         return f"{url} is no serial port: `ls /dev/serial/by-id/` shows what is; set `port`"
     if code == errno.ENOENT:
         return (
             f"{url} does not exist: plug the board in, look it up with `ls /dev/serial/by-id/`"
-            " and set the parameter `port`"
+            " and set the parameter `port`; without a robot try port:=sim://"
         )
     if code in (errno.EACCES, errno.EPERM):
         return (

@@ -20,75 +20,16 @@ from pathlib import Path
 import pytest
 import serial
 import serial.rfc2217
+from listener import LAST_WORDS, PATIENCE_S, Listener, link_to, session
 
-from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.limits import SpeedLimits
-from omnibot_driver.core.odometry import OdometrySettings
-from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
-from omnibot_driver.core.session import Event, ImuEstimate, Notice, Session, SessionSettings
-from omnibot_driver.link import Link
+from omnibot_driver.core.session import Event, Notice, Session
 from omnibot_driver.port import Port
 from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
 from omnibot_driver.standstill import SETTLE_S
 
-PATIENCE_S = 20.0
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
-LAST_WORDS = bytes(8) + STOP + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
-
-
-class Listener:
-    """Keeps what a link delivers and reports, and wakes who waits for it."""
-
-    def __init__(self) -> None:
-        self.events: list[Event] = []
-        self.reports: list[str | None] = []
-        self.failures: list[BaseException] = []
-        self.threads: set[str] = set()
-        self._changed = threading.Condition()
-
-    def deliver(self, events: Sequence[Event]) -> None:
-        with self._changed:
-            self.events += events
-            if any(isinstance(event, ImuEstimate) for event in events):
-                self.threads.add(threading.current_thread().name)
-            self._changed.notify_all()
-
-    def report(self, trouble: str | None) -> None:
-        with self._changed:
-            self.reports.append(trouble)
-            self._changed.notify_all()
-
-    def failed(self, error: BaseException) -> None:
-        with self._changed:
-            self.failures.append(error)
-            self._changed.notify_all()
-
-    def wait_for(self, predicate: object) -> None:
-        assert callable(predicate)
-        with self._changed:
-            assert self._changed.wait_for(predicate, PATIENCE_S)
-
-
-def session(*, run: bool = True) -> Session:
-    settings = SessionSettings(
-        limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
-    )
-    return Session(OmniBot(OmniBotSettings()), settings, run=run)
-
-
-def link_to(url: str, listener: Listener, session: Session) -> Link:
-    return Link(
-        session,
-        url,
-        115200,
-        last_words=LAST_WORDS,
-        reconnect_interval_s=0.02,
-        deliver=listener.deliver,
-        report=listener.report,
-        failed=listener.failed,
-    )
 
 
 @pytest.fixture

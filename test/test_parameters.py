@@ -58,6 +58,7 @@ PROMISED: dict[str, object] = {
     "accel_bias": [0.0, 0.0, 0.0],
     "auto_gyro_bias": False,
     "calibration_file": "",
+    "publish_raw": False,
 }
 """Names and defaults that users rely on."""
 

@@ -13,10 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 
-from omnibot_driver.simulator.faults import FaultyLine, LineFaults
-from omnibot_driver.simulator.firmware import SimulatedBoard
+from omnibot_driver.simulator.options import add_board_options, board_from
 from omnibot_driver.simulator.pty import PtyBoard
-from omnibot_driver.simulator.settings import BoardSettings
 
 _CONSOLE_HELP = """\
 truth    one line of JSON: true pose and twist, the board's odometry, mode
@@ -30,18 +28,7 @@ _HEALTH_CHECK_S = 0.5
 def main(argv: list[str] | None = None) -> int:
     """Run a simulated board until told to end; return the exit code."""
     arguments = _parser().parse_args(argv)
-    board = SimulatedBoard(
-        BoardSettings(
-            seed=arguments.seed,
-            frame=arguments.frame,
-            imu_only=arguments.imu_only,
-            control=arguments.control,
-            estop_latches=arguments.latching_estop,
-            running=arguments.running,
-        )
-    )
-    faults = LineFaults(lose=arguments.lose, burst=arguments.burst, flip=arguments.flip)
-    line = FaultyLine(faults, arguments.seed)
+    board, line = board_from(arguments)
     try:
         with _signals_as_readable() as signalled, PtyBoard(board, arguments.link, line) as port:
             print(port.path, flush=True)
@@ -68,51 +55,8 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--link", metavar="PATH", help="make a symbolic link to the terminal")
-    parser.add_argument("--seed", type=int, default=0, help="of all random numbers (default 0)")
-    parser.add_argument("--imu-only", action="store_true", help="run in IMU only mode")
-    parser.add_argument(
-        "--frame",
-        choices=("earth", "body"),
-        default="earth",
-        help="meaning of the 25 Hz frame (default earth)",
-    )
-    parser.add_argument(
-        "--control",
-        choices=("velocity", "position"),
-        default="velocity",
-        help="where the on-board switch stands (default velocity)",
-    )
-    parser.add_argument(
-        "--latching-estop",
-        action="store_true",
-        help="an emergency stop holds until the board is reset",
-    )
-    parser.add_argument(
-        "--running", action="store_true", help="start in the running mode instead of booting"
-    )
-    for fault, effect in (
-        ("lose", "is lost"),
-        ("burst", "begins a burst of up to 200 lost bytes"),
-        ("flip", "arrives with one bit changed"),
-    ):
-        parser.add_argument(
-            f"--{fault}",
-            type=_chance,
-            default=0.0,
-            metavar="RATE",
-            help=f"chance that a byte the board sends {effect} (default 0)",
-        )
+    add_board_options(parser)
     return parser
-
-
-def _chance(text: str) -> float:
-    try:
-        chance = float(text)
-    except ValueError:
-        chance = -1.0
-    if not 0.0 <= chance <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no chance: give a number from 0 to 1")
-    return chance
 
 
 @contextmanager

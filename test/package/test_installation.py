@@ -29,6 +29,7 @@ SHARED_FILES = [
             "config/omnibot.policy.xml",
             "config/twist_mux.yaml",
             "docs/commissioning.md",
+            "docs/recording.md",
             "docs/troubleshooting.md",
             "launch/description.launch.py",
             "launch/driver.launch.py",

@@ -202,3 +202,14 @@ def test_the_filter_alone_publishes_the_transform(launch: Callable[..., Started]
     assert (given["odom_frame"], given["base_link_frame"]) == ("robot1/odom", "robot1/base_link")
     for name in ("driver", "ekf_node", "robot_state_publisher"):
         assert "__ns:=/robot1" in started[name]["arguments"]
+
+
+@needs_launch
+def test_the_simulation_is_the_driver_with_a_board_inside(launch: Callable[..., Started]) -> None:
+    """One process; the board's options and the driver's arguments are at hand."""
+    started = launch("simulation.launch.py", "namespace:=robot1")
+    assert set(started) == {"driver"}
+    assert parameters(started["driver"])["port"] == "sim://"
+    assert "__ns:=/robot1" in started["driver"]["arguments"]
+    started = launch("simulation.launch.py", "port:=sim://?imu_only&seed=1")
+    assert parameters(started["driver"])["port"] == "sim://?imu_only&seed=1"

@@ -30,6 +30,9 @@ ROSDEP_KEYS = {
 # What launch files can start and a driver does not need; the README names them.
 OPTIONAL = {"robot_localization", "rviz2"}
 
+# What pip brings and rosdep has no name for, by the extra that asks for it.
+EXTRAS = {"replay": ["rosbags"]}
+
 # Enough for values and arithmetic; nothing that waits, reads a clock or touches the world.
 PURE_MODULES = {
     "__future__",
@@ -85,6 +88,7 @@ def third_party(files: Iterable[Path]) -> set[str]:
     """Return the rosdep keys of what the files import from outside Python and this repository."""
     files = list(files)
     own = {PACKAGE} | {file.stem for file in files}  # tests import their helpers by bare name
+    own.update(*EXTRAS.values())
     top_level = {name.partition(".")[0] for file in files for name in imports(file)}
     return {ROSDEP_KEYS.get(name, name) for name in top_level - sys.stdlib_module_names - own}
 
@@ -121,6 +125,11 @@ def test_manifest_and_setup_agree(setup_arguments: dict[str, Any]) -> None:
     for key in ("name", "version", "license"):
         assert setup_arguments[key] == MANIFEST.findtext(key)
     assert setup_arguments["maintainer"] == MANIFEST.findtext("maintainer")
+
+
+def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any]) -> None:
+    """And only what the package can do without."""
+    assert setup_arguments["extras_require"] == EXTRAS
 
 
 def test_every_entry_point_names_a_function(setup_arguments: dict[str, Any]) -> None:

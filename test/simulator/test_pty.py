@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 
 from omnibot_driver.simulator import BoardMode, BoardSettings, PtyBoard, SimulatedBoard
-from omnibot_driver.simulator.pty import UNREAD_LIMIT
+from omnibot_driver.simulator.running import UNREAD_LIMIT
 
 PATIENCE_S = 20.0
 RUNNING = BoardSettings(running=True)
@@ -98,7 +98,7 @@ class Clock:
         self.now_s = 0.0
         self.at_ticks: list[float] = []
         time_of_clock = SimpleNamespace(monotonic=lambda: self.now_s)
-        monkeypatch.setattr("omnibot_driver.simulator.pty.time", time_of_clock)
+        monkeypatch.setattr("omnibot_driver.simulator.running.time", time_of_clock)
         monkeypatch.setattr(
             "omnibot_driver.simulator.pty.select", SimpleNamespace(select=self.wait)
         )

@@ -53,6 +53,19 @@ class Probe:
         self._executor.wake()
         return messages
 
+    def listen_raw(
+        self, kind: type, topic: str, qos: QoSProfile, append: Callable[[bytes, Any], None]
+    ) -> None:
+        """Messages of this topic as they are on the network, with what is known of each."""
+
+        def take(data: bytes, info: Any) -> None:
+            with self._changed:
+                append(data, info)
+                self._changed.notify_all()
+
+        self.node.create_subscription(kind, topic, take, qos, raw=True)
+        self._executor.wake()
+
     def wait_for(self, predicate: Callable[[], object]) -> None:
         """Until the predicate holds; it is asked again whenever a message comes in."""
         assert self.comes_about(predicate), "it did not come about"
@@ -68,20 +81,24 @@ class Probe:
         states = self._received["omnibot_driver/state"]
         self.wait_for(lambda: states and states[-1].data == state)
 
-    def publisher(self, kind: type, topic: str) -> Any:
-        """A publisher that the driver already listens to."""
-        publisher = self.node.create_publisher(kind, topic, 1)
-        matched = threading.Event()
+    def publisher(self, kind: type, topic: str, qos: QoSProfile | int = 1) -> Any:
+        """A publisher that somebody already listens to."""
+        publisher = self.node.create_publisher(kind, topic, qos)
+        self.wait_for_graph(publisher.get_subscription_count)
+        return publisher
+
+    def wait_for_graph(self, predicate: Callable[[], object]) -> None:
+        """Until the predicate, which is asked now and then, holds."""
+        held = threading.Event()
 
         def look() -> None:
-            if publisher.get_subscription_count():
-                matched.set()
+            if predicate():
+                held.set()
 
         timer = self.node.create_timer(0.02, look)
         self._executor.wake()
-        assert matched.wait(PATIENCE_S), f"nobody subscribes {topic}"
+        assert held.wait(PATIENCE_S), "the graph does not come to look like that"
         self.node.destroy_timer(timer)
-        return publisher
 
     def client(self, kind: type, service: str) -> Any:
         client = self.node.create_client(kind, f"omnibot_driver/{service}")

@@ -1,0 +1,101 @@
+"""What came in over a wire once: ``replay://bag?speed=10``, read from a rosbag2.
+
+Knows the URL and the library rosbags, which reads bags without ROS. Must not know when the bytes
+are wanted, nor what they mean.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import parse_qsl
+
+from omnibot_driver.core.errors import LinkError, ParameterError
+
+SCHEME: Final = "replay://"
+RAW_TYPE: Final = "std_msgs/msg/UInt8MultiArray"
+RAW_NAME: Final = "/raw_rx"
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """One topic of one bag: a folder, or a single .mcap or .db3 file.
+
+    ``speed``: so many times faster, infinity for as fast as can be; ``delay_s``: until it begins.
+    """
+
+    path: Path
+    topic: str
+    speed: float = 1.0
+    delay_s: float = 1.0
+
+    def chunks(self) -> Iterator[tuple[int, bytes]]:
+        """When something came in, in ns of the recorder's time, and what. Raises LinkError."""
+        try:
+            from rosbags.rosbag2 import Reader
+            from rosbags.typesys import Stores, get_typestore
+
+            types = get_typestore(Stores.ROS2_JAZZY)
+            with Reader(self.path) as bag:
+                wanted = [item for item in bag.connections if item.topic == self.topic]
+                for _, at_ns, message in bag.messages(wanted):
+                    content: Any = types.deserialize_cdr(message, RAW_TYPE)
+                    yield at_ns, content.data.tobytes()
+        except Exception as error:  # whatever a damaged bag makes the library stumble over
+            raise LinkError(f"the recording {self.path} cannot be read on: {error}") from error
+
+
+def is_recording(url: str) -> bool:
+    """Tell whether the URL is one of ours."""
+    return url.lower().startswith(SCHEME)
+
+
+def open_recording(url: str) -> Recording:
+    """The recording that a URL means. Raises ParameterError, which says what is wrong with it."""
+    location, _, query = url[len(SCHEME) :].partition("?")
+    options = dict(parse_qsl(query, keep_blank_values=True))
+    speed = _number(url, "speed", options.pop("speed", "1"), 0.01, math.inf)
+    delay_s = _number(url, "delay", options.pop("delay", "1"), 0.0, 3600.0)
+    topic = options.pop("topic", "")
+    if options:
+        known = "speed, delay and topic"
+        raise _refusal(url, f"there is no option '{next(iter(options))}', only {known}")
+    path = Path(location)
+    return Recording(path, _find_topic(url, path, topic), speed, delay_s)
+
+
+def _find_topic(url: str, path: Path, wanted: str) -> str:
+    try:
+        from rosbags.rosbag2 import Reader
+    except ImportError as error:
+        raise _refusal(
+            url, "bags are read by the Python package rosbags: `pip install rosbags`"
+        ) from error
+    if not path.exists():
+        raise _refusal(url, f"there is no {path.absolute()}; give the folder of a bag")
+    try:
+        with Reader(path) as bag:
+            raw = sorted({item.topic for item in bag.connections if item.msgtype == RAW_TYPE})
+    except Exception as error:  # rosbags raises whatever it stumbles over
+        raise _refusal(url, f"{path} is no bag that can be read: {error}") from error
+    found = [topic for topic in raw if topic == wanted or (not wanted and topic.endswith(RAW_NAME))]
+    if len(found) == 1:
+        return found[0]
+    if not raw:
+        raise _refusal(url, f"no {RAW_NAME[1:]} is in it: record with `publish_raw: true`")
+    raise _refusal(url, f"choose one of its topics with topic={' or topic='.join(raw)}")
+
+
+def _number(url: str, name: str, text: str, low: float, high: float) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not low <= number <= high:
+        raise _refusal(url, f"{name} must be {low:g} to {high:g}, not {text!r}")
+    return number
+
+
+def _refusal(url: str, why: str) -> ParameterError:
+    return ParameterError(f"port '{url}' is not understood: {why}")

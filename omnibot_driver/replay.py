@@ -1,0 +1,132 @@
+"""A recorded wire fed to a session: what a `Link` is to a port, this is to a recording.
+
+The only clock is the recording's. The session hears each chunk of bytes at the time at which it
+came in then, and is ticked when it asks to be, so what it says depends on nothing but the
+recording: not on this machine, not on how fast the recording is played. What it wants written
+goes nowhere.
+"""
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Final, TypeVar
+
+from omnibot_driver.core.errors import LinkError
+from omnibot_driver.core.session import Event, Notice, OnExit, Session
+from omnibot_driver.recording import Recording
+
+JOIN_TIMEOUT_S: Final = 1.0
+SHORTEST_STEP_S: Final = 0.001
+"""Between two ticks of the session, whatever it asks for."""
+
+T = TypeVar("T")
+
+
+class Replay:
+    """One session on one recording, which is played once.
+
+    ``deliver`` gets the session's events and the time of day, in ns, at which its time is zero, on
+    whichever thread they came up; ``report`` gets None when the recording begins; ``failed`` gets
+    the exception that ended the thread, which nothing but a defect can do.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        recording: Recording,
+        *,
+        deliver: Callable[[Sequence[Event], int], None],
+        report: Callable[[None], None],
+        failed: Callable[[BaseException], None],
+    ) -> None:
+        self._session = session
+        self._recording = recording
+        self._deliver = deliver
+        self._report = report
+        self._failed = failed
+        self._lock = threading.Lock()
+        self._closing = threading.Event()
+        self._now = self._began_at = 0.0
+        self._epoch_ns = 0
+        self._thread = threading.Thread(target=self._guard, name="omnibot-replay", daemon=True)
+
+    def start(self) -> None:
+        """Begin to play, after the recording's delay."""
+        self._thread.start()
+
+    def call(self, action: Callable[[Session, float], T]) -> T:
+        """Do something with the session, at the time that the recording has come to."""
+        events: Sequence[Event] = ()
+        try:
+            with self._lock:
+                try:
+                    return action(self._session, self._now)
+                finally:
+                    events = self._settle()
+        finally:
+            self._deliver(events, self._epoch_ns)
+
+    def command(self, action: Callable[[Session, float], None], _sent_ns: int) -> None:
+        """``call``; nobody is moved by it."""
+        self.call(action)
+
+    def close(self, _on_exit: OnExit) -> None:
+        """End the thread; harmless to repeat."""
+        self._closing.set()
+        if self._thread.is_alive():
+            self._thread.join(JOIN_TIMEOUT_S)
+
+    def _guard(self) -> None:
+        try:
+            self._play()
+        except BaseException as error:
+            self._failed(error)
+
+    def _play(self) -> None:
+        if self._closing.wait(self._recording.delay_s):
+            return
+        self._began_at = time.monotonic()
+        end = "the recording has ended: nothing more will come"
+        opened = False
+        try:
+            for at_ns, data in self._recording.chunks():
+                if not opened:
+                    opened, self._epoch_ns = True, at_ns
+                    self._report(None)
+                    self.call(lambda session, now: session.opened(now))
+                if not self._run_until((at_ns - self._epoch_ns) * 1e-9):
+                    return
+                self.call(partial(_hear, data))
+        except LinkError as error:
+            end = str(error)
+        self.call(lambda session, now: session.closed(now))
+        self._deliver([Notice(end)], self._epoch_ns)
+
+    def _run_until(self, end_s: float) -> bool:
+        """Let the time pass, with everything that falls due in it; False when it is cut short."""
+        while (due_s := self._due()) < end_s:
+            if not self._pass(due_s):
+                return False
+            self.call(lambda session, now: session.tick(now))
+        return self._pass(end_s)
+
+    def _due(self) -> float:
+        with self._lock:
+            return max(self._session.wake_at, self._now + SHORTEST_STEP_S)
+
+    def _pass(self, until_s: float) -> bool:
+        at_s = self._began_at + until_s / self._recording.speed
+        if self._closing.wait(max(0.0, at_s - time.monotonic())):
+            return False
+        with self._lock:
+            self._now = max(self._now, until_s)
+        return True
+
+    def _settle(self) -> Sequence[Event]:
+        self._session.take_output(self._now)
+        return self._session.take_events()
+
+
+def _hear(data: bytes, session: Session, now: float) -> None:
+    session.receive(data, now)

@@ -1,0 +1,66 @@
+"""What stands around a link in place of a node."""
+
+import threading
+from collections.abc import Callable, Sequence
+
+from omnibot_driver.core.commands import CommandSettings
+from omnibot_driver.core.limits import SpeedLimits
+from omnibot_driver.core.odometry import OdometrySettings
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.session import Event, ImuEstimate, Session, SessionSettings
+from omnibot_driver.link import Link
+
+PATIENCE_S = 20.0
+LAST_WORDS = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00 FF FE 10 00 00 00 00 00 00")
+
+
+class Listener:
+    """Keeps what a link delivers and reports, and wakes who waits for it."""
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+        self.reports: list[str | None] = []
+        self.failures: list[BaseException] = []
+        self.threads: set[str] = set()
+        self._changed = threading.Condition()
+
+    def deliver(self, events: Sequence[Event]) -> None:
+        with self._changed:
+            self.events += events
+            if any(isinstance(event, ImuEstimate) for event in events):
+                self.threads.add(threading.current_thread().name)
+            self._changed.notify_all()
+
+    def report(self, trouble: str | None) -> None:
+        with self._changed:
+            self.reports.append(trouble)
+            self._changed.notify_all()
+
+    def failed(self, error: BaseException) -> None:
+        with self._changed:
+            self.failures.append(error)
+            self._changed.notify_all()
+
+    def wait_for(self, predicate: Callable[[], object]) -> None:
+        with self._changed:
+            assert self._changed.wait_for(predicate, PATIENCE_S)
+
+
+def session(*, run: bool = True) -> Session:
+    settings = SessionSettings(
+        limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
+    )
+    return Session(OmniBot(OmniBotSettings()), settings, run=run)
+
+
+def link_to(url: str, listener: Listener, session: Session) -> Link:
+    return Link(
+        session,
+        url,
+        115200,
+        last_words=LAST_WORDS,
+        reconnect_interval_s=0.02,
+        deliver=listener.deliver,
+        report=listener.report,
+        failed=listener.failed,
+    )

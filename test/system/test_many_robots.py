@@ -1,0 +1,99 @@
+"""Three robots in one domain: each hears its own commands and speaks of its own frames."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+from driver_process import Driver
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from probe import Probe
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+
+
+@dataclass
+class Robot:
+    """A driver with a board of its own, and its part of the fleet's view."""
+
+    name: str
+    probe: Probe
+    imu: list[Any]
+    odom: list[Any]
+    estop_active: list[Any]
+
+    @property
+    def x_m(self) -> float:
+        return float(self.odom[-1].pose.pose.position.x)
+
+
+@pytest.fixture(scope="module")
+def fleet() -> Iterator[list[Robot]]:
+    names = ("odom_frame", "base_frame", "imu_frame")
+    with ExitStack() as stack:
+        robots = []
+        for seed in range(3):
+            driver = stack.enter_context(
+                Driver(
+                    port=f"sim://?seed={seed}",
+                    **{name: f"r{seed}/{name}" for name in names},
+                )
+            )
+            probe = stack.enter_context(Probe(driver.namespace))
+            robots.append(
+                Robot(
+                    driver.namespace,
+                    probe,
+                    probe.listen(Imu, "imu/data_raw"),
+                    probe.listen(Odometry, "odom"),
+                    probe.listen(Bool, "omnibot_driver/estop_active", latched=True),
+                )
+            )
+        for robot in robots:
+            robot.probe.wait_for_state("nominal")
+        yield robots
+
+
+def test_each_speaks_of_its_own_frames(fleet: list[Robot]) -> None:
+    """No two robots share a frame, so one tree can hold them all."""
+    for seed, robot in enumerate(fleet):
+        robot.probe.wait_for(lambda robot=robot: robot.imu and robot.odom)
+        assert robot.imu[-1].header.frame_id == f"r{seed}/imu_frame"
+        assert robot.odom[-1].header.frame_id == f"r{seed}/odom_frame"
+        assert robot.odom[-1].child_frame_id == f"r{seed}/base_frame"
+
+
+def test_each_hears_only_its_own_commands(fleet: list[Robot]) -> None:
+    """One drives forwards, one backwards, the third stands where it stood."""
+    forward, still, backward = fleet
+    speeds = {forward.name: 0.3, backward.name: -0.3}
+    publishers = {
+        robot.name: robot.probe.publisher(Twist, "cmd_vel") for robot in (forward, backward)
+    }
+    for _ in range(100):
+        if forward.x_m > 0.1 and backward.x_m < -0.1:
+            break
+        for name, publisher in publishers.items():
+            twist = Twist()
+            twist.linear.x = speeds[name]
+            publisher.publish(twist)
+        count = len(still.odom)
+        still.probe.wait_for(lambda count=count: len(still.odom) > count + 2)
+    assert forward.x_m > 0.1
+    assert backward.x_m < -0.1
+    assert still.x_m == 0.0
+
+
+def test_each_has_an_emergency_stop_of_its_own(fleet: list[Robot]) -> None:
+    """What stops one robot does not stop the others, nor release them."""
+    first, second, third = fleet
+    for robot in (first, second):
+        assert robot.probe.call(SetBool, "estop", data=True).success
+        robot.probe.wait_for(lambda robot=robot: robot.estop_active[-1].data)
+    assert first.probe.call(SetBool, "estop", data=False).success
+    first.probe.wait_for(lambda: not first.estop_active[-1].data)
+    assert second.estop_active[-1].data
+    assert [message.data for message in third.estop_active] == [False]

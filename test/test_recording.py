@@ -1,0 +1,139 @@
+"""``replay://``: the wire as a bag holds it, and every way in which it cannot be had."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("rosbags")
+
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from omnibot_driver.core.errors import LinkError, ParameterError
+from omnibot_driver.recording import is_recording, open_recording
+
+TYPES = get_typestore(Stores.ROS2_JAZZY)
+RAW = "std_msgs/msg/UInt8MultiArray"
+RX = "/omnibot_driver/raw_rx"
+# CDR by hand: little endian; no dimension, offset 0, the count, the bytes.
+CHUNKS = [
+    (1_790_000_000_000_000_000, b"Paused: 0 \n"),
+    (1_790_000_000_000_000_001, b"\xff\xfa\x00"),
+    (1_790_000_002_000_000_000, b"\n"),
+]
+
+
+def cdr(data: bytes) -> bytes:
+    header = bytes.fromhex("00 01 00 00")
+    return header + bytes(8) + len(data).to_bytes(4, "little") + data
+
+
+def bag(
+    path: Path, *topics: str, plugin: StoragePlugin = StoragePlugin.MCAP, kind: str = RAW
+) -> Path:
+    """A bag in which each topic holds the chunks."""
+    with Writer(path, version=9, storage_plugin=plugin) as writer:
+        for topic in topics:
+            connection = writer.add_connection(topic, kind, typestore=TYPES)
+            for at_ns, data in CHUNKS:
+                writer.write(connection, at_ns, cdr(data))
+    return path
+
+
+@pytest.mark.parametrize("plugin", StoragePlugin)
+def test_every_byte_comes_back_with_its_time(tmp_path: Path, plugin: StoragePlugin) -> None:
+    """From both kinds of storage, of a bag and of its one file, whatever else is in it."""
+    path = bag(tmp_path / "bag", "/omnibot_driver/raw_tx", RX, plugin=plugin)
+    (file,) = (found for found in path.iterdir() if found.suffix != ".yaml")
+    for place in (path, file):
+        assert list(open_recording(f"replay://{place}").chunks()) == CHUNKS
+
+
+def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
+    """Two robots in one bag: their topics tell them apart."""
+    path = bag(tmp_path / "bag", "/robot1/omnibot_driver/raw_rx", "/robot2/omnibot_driver/raw_rx")
+    recording = open_recording(
+        f"replay://{path}?speed=2.5&delay=0&topic=/robot2/omnibot_driver/raw_rx"
+    )
+    assert (recording.speed, recording.delay_s) == (2.5, 0.0)
+    assert recording.topic == "/robot2/omnibot_driver/raw_rx"
+    assert list(recording.chunks()) == CHUNKS
+
+
+def test_what_is_said_without_options(tmp_path: Path) -> None:
+    """As fast as it was, once others had a second to find the driver."""
+    recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
+    assert (recording.speed, recording.delay_s, recording.topic) == (1.0, 1.0, RX)
+
+
+@pytest.mark.parametrize(
+    ("query", "why"),
+    [
+        ("?speed=0", "speed must be 0.01 to inf, not '0'"),
+        ("?speed=fast", "speed must be 0.01 to inf, not 'fast'"),
+        ("?speed=nan", "speed must be 0.01 to inf, not 'nan'"),
+        ("?delay=-1", "delay must be 0 to 3600, not '-1'"),
+        ("?rate=2", "there is no option 'rate', only speed, delay and topic"),
+        ("?topic=/odom", f"choose one of its topics with topic={RX}"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(tmp_path: Path, query: str, why: str) -> None:
+    """With what would make sense."""
+    path = bag(tmp_path / "bag", RX)
+    with pytest.raises(ParameterError) as refusal:
+        open_recording(f"replay://{path}{query}")
+    assert str(refusal.value) == f"port 'replay://{path}{query}' is not understood: {why}"
+
+
+def test_a_bag_without_the_wire_says_how_to_record_it(tmp_path: Path) -> None:
+    """The commonest mistake."""
+    path = bag(tmp_path / "bag", "/odom", kind="std_msgs/msg/String")
+    with pytest.raises(ParameterError, match="record with `publish_raw: true`"):
+        open_recording(f"replay://{path}")
+
+
+def test_a_bag_of_two_robots_is_not_guessed_at(tmp_path: Path) -> None:
+    """All that could be meant are named."""
+    path = bag(tmp_path / "bag", "/b/raw_rx", "/a/raw_rx")
+    with pytest.raises(ParameterError, match="topic=/a/raw_rx or topic=/b/raw_rx"):
+        open_recording(f"replay://{path}")
+
+
+def test_what_is_no_bag_is_refused(tmp_path: Path) -> None:
+    """Nothing there, an empty folder, some other file."""
+    (tmp_path / "notes.txt").write_text("hello")
+    (tmp_path / "torn.mcap").write_bytes(b"\x89MCAP0\r\n")
+    for name, why in (
+        ("nothing", "there is no"),
+        (".", "is no bag that can be read"),
+        ("notes.txt", "is no bag that can be read"),
+        ("torn.mcap", "is no bag that can be read"),
+    ):
+        with pytest.raises(ParameterError, match=why):
+            open_recording(f"replay://{tmp_path / name}")
+
+
+def test_without_the_library_it_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing else of the driver needs it."""
+    path = bag(tmp_path / "bag", RX)
+    monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
+    with pytest.raises(ParameterError, match="`pip install rosbags`"):
+        open_recording(f"replay://{path}")
+
+
+def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> None:
+    """Whatever the library stumbles over."""
+    recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    with pytest.raises(LinkError, match="cannot be read on"):
+        list(recording.chunks())
+
+
+def test_only_its_own_urls_are_taken() -> None:
+    """A device may have any name."""
+    assert is_recording("replay://x")
+    assert not is_recording("/dev/replay")
+    assert not is_recording("sim://")

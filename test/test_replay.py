@@ -1,0 +1,215 @@
+"""A recorded wire, heard again: the same every time, however fast, and as it was when recorded."""
+
+import itertools
+import math
+import threading
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import pytest
+from listener import Listener, link_to, session
+
+from omnibot_driver.core.errors import LinkError, RequestRefused
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.session import Event, ImuEstimate, Notice, StateChanged
+from omnibot_driver.core.supervisor import Request
+from omnibot_driver.replay import Replay
+from omnibot_driver.simulator import BoardSettings, FaultyLine, LineFaults, SimulatedBoard
+
+EPOCH_NS = 1_790_000_000_123_456_789
+TICK_NS = 10_000_000
+ENDED = Notice("the recording has ended: nothing more will come")
+
+Chunks = list[tuple[int, bytes]]
+
+
+@dataclass(frozen=True)
+class Tape:
+    """A recording without a bag."""
+
+    content: Iterable[tuple[int, bytes]]
+    speed: float = math.inf
+    delay_s: float = 0.0
+
+    def chunks(self) -> Iterator[tuple[int, bytes]]:
+        yield from self.content
+
+
+class Heard(Listener):
+    """What a replay told, with the state after each event."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.session = session()
+        self.states: list[str] = []
+        self.epochs: set[int] = set()
+
+    def take(self, events: Sequence[Event], epoch_ns: int) -> None:
+        self.epochs.add(epoch_ns)
+        self.states += [self.session.state for e in events if isinstance(e, StateChanged)]
+        self.deliver(events)
+
+
+def start(tape: Tape) -> tuple[Replay, Heard]:
+    heard = Heard()
+    replay = Replay(
+        heard.session,
+        tape,  # type: ignore[arg-type]
+        deliver=heard.take,
+        report=heard.report,
+        failed=heard.failed,
+    )
+    replay.start()
+    return replay, heard
+
+
+def play(tape: Tape) -> Heard:
+    """From the beginning to the end."""
+    replay, heard = start(tape)
+    heard.wait_for(lambda: heard.failures or ENDED in heard.events)
+    replay.close("stop")
+    assert not heard.failures
+    return heard
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left_behind() -> Iterator[None]:
+    threads = threading.active_count()
+    yield
+    assert threading.active_count() == threads
+
+
+def simulated(ticks: int, *, silent: range = range(0), line: FaultyLine | None = None) -> Chunks:
+    """What a moving board would have sent; nothing in the silent ticks."""
+    board = SimulatedBoard(BoardSettings(seed=3, running=True))
+    board.receive(bytes.fromhex("FF FE 01 00 0E 00 07 00 32"))
+    found = []
+    for tick in range(ticks):
+        data = board.step()
+        data = line.carry(data) if line else data
+        jitter_ns = tick * 7_919_000 % 3_000_000
+        if data and tick not in silent:
+            found.append((EPOCH_NS + tick * TICK_NS + jitter_ns, data))
+    return found
+
+
+BAD_LINE = simulated(1500, line=FaultyLine(LineFaults(lose=0.003, burst=0.0003, flip=0.001)))
+
+
+def measured(events: Iterable[Event]) -> list[tuple[object, ...]]:
+    """The measurements without their stamps."""
+    found: list[tuple[object, ...]] = []
+    for event in events:
+        if isinstance(event, ImuEstimate):
+            found.append((event.specific_force, event.angular_velocity))
+        elif isinstance(event, OdometryEstimate):
+            found.append((event.pose, event.twist))
+    return found
+
+
+def test_a_replay_tells_what_was_told_when_it_was_recorded() -> None:
+    """Every measurement, in the same order, with the same values."""
+    tape: Chunks = []
+    listener, ours = Listener(), session()
+    link = link_to("sim://?seed=2", listener, ours)
+    link._on_read = lambda data: tape.append((time.monotonic_ns(), data))
+    link.start()
+    listener.wait_for(lambda: ours.state == "nominal")
+    link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.1, 0.4), now))
+    listener.wait_for(lambda: len(listener.events) > 150)
+    link.close("stop")
+    live = measured(listener.events)
+    assert len(live) > 100
+    assert measured(play(Tape(tape)).events) == live
+
+
+def test_every_replay_is_the_same() -> None:
+    """Measurements, stamps, states and warnings, also of a wire that lost and changed bytes."""
+    first, second = play(Tape(BAD_LINE)), play(Tape(BAD_LINE))
+    assert len(measured(first.events)) > 1000
+    assert any(isinstance(event, Notice) and event != ENDED for event in first.events)
+    assert first.events == second.events
+    assert first.states == second.states
+
+
+def test_the_pace_makes_no_difference() -> None:
+    """What is played faster is heard the same."""
+    tape = Tape(BAD_LINE[:100])
+    assert play(replace(tape, speed=5.0)).events == play(tape).events
+
+
+def test_time_passes_as_it_did() -> None:
+    """A silence in the recording is noticed, however fast it is played; the end as well."""
+    heard = play(Tape(simulated(600, silent=range(200, 400))))
+    assert heard.states == [
+        *("connecting", "nominal"),
+        *("connecting", "nominal"),
+        "disconnected",
+    ]
+    assert heard.reports == [None]
+
+
+def test_stamps_are_times_of_the_recording() -> None:
+    """They begin with its first bytes and go on with the board's ticks."""
+    heard = play(Tape(simulated(300)))
+    stamps = [event.stamp_s for event in heard.events if isinstance(event, ImuEstimate)]
+    assert len(stamps) == 300
+    assert heard.epochs == {EPOCH_NS}
+    assert stamps[0] == pytest.approx(0.0, abs=0.005)
+    assert stamps[-1] - stamps[100] == pytest.approx(1.99, abs=0.003)
+
+
+def test_a_recording_can_be_left_before_its_end() -> None:
+    """Closing does not wait for it, nor for its beginning."""
+    for tape in (Tape(BAD_LINE, speed=1e-3), Tape(BAD_LINE, delay_s=3600.0)):
+        replay, heard = start(tape)
+        if tape.delay_s == 0.0:
+            heard.wait_for(lambda heard=heard: heard.states)  # type: ignore[misc]
+        replay.close("stop")
+        replay.close("stop")
+        assert ENDED not in heard.events
+        assert not heard.failures
+
+
+def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
+    """A request that the end overtakes is answered; afterwards the port is not open."""
+    endless = ((EPOCH_NS + n * TICK_NS, data) for n, (_, data) in enumerate(itertools.cycle(TAPE)))
+    stop = threading.Event()
+    tape = Tape(itertools.takewhile(lambda _: not stop.is_set(), endless), speed=1.0)
+    replay, heard = start(tape)
+    heard.wait_for(lambda: heard.session.state == "nominal")
+    replay.command(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now), 0)
+    replay.call(lambda s, now: s.request(Request.PAUSE, "token", now))
+    stop.set()
+    heard.wait_for(lambda: ENDED in heard.events)
+    assert "port was lost" in str([e for e in heard.events if getattr(e, "token", "") == "token"])
+    with pytest.raises(RequestRefused, match="not open"):
+        replay.call(lambda s, now: s.request(Request.START, "token", now))
+    replay.close("stop")
+    assert not heard.failures
+
+
+TAPE = simulated(100)
+
+
+def test_a_recording_that_breaks_off_says_so() -> None:
+    """What was read so far counts."""
+
+    def broken() -> Iterator[tuple[int, bytes]]:
+        yield from TAPE
+        raise LinkError("the recording x cannot be read on: torn")
+
+    replay, heard = start(Tape(broken()))
+    heard.wait_for(lambda: heard.states[-1:] == ["disconnected"] and heard.events[-1] != ENDED)
+    replay.close("stop")
+    assert heard.events[-1] == Notice("the recording x cannot be read on: torn")
+    assert len(measured(heard.events)) > 100
+
+
+def test_an_empty_recording_ends_at_once() -> None:
+    """Nothing was recorded, nothing is told."""
+    heard = play(Tape([]))
+    assert heard.events == [ENDED]
+    assert heard.reports == []
