@@ -171,13 +171,11 @@ class GyroCalibration:
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
         """The wheels told so much."""
         self._look.displaced(dx_m, dy_m, dyaw_rad)
-        if self.measuring and self._look.rolled:
-            self._refuse_motion("its wheels turn")
 
     def _conclude(self) -> None:
         look, self._look = self._look, Look()
         if motion := look.motion:
-            self._refuse_motion(motion)
+            self.give_up(f"the robot moves ({motion}); let it stand still for 2 s and call again")
             return
         self.gravity_mps2 = math.hypot(*look.force.mean)
         self.noise = look.rate.deviation
@@ -194,9 +192,6 @@ class GyroCalibration:
                 for known, seen in zip(self.bias, look.rate.mean, strict=True)
             )
             self.bias = x, y, z
-
-    def _refuse_motion(self, motion: str) -> None:
-        self.give_up(f"the robot moves ({motion}); let it stand still for 2 s and call again")
 
     def _answer(self, success: bool, message: str) -> None:
         self.answers.append(RequestDone(self._token, success, message))
