@@ -19,7 +19,8 @@ BLOCK_S: Final = 1.0
 """Length of a look at a robot that nobody asked to stand still."""
 GAP_S: Final = 0.2
 """After a longer time without readings a look begins anew."""
-ANSWER_WITHIN_S: Final = 4.5
+ANSWER_WITHIN_S: Final = 4.0
+"""Leaves a second of the five that a service has for writing a file."""
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3
