@@ -398,7 +398,7 @@ class OmniBotDriver(Node):
             try:
                 calibration.save(file, {"gyro_bias": bias})
                 answer.set_result("")
-            except (OSError, ParameterError) as error:
+            except Exception as error:  # whoever asked is owed an answer
                 answer.set_result(str(error))
             if self.executor is not None:
                 self.executor.wake()

@@ -126,7 +126,8 @@ class Diagnosis:
             "nominal": (Level.OK, "running"),
         }[session.state]
         if self._grew("restarts", restarts, now) and level is Level.OK:
-            level, message = Level.WARN, "the board has restarted: check its power supply"
+            level = Level.WARN
+            message = "the board has restarted: unless you reset it, check its power supply"
         return Status("Board", level, message, {"Mode": session.state, "Restarts": str(restarts)})
 
     def _stream(self, session: SessionFigures, now: float) -> Status:

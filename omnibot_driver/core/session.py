@@ -431,7 +431,6 @@ class Session:
                 f" {refused.displacements} odometry, {refused.poses} poses): the line changes bits,"
                 " or a limit of motion is set too low"
             )
-
         advice = self._inertial.advice
         if advice and not self._gravity_told:
             self._notify(advice)

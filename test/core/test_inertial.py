@@ -116,6 +116,19 @@ def test_a_calibration_is_answered_in_time_whatever_happens(how: str) -> None:
     assert "again" in done.message
 
 
+def test_a_silent_board_that_nobody_is_to_start_is_woken_up_for_the_answer() -> None:
+    """Nothing else is due then: Stop was said for its second."""
+    bench = Bench(BoardSettings(running=True), run=False)
+    bench.open()
+    bench.run(1.0)
+    bench.session.calibrate_gyro("token", bench.now)
+    began, bench.speaks = bench.now, False
+    bench.run(3.6)
+    assert bench.now < bench.session.wake_at <= began + 4.5
+    bench.run(1.0)
+    assert any(isinstance(event, RequestDone) for event in bench.events)
+
+
 def test_a_parameter_that_is_set_otherwise_replaces_the_bias_and_others_do_not() -> None:
     """A change of limits must not undo a calibration."""
     bench = running(gyro_bias_dps=PLANTED_DPS)

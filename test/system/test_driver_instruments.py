@@ -83,6 +83,17 @@ def test_the_gyro_is_calibrated_saved_and_loaded_again(
     assert list(values[0].double_array_value) == saved["gyro_bias"]
 
 
+def test_a_calibration_that_cannot_be_saved_is_applied_and_says_so(robot: Robot) -> None:
+    """Here somebody has broken the file meanwhile; it is left as it is."""
+    robot.file.write_text("gyro_bias: [1, 2")
+    answer = robot.probe.call(Trigger, "calibrate_gyro")
+    assert not answer.success
+    assert answer.message.startswith("gyro bias (0.0")
+    assert "it is applied, but not saved" in answer.message
+    assert "mend it" in answer.message
+    assert robot.file.read_text() == "gyro_bias: [1, 2"
+
+
 def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
     tmp_path: Path, start_driver: Callable[..., Driver]
 ) -> None:
