@@ -46,11 +46,11 @@ class Listener:
             assert self._changed.wait_for(predicate, PATIENCE_S)
 
 
-def session(*, run: bool = True) -> Session:
+def session(*, run: bool = True, obeys: bool = True) -> Session:
     settings = SessionSettings(
         limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
     )
-    return Session(OmniBot(OmniBotSettings()), settings, run=run)
+    return Session(OmniBot(OmniBotSettings()), settings, run=run, obeys=obeys)
 
 
 def link_to(url: str, listener: Listener, session: Session) -> Link:

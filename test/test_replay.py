@@ -42,7 +42,7 @@ class Heard(Listener):
 
     def __init__(self) -> None:
         super().__init__()
-        self.session = session()
+        self.session = session(obeys=False)
         self.states: list[str] = []
         self.epochs: set[int] = set()
 
@@ -149,6 +149,12 @@ def test_time_passes_as_it_did() -> None:
         "disconnected",
     ]
     assert heard.reports == [None]
+
+
+def test_a_recorded_robot_is_not_blamed_for_moving() -> None:
+    """Nobody here has told it to, and nobody is sent to switch it off."""
+    heard = play(Tape(simulated(600)))
+    assert [event for event in heard.events if isinstance(event, Notice)] == [ENDED]
 
 
 def test_stamps_are_times_of_the_recording() -> None:
