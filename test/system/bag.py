@@ -135,7 +135,9 @@ def equal(ours: Any, theirs: Any) -> bool:
     if hasattr(ours, "get_fields_and_field_types"):
         names = ours.get_fields_and_field_types()
         return all(equal(getattr(ours, name), getattr(theirs, name)) for name in names)
-    if isinstance(ours, str | bytes | int | float):
+    if isinstance(ours, bytes):  # what ROS calls a byte
+        return ours == bytes([theirs])
+    if isinstance(ours, str | int | float):
         return bool(ours == theirs)
     return len(ours) == len(theirs) and all(
         equal(mine, his) for mine, his in zip(ours, theirs, strict=True)
