@@ -53,7 +53,9 @@ def session(*, run: bool = True, obeys: bool = True) -> Session:
     return Session(OmniBot(OmniBotSettings()), settings, run=run, obeys=obeys)
 
 
-def link_to(url: str, listener: Listener, session: Session) -> Link:
+def link_to(
+    url: str, listener: Listener, session: Session, **taps: Callable[[bytes], None]
+) -> Link:
     return Link(
         session,
         url,
@@ -63,4 +65,5 @@ def link_to(url: str, listener: Listener, session: Session) -> Link:
         deliver=listener.deliver,
         report=listener.report,
         failed=listener.failed,
+        **taps,
     )

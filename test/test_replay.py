@@ -113,8 +113,12 @@ def test_a_replay_tells_what_was_told_when_it_was_recorded() -> None:
     """Every measurement, in the same order, with the same values."""
     tape: Chunks = []
     listener, ours = Listener(), session()
-    link = link_to("sim://?seed=2", listener, ours)
-    link._on_read = lambda data: tape.append((time.monotonic_ns(), data))
+    link = link_to(
+        "sim://?seed=2",
+        listener,
+        ours,
+        on_read=lambda data: tape.append((time.monotonic_ns(), data)),
+    )
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
     link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.1, 0.4), now))
