@@ -80,6 +80,7 @@ class OmniBotDriver(Node):
             run=self._values["auto_start"],
             axis_signs=tuple(self._values["axis_signs"]),
             control=self._values["control_method"],
+            obeys=not is_recording(self._values["port"]),
         )
         self._state_lock = threading.Lock()
         self._told: set[str] = set()

@@ -46,14 +46,16 @@ class Listener:
             assert self._changed.wait_for(predicate, PATIENCE_S)
 
 
-def session(*, run: bool = True) -> Session:
+def session(*, run: bool = True, obeys: bool = True) -> Session:
     settings = SessionSettings(
         limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
     )
-    return Session(OmniBot(OmniBotSettings()), settings, run=run)
+    return Session(OmniBot(OmniBotSettings()), settings, run=run, obeys=obeys)
 
 
-def link_to(url: str, listener: Listener, session: Session) -> Link:
+def link_to(
+    url: str, listener: Listener, session: Session, **taps: Callable[[bytes], None]
+) -> Link:
     return Link(
         session,
         url,
@@ -63,4 +65,5 @@ def link_to(url: str, listener: Listener, session: Session) -> Link:
         deliver=listener.deliver,
         report=listener.report,
         failed=listener.failed,
+        **taps,
     )

@@ -101,6 +101,21 @@ def test_closing_writes_stop_and_ends_the_threads(board: PtyBoard) -> None:
     assert ours.state == "disconnected"
 
 
+def test_every_read_and_every_write_can_be_listened_to(board: PtyBoard) -> None:
+    """Byte for byte as they were, the opening and the farewell included."""
+    read, written = [], []
+    listener, ours = Listener(), session()
+    link = link_to(board.path, listener, ours, on_read=read.append, on_write=written.append)
+    link.start()
+    listener.wait_for(lambda: len(listener.events) > 20)
+    link.close("stop")
+    assert written[-1] == STOP
+    assert board.wait_for(lambda b: b.received == b"".join(written), PATIENCE_S)
+    sent = b"".join(frame.data for frame in board.board.sent)
+    assert len(read) > 10
+    assert sent.startswith(b"".join(read))
+
+
 def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
     """And the link goes on."""
     listener, ours = Listener(), session()

@@ -42,7 +42,7 @@ class Heard(Listener):
 
     def __init__(self) -> None:
         super().__init__()
-        self.session = session()
+        self.session = session(obeys=False)
         self.states: list[str] = []
         self.epochs: set[int] = set()
 
@@ -113,8 +113,12 @@ def test_a_replay_tells_what_was_told_when_it_was_recorded() -> None:
     """Every measurement, in the same order, with the same values."""
     tape: Chunks = []
     listener, ours = Listener(), session()
-    link = link_to("sim://?seed=2", listener, ours)
-    link._on_read = lambda data: tape.append((time.monotonic_ns(), data))
+    link = link_to(
+        "sim://?seed=2",
+        listener,
+        ours,
+        on_read=lambda data: tape.append((time.monotonic_ns(), data)),
+    )
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
     link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.1, 0.4), now))
@@ -149,6 +153,12 @@ def test_time_passes_as_it_did() -> None:
         "disconnected",
     ]
     assert heard.reports == [None]
+
+
+def test_a_recorded_robot_is_not_blamed_for_moving() -> None:
+    """Nobody here has told it to, and nobody is sent to switch it off."""
+    heard = play(Tape(simulated(600)))
+    assert [event for event in heard.events if isinstance(event, Notice)] == [ENDED]
 
 
 def test_stamps_are_times_of_the_recording() -> None:

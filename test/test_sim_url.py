@@ -2,10 +2,10 @@
 
 import threading
 from collections.abc import Iterator
-from contextlib import closing
 
 import pytest
-from listener import Listener, link_to, session
+import serial
+from listener import PATIENCE_S, Listener, link_to, session
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.kinematics import BodyTwist
@@ -94,11 +94,10 @@ def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
 
 
 def test_a_read_that_waits_can_be_cancelled() -> None:
-    """Closing a driver does not wait for a board that is silent."""
-    with closing(Port("sim://", 115200)) as port:
-        while port.read() != b"Paused: 0 \n":
-            pass
-        canceller = threading.Timer(2 * TICK_S, port.interrupt)
+    """Closing a driver does not wait for the next notice of a paused board, a second away."""
+    with serial.serial_for_url("sim://", timeout=PATIENCE_S) as port:
+        assert port.read(11) == b"Paused: 0 \n"
+        canceller = threading.Timer(2 * TICK_S, port.cancel_read)
         canceller.start()
         assert port.read() == b""
         canceller.join()

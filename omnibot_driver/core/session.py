@@ -75,7 +75,8 @@ class SessionSettings:
 class Session:
     """``run``: whether the board is to be started whenever it is there; ``axis_signs``: 1 or -1 for
     x, y and yaw where the board's body axes are not REP-103's, for commands and odometry alike;
-    ``control``: where the board's switch stands, which no board tells.
+    ``control``: where the board's switch stands, which no board tells; ``obeys``: whether the robot
+    can be expected to do what it is told here, which a recorded one was not.
     """
 
     def __init__(
@@ -86,8 +87,10 @@ class Session:
         run: bool,
         axis_signs: Signs = (1, 1, 1),
         control: ControlMethod = "velocity",
+        obeys: bool = True,
     ) -> None:
         self._board = board
+        self._obeys = obeys
         self._supervisor = Supervisor(board, run=run)
         self._commands = CommandStream(
             settings.commands, stop=board.stop(), emergency_stop=board.emergency_stop()
@@ -389,6 +392,8 @@ class Session:
                     self._supervisor.heard_paused(now, continues=continues)
 
     def _look(self, reading: DisplacementReading, now: float) -> None:
+        if not self._obeys:
+            return
         finding = self._watch.look(reading, self._commands.current)
         if finding is Finding.ASTRAY:
             self._commands.halt(now)

@@ -35,9 +35,9 @@ class InProcessBoard(RunningBoard):
         self._inbox.put(data)
 
     def read(self, size: int, timeout_s: float | None) -> bytes:
-        """Up to so many bytes; waits for the first one until the time is over or ``cancel``."""
+        """So many bytes; fewer when the time is over, or after ``cancel``."""
         with self._came:
-            self._came.wait_for(lambda: self._unread or self._cancelled, timeout_s)
+            self._came.wait_for(lambda: len(self._unread) >= size or self._cancelled, timeout_s)
             self.check()
             self._cancelled = False
             data = bytes(self._unread[:size])
@@ -95,7 +95,7 @@ class Serial(SerialBase):
         return self._opened.unread
 
     def read(self, size: int = 1, /) -> bytes:
-        """As many bytes as are there, up to so many, or none when the time is over."""
+        """So many bytes; fewer when the time is over."""
         return self._opened.read(size, self.timeout)
 
     def write(self, data: Any, /) -> int:

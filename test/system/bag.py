@@ -135,7 +135,7 @@ def equal(ours: Any, theirs: Any) -> bool:
     if hasattr(ours, "get_fields_and_field_types"):
         names = ours.get_fields_and_field_types()
         return all(equal(getattr(ours, name), getattr(theirs, name)) for name in names)
-    if isinstance(ours, bytes):  # a single octet, which rosbags gives as a number
+    if isinstance(ours, bytes):  # what ROS calls a byte
         return ours == bytes([theirs])
     if isinstance(ours, str | int | float):
         return bool(ours == theirs)
