@@ -1,10 +1,19 @@
-"""What happens often is counted, and told seldom. Knows counts and times."""
+"""What a user is told of the stream: seldom, or once, in sentences that say what to do.
+
+Knows counts, times and words; not where they come from.
+"""
 
 import math
+from collections.abc import Iterable, Iterator
 from typing import Final
 
+from omnibot_driver.core.plausibility import Refused
+
 NEWS_S: Final = 10.0
-"""Nothing is told more often than this."""
+"""What is counted is told no more often than this."""
+HEADING_ASSUMED: Final = (
+    "the board sends no pose that makes sense: its heading is assumed to have been 0 at first"
+)
 
 
 class News:
@@ -20,3 +29,50 @@ class News:
             return 0
         new, self._told, self._told_at = count - self._told, count, now
         return new
+
+
+class Bulletin:
+    """The sentences that are due."""
+
+    def __init__(self) -> None:
+        self._lost, self._refused = News(), News()
+        self._told: set[str] = set()
+        self._standing = ""
+
+    def counted(self, lost: int, refused: Refused, now: float) -> Iterator[str]:
+        """What was lost and refused since it was last told."""
+        if more := self._lost.since_told(lost, now):
+            yield f"{more} odometry frames were lost on the line: check cable and hub"
+        total = refused.imu + refused.displacements + refused.poses
+        if more := self._refused.since_told(total, now):
+            yield (
+                f"{more} readings cannot be true and were refused (in all {refused.imu} imu,"
+                f" {refused.displacements} odometry, {refused.poses} poses): the line changes bits,"
+                " or a limit of motion is set too low"
+            )
+
+    def once(self, sentences: Iterable[str]) -> Iterator[str]:
+        """Those that were never told before."""
+        for sentence in sentences:
+            if sentence not in self._told:
+                self._told.add(sentence)
+                yield sentence
+
+    def standing(self, sentence: str) -> Iterator[str]:
+        """What holds now, empty for nothing; told when it begins to hold."""
+        before, self._standing = self._standing, sentence
+        if sentence and not before:
+            yield sentence
+
+
+def why_silent(silence_s: float, *, bytes_came: bool) -> str:
+    """Why nothing was understood for so long, and what to do."""
+    if bytes_came:
+        return (
+            f"nothing that comes in makes sense for {silence_s:g} s: check the parameter"
+            " `baudrate`, the cable, and that it is this board"
+        )
+    return (
+        f"nothing comes from the board for {silence_s:g} s: check its power and the cable,"
+        " and that `port` is its port"
+    )

@@ -13,7 +13,6 @@ from typing import Final, Literal
 from omnibot_driver.core.board import (
     Board,
     DisplacementReading,
-    ImuReading,
     Mode,
     PausedReading,
     PoseReading,
@@ -21,20 +20,19 @@ from omnibot_driver.core.board import (
     Vector3,
 )
 from omnibot_driver.core.commands import PACE_S, CommandSettings, CommandStream
-from omnibot_driver.core.device_clock import DeviceClock
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.helm import ControlMethod, Helm
-from omnibot_driver.core.inertial import ImuCorrection, ImuEstimate, Inertial
+from omnibot_driver.core.inertial import ImuCorrection, ImuEstimate
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits, require_timely
+from omnibot_driver.core.measuring import Estimate, Measured, Measuring
 from omnibot_driver.core.motion import GoalMotion, Motion
-from omnibot_driver.core.news import News
-from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
-from omnibot_driver.core.plausibility import MotionLimits, Plausibility, Refused, Stamped
+from omnibot_driver.core.news import HEADING_ASSUMED, Bulletin, why_silent
+from omnibot_driver.core.odometry import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.plausibility import MotionLimits, Refused
 from omnibot_driver.core.se2 import Pose, Signs
 from omnibot_driver.core.snapshot import CommandFigures, SessionFigures
 from omnibot_driver.core.supervisor import Phase, Request, RequestDone, Supervisor
-from omnibot_driver.core.tally import Tally
 from omnibot_driver.core.watch import Finding, Watch
 
 SILENCE_S: Final = 1.5
@@ -95,19 +93,15 @@ class Session:
         self._commands = CommandStream(
             settings.commands, stop=board.stop(), emergency_stop=board.emergency_stop()
         )
-        self._odometry = Odometry(settings.odometry, axis_signs)
+        self._measuring = Measuring(
+            board, settings.odometry, settings.motion, settings.imu, axis_signs
+        )
+        self._odometry, self._inertial = self._measuring.odometry, self._measuring.inertial
         self._helm = Helm(board, self._odometry, settings.limits, axis_signs, control)
-        self._plausibility = Plausibility(settings.motion, board.tick_s)
-        self._clock = DeviceClock(board.tick_s)
-        self._inertial = Inertial(board, settings.imu)
-        self._tally = Tally()
         self._heard_at = self._came_at = self._commanded_at = -math.inf
         self._silent = False
-        self._heading_assumed = False
         self._watch = Watch()
-        self._advice: str | None = None
-        self._gravity_told = False
-        self._lost_news, self._refused_news = News(), News()
+        self._bulletin = Bulletin()
         self._events: list[Event] = []
         self._shown = (self.state, self.estop_active)
 
@@ -129,26 +123,22 @@ class Session:
     @property
     def lost(self) -> int:
         """Displacements that were lost on the line since the driver began."""
-        return self._tally.lost_displacements
+        return self._measuring.tally.lost_displacements
 
     @property
     def refused(self) -> Refused:
         """What the wire said and nobody was told."""
-        imu, displacements = (
-            self._plausibility.refused_imu,
-            self._plausibility.refused_displacements,
-        )
-        return Refused(imu, displacements, self._odometry.refused_poses)
+        return self._measuring.refused
 
     def figures(self, now: float) -> SessionFigures:
         """All that is counted and measured."""
         current = self._commands.current
         return SessionFigures(
             state=self.state,
-            tally=replace(self._tally),
+            tally=replace(self._measuring.tally),
             board=self._board.figures,
             refused=self.refused,
-            skew_ppm=self._clock.skew_ppm,
+            skew_ppm=self._measuring.skew_ppm,
             commands=CommandFigures(
                 source=current.authority.value if current else None,
                 age_s=now - self._commanded_at,
@@ -184,16 +174,14 @@ class Session:
         """New settings, from the next command and frame on."""
         self._helm.limits = settings.limits
         self._commands.settings = settings.commands
-        self._odometry.settings = settings.odometry
-        self._plausibility.limits = settings.motion
-        self._inertial.configure(settings.imu)
+        self._measuring.configure(settings.odometry, settings.motion, settings.imu)
 
     def opened(self, now: float) -> None:
         """The port is open."""
         self._board.connect()
         self._commands.discard()
         self._watch.begin()
-        self._clock.restart()
+        self._measuring.restart()
         self._silent, self._heard_at, self._came_at = False, now, -math.inf
         self._supervisor.opened(now)
         if self.estop_active:
@@ -202,7 +190,7 @@ class Session:
     def closed(self, now: float) -> None:
         """The port is gone."""
         self._take_in(self._board.flush(now), now)
-        self._measure(self._plausibility.release(), now)
+        self._react(self._measuring.release(), now)
         self._supervisor.closed()
         self._inertial.calibration.give_up(
             "the port was lost meanwhile; call again once it is back"
@@ -223,11 +211,11 @@ class Session:
             self._commands.halt(now)
         if not self._silent and now - self._heard_at >= SILENCE_S:
             self._silent = True
-            self._measure(self._plausibility.release(), now)
-            self._notify(self._why_silent())
+            self._react(self._measuring.release(), now)
+            self._notify(why_silent(SILENCE_S, bytes_came=self._came_at > self._heard_at))
             if self._board.mode is not Mode.UNKNOWN:
                 self._board.silence()
-                self._clock.restart()
+                self._measuring.restart()
                 self._commands.halt(now)
                 self._supervisor.heard_nothing(now)
         self._supervisor.tick(now)
@@ -346,50 +334,31 @@ class Session:
         return self._supervisor.phase is Phase.CLOSED
 
     def _take_in(self, readings: list[Reading], now: float) -> None:
-        stamps_s = self._clock.stamps(readings, now, self._board.newest)
+        measured = self._measuring.take_in(readings, now)
         if not readings:
             return
         self._heard_at, self._silent = now, False
-        self._tally.read(now - stamps_s[-1])
-        for reading, stamp_s in zip(readings, stamps_s, strict=True):
-            self._tally.hear(reading)
-            self._measure(self._plausibility.admit(reading, stamp_s), now)
-        self._check_goal([], now)
+        self._react(measured, now)
         self._tell(now)
-        if self._board.advice != self._advice and self._board.advice is not None:
-            self._advice = self._board.advice
-            self._notify(self._advice)
-        if self._odometry.heading_assumed and not self._heading_assumed:
-            self._heading_assumed = True
-            self._notify(
-                "the board sends no pose that makes sense: its heading is assumed to have been 0"
-                " at first"
-            )
         if self._board.mode.running and not isinstance(readings[-1], PausedReading):
             self._supervisor.heard_data(now)
 
-    def _measure(self, readings: list[Stamped], now: float) -> None:
-        for reading, stamp_s in readings:
+    def _react(self, measured: list[Measured], now: float) -> None:
+        for reading, estimates in measured:
+            self._events += estimates
             match reading:
-                case ImuReading():
-                    self._events.append(self._inertial.estimate(reading, stamp_s))
                 case DisplacementReading(restarted=restarted):
-                    self._inertial.displaced(reading)
                     self._look(reading, now)
-                    estimates = self._odometry.displace(reading, stamp_s)
-                    self._events += estimates
                     self._check_goal(estimates, now)
                     if restarted:
                         self._commands.halt(now)
-                case PoseReading(restarted=restarted):
-                    self._events += self._odometry.settle(reading)
-                    if restarted:
-                        self._commands.halt(now)
+                case PoseReading(restarted=True):
+                    self._commands.halt(now)
                 case PausedReading(continues):
                     self._commands.discard()
                     self._watch.begin()
-                    self._clock.restart()
                     self._supervisor.heard_paused(now, continues=continues)
+        self._check_goal([], now)
 
     def _look(self, reading: DisplacementReading, now: float) -> None:
         if not self._obeys:
@@ -400,46 +369,34 @@ class Session:
         if finding and self._watch.is_news(finding):
             self._notify(finding.value)
 
-    def _check_goal(self, estimates: Sequence[OdometryEstimate], now: float) -> None:
+    def _check_goal(self, estimates: Sequence[Estimate], now: float) -> None:
         """Drop a goal that is another place by now, or that the robot drives away from."""
         goal = self._commands.current
         if not isinstance(goal, GoalMotion):
             return
         if goal.alignment != self._odometry.alignments:
             why = "odom begins anew"
-        elif any(goal.is_left_by(estimate.pose) for estimate in estimates):
+        elif any(
+            goal.is_left_by(estimate.pose)
+            for estimate in estimates
+            if isinstance(estimate, OdometryEstimate)
+        ):
             why = "the robot drives away from it: does the board's switch stand on position?"
         else:
             return
         self._commands.halt(now)
         self._notify(f"the goal of cmd_pose is discarded: {why}")
 
-    def _why_silent(self) -> str:
-        if self._came_at > self._heard_at:
-            return (
-                f"nothing that comes in makes sense for {SILENCE_S:g} s: check the parameter"
-                " `baudrate`, the cable, and that it is this board"
-            )
-        return (
-            f"nothing comes from the board for {SILENCE_S:g} s: check its power and the cable,"
-            " and that `port` is its port"
-        )
-
     def _tell(self, now: float) -> None:
-        if lost := self._lost_news.since_told(self.lost, now):
-            self._notify(f"{lost} odometry frames were lost on the line: check cable and hub")
-        refused = self.refused
-        total = refused.imu + refused.displacements + refused.poses
-        if more := self._refused_news.since_told(total, now):
-            self._notify(
-                f"{more} readings cannot be true and were refused (in all {refused.imu} imu,"
-                f" {refused.displacements} odometry, {refused.poses} poses): the line changes bits,"
-                " or a limit of motion is set too low"
-            )
-        advice = self._inertial.advice
-        if advice and not self._gravity_told:
-            self._notify(advice)
-        self._gravity_told = bool(advice)
+        bulletin, board, odometry = self._bulletin, self._board, self._odometry
+        once = [board.advice] if board.advice is not None else []
+        once += [HEADING_ASSUMED] if odometry.heading_assumed else []
+        for sentence in (
+            *bulletin.counted(self.lost, self.refused, now),
+            *bulletin.standing(self._inertial.advice),
+            *bulletin.once(once),
+        ):
+            self._notify(sentence)
 
     def _notify(self, text: str) -> None:
         self._events.append(Notice(text))
