@@ -216,6 +216,15 @@ def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
     assert found + made.feed(b"Paused: 0 \n", 0.7) == [*shock, PausedFrame(0)]
 
 
+def test_a_knock_right_before_a_silence_is_delivered() -> None:
+    """Out of the calm, with an adapter's pause within it: its end is where the line falls silent."""
+    made = FrameDecoder()
+    made.feed(LEAD_IN + 300 * encode(REST), 0.0)
+    knock = ImuFrame((-2683, 3744, -16377), (0, 1, 1949))
+    found = made.feed(encode(knock)[:-3], 0.016) + made.feed(encode(knock)[-3:], 0.032)
+    assert found + made.feed(b"Paused: 0 \n", 0.95) == [knock, PausedFrame(0)]
+
+
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
     """One byte of waiting, not one frame."""
     made = FrameDecoder()

@@ -7,6 +7,9 @@ from truth import Chunks, Key, Received
 
 Feed = Callable[[bytes, float], list[Key]]
 
+MOST_DROPPED = 30
+"""Intact frames that a parser leaves out in a row, unless what follows shows that it did: a false
+frame may read as a true one that is still to come."""
 REACH_BYTES = 600
 """A frame that comes out was sent within so many bytes before the end of what was handed over,
 or within the read itself."""
@@ -60,14 +63,16 @@ def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
         if found:
             horizon = _origin(origins, end - 1)
             nearest = _origin(origins, max(0, start - REACH_BYTES)) - 300
-            for key in found:
-                at = next_frame
-                while at < len(frames) and frames[at][2] < nearest:
-                    at += 1
-                while at < len(frames) and frames[at][1] <= horizon and frames[at][0] != key:
-                    at += 1
+            for number, key in enumerate(found):
+                first = next_frame
+                while first < len(frames) and frames[first][2] < nearest:
+                    first += 1
+                at = _place(received, key, first, horizon)
+                if sum(intact[first:at]) > MOST_DROPPED and number + 1 < len(found):
+                    after = _place(received, found[number + 1], at + 1, horizon)
+                    at = at if sum(intact[at + 1 : after]) <= MOST_DROPPED else len(frames)
                 score.out += 1
-                if at < len(frames) and frames[at][1] <= horizon:
+                if at < len(frames):
                     got[at] = 1
                     score.delivered += intact[at]
                     next_frame = at + 1
@@ -80,6 +85,14 @@ def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
     score.texts_delivered = sum(text and bool(g) for text, g in zip(texts, got, strict=True))
     score.missed_beyond_two = int(not all(whole[2:]))
     return score
+
+
+def _place(received: Received, key: Key, at: int, horizon: int) -> int:
+    """The next frame with this content, among those sent by then; beyond the last if none is."""
+    frames = received.truth.frames
+    while at < len(frames) and frames[at][1] <= horizon and frames[at][0] != key:
+        at += 1
+    return at if at < len(frames) and frames[at][1] <= horizon else len(frames)
 
 
 def _origin(origins: list[int], at: int) -> int:

@@ -42,6 +42,8 @@ KNOWN_GAP: Final = 11.0
 frame; not enough to forget that it may be the pause that deceives."""
 CUT_SHORT: Final = 6.0
 """The line was closed within a frame."""
+ENDS_IN_NOISE: Final = 2.0
+"""The line falls silent within a bad run, though it does so behind frames, ten bytes or so long."""
 
 # What the board sends. An IMU frame that is no look-alike adds up to 6.5 at the most, a delta or a
 # pose to 4.5.

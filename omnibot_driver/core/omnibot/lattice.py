@@ -113,9 +113,10 @@ class _Search:
                 price += evidence.BAD_RUN if header else evidence.BAD_RUN + evidence.BAD_TAIL
                 self._edge(boundary, bad + 2, price, None, self._contexts[boundary].damaged())
                 self._frames_from(at, closed)
-        for node in (2 * size, 2 * size + 1):
+        unexplained = evidence.ENDS_IN_NOISE if closed else 0.0
+        for node, price in ((2 * size, unexplained), (2 * size + 1, 0.0)):
             if cost[node] < inf:
-                self._edge(node, self._end, 0.0)
+                self._edge(node, self._end, price)
 
     def _frames_from(self, at: int, closed: bool) -> None:
         data, size = self._data, len(self._data)
