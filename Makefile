@@ -36,7 +36,7 @@ demo: $(VENV)/.runtime  ## drive a square on a simulated board, until ctrl-C or 
 	@$(PY) -m omnibot_driver.demo
 
 test: lint  ## run every check and test
-	$(PY) -m pytest
+	$(PY) -m pytest -n 2 --dist loadfile  # two files at a time: most tests wait for real time
 
 integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), into docs/integrity.md
 	$(PY) test/integrity/report.py

@@ -14,7 +14,7 @@ setup(
     maintainer_email="maintainers@example.org",
     license="Apache-2.0",
     python_requires=">=3.11",
-    install_requires=["pyserial"],
+    install_requires=["pyserial", "PyYAML"],
     extras_require={"replay": ["rosbags"]},
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={NAME: ["py.typed"]},

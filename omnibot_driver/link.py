@@ -17,6 +17,7 @@ from typing import Final, TypeVar
 
 from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.session import Event, Notice, OnExit, Session
+from omnibot_driver.core.snapshot import LinkFigures, SessionFigures
 from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
 from omnibot_driver.port import Port
 from omnibot_driver.standstill import Standstill
@@ -53,6 +54,9 @@ class Link:
         on_write: Callable[[bytes], None] = lambda _data: None,
     ) -> None:
         self._session = session
+        self._url = url
+        self._trouble = ""
+        self._opened = self._received = self._sent = 0
         self._open = partial(Port, url, baudrate)
         self._last_words = last_words
         self.reconnect_interval_s = self._wait_s = reconnect_interval_s
@@ -107,6 +111,18 @@ class Link:
 
         self.call(unless_it_waited)
 
+    def figures(self) -> tuple[LinkFigures, SessionFigures]:
+        """All that is counted and measured, at one moment."""
+        with self._changed:
+            link = LinkFigures(
+                port=self._url,
+                trouble=self._trouble,
+                opened=self._opened,
+                received_bytes=self._received,
+                sent_bytes=self._sent,
+            )
+            return link, self._session.figures(time.monotonic())
+
     def close(self, on_exit: OnExit) -> None:
         """Stop the robot, then end the threads and close the port; harmless to repeat."""
         with self._changed:
@@ -136,7 +152,8 @@ class Link:
                     finally:
                         self._detach()
             except LinkError as error:
-                self._report(str(error))
+                self._trouble = str(error)
+                self._report(self._trouble)
                 self._closing.wait(self._wait_s)
                 longest_s = max(LONGEST_WAIT_S, self.reconnect_interval_s)
                 self._wait_s = min(BACK_OFF * self._wait_s, longest_s)
@@ -145,6 +162,8 @@ class Link:
         keeper, notices = self._guarded(port)
         with self._changed:
             self._port, self._write_error, self._keeper = port, None, keeper
+            self._trouble = ""
+            self._opened += 1
             self._session.opened(time.monotonic())
             events = [*notices, *self._settle()]
         self._deliver(events)
@@ -168,6 +187,7 @@ class Link:
                 if not data:
                     continue
                 self._wait_s = self.reconnect_interval_s
+                self._received += len(data)
                 now = time.monotonic()
                 self._heed_standstill(now)
                 self._session.receive(data, now)
@@ -235,6 +255,7 @@ class Link:
             return
         try:
             self._port.write(data)
+            self._sent += len(data)
         except LinkError as error:
             self._write_error = error
             self._interrupt()

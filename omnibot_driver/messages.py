@@ -6,33 +6,38 @@ orientation).
 
 import math
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Point, Quaternion, Vector3
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point, Quaternion, Transform, TransformStamped, Vector3
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header, UInt8MultiArray
 
+from omnibot_driver.core.diagnosis import Status
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
 from omnibot_driver.core.limits import require_finite
 from omnibot_driver.core.odometry import OdometryEstimate
 from omnibot_driver.core.se2 import Pose
-from omnibot_driver.core.session import ImuEstimate
 
 UNMEASURED_VARIANCE: Final = 1e6
 """For z, roll and pitch, of which a planar odometry says nothing, and for a twist not known."""
 SHORTEST_QUATERNION: Final = 1e-3
 MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
+WHEEL_JOINTS: Final = ("wheel_a_joint", "wheel_b_joint", "wheel_c_joint")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MessageSettings:
-    """Frames, and standard deviations that the covariances are made of (SI units)."""
+    """Frames, prefix included; standard deviations that the covariances are made of (SI units);
+    and the wheels.
+    """
 
     odom_frame: str
     base_frame: str
@@ -41,18 +46,21 @@ class MessageSettings:
     angular_velocity_stddev: float
     twist_linear_stddev: float
     twist_angular_stddev: float
+    wheels: OmniKinematics
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any]) -> "MessageSettings":
         """From checked parameter values."""
+        prefix = values["frame_prefix"]
         return cls(
-            odom_frame=values["odom_frame"],
-            base_frame=values["base_frame"],
-            imu_frame=values["imu_frame"],
+            odom_frame=prefix + values["odom_frame"],
+            base_frame=prefix + values["base_frame"],
+            imu_frame=prefix + values["imu_frame"],
             acceleration_stddev=values["linear_acceleration_stddev"],
             angular_velocity_stddev=values["angular_velocity_stddev"],
             twist_linear_stddev=values["twist_linear_stddev"],
             twist_angular_stddev=values["twist_angular_stddev"],
+            wheels=OmniKinematics(values["wheel_radius"], values["base_radius"]),
         )
 
 
@@ -95,6 +103,50 @@ def odometry_message(
         linear, angular = settings.twist_linear_stddev**2, settings.twist_angular_stddev**2
     message.twist.covariance = _planar(linear, 0.0, 0.0, linear, 0.0, angular)
     return message
+
+
+def transform_message(odometry: Odometry) -> TransformStamped:
+    """``/tf``: where this odometry says that the base is, at its own stamp."""
+    pose = odometry.pose.pose
+    at = pose.position
+    return TransformStamped(
+        header=odometry.header,
+        child_frame_id=odometry.child_frame_id,
+        transform=Transform(translation=Vector3(x=at.x, y=at.y, z=at.z), rotation=pose.orientation),
+    )
+
+
+def joint_state_message(
+    estimate: OdometryEstimate, stamp: Time, settings: MessageSettings
+) -> JointState:
+    """``joint_states``: the wheels' angles, unwrapped, and rates; no rates where none are known."""
+    rolled, rolling = estimate.rolled, estimate.rolling
+    as_twist = BodyTwist(rolled.x_m, rolled.y_m, rolled.yaw_rad)
+    return JointState(
+        header=Header(stamp=stamp),
+        name=WHEEL_JOINTS,
+        position=settings.wheels.wheel_rates(as_twist),
+        velocity=settings.wheels.wheel_rates(rolling) if rolling else [],
+    )
+
+
+def diagnostic_message(
+    statuses: Sequence[Status], stamp: Time, node_name: str, hardware_id: str
+) -> DiagnosticArray:
+    """``/diagnostics``, with names as diagnostic_updater makes them."""
+    return DiagnosticArray(
+        header=Header(stamp=stamp),
+        status=[
+            DiagnosticStatus(
+                level=bytes([status.level]),
+                name=f"{node_name}: {status.name}",
+                message=status.message,
+                hardware_id=hardware_id,
+                values=[KeyValue(key=key, value=value) for key, value in status.values.items()],
+            )
+            for status in statuses
+        ],
+    )
 
 
 def body_twist(twist: Any) -> BodyTwist:

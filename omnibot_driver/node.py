@@ -11,6 +11,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import rclpy
@@ -28,26 +29,29 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float32MultiArray, String, UInt8MultiArray
 from std_srvs.srv import SetBool, Trigger
 
-from omnibot_driver import messages, parameters
+from omnibot_driver import calibration, messages, parameters, selfcheck
+from omnibot_driver.core.diagnosis import Refusals
 from omnibot_driver.core.errors import CommandRefused, ParameterError, RequestRefused
+from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.odometry import OdometryEstimate
 from omnibot_driver.core.omnibot import OmniBot
 from omnibot_driver.core.session import (
     Event,
-    ImuEstimate,
     Notice,
     RequestDone,
     Session,
     StateChanged,
 )
 from omnibot_driver.core.supervisor import Request
+from omnibot_driver.diagnostics import Diagnostics
 from omnibot_driver.link import Link
 from omnibot_driver.recording import is_recording, open_recording
 from omnibot_driver.replay import Replay
+from omnibot_driver.transforms import transform_publisher
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 RAW_DEPTH = 1000
@@ -81,6 +85,7 @@ class OmniBotDriver(Node):
         self._state_lock = threading.Lock()
         self._told: set[str] = set()
         self._refused_at_s: dict[str, float] = {}
+        self._refusals = Refusals()
         self._clock_offset_ns = 0
         self._handlers: dict[type, Callable[[Any, int], None]] = {
             ImuEstimate: self._publish_imu,
@@ -92,6 +97,11 @@ class OmniBotDriver(Node):
         self._link = self._make_link()
         self._create_publishers()
         self._create_inputs()
+        port = self._values["port"]
+        if isinstance(self._link, Link):  # a recording is no link to be judged
+            self._diagnostics = Diagnostics(self, self._link, lambda: self._refusals, port)
+        if advice := selfcheck.clock_advice(port, self.get_parameter("use_sim_time").value):
+            self.get_logger().warning(advice)
         self._publish_state()
         self._link.start()
 
@@ -143,6 +153,8 @@ class OmniBotDriver(Node):
             if not NOT_OURS.fullmatch(name)
         }
         values = parameters.check_all(given)
+        if file := values["calibration_file"]:
+            values |= calibration.load(Path(file).expanduser())
         for parameter in parameters.PARAMETERS:
             self.declare_parameter(
                 parameter.name,
@@ -177,6 +189,8 @@ class OmniBotDriver(Node):
     def _create_publishers(self) -> None:
         self._imu = self.create_publisher(Imu, "imu/data_raw", 10)
         self._odometry = self.create_publisher(Odometry, "odom", 10)
+        self._joints = self.create_publisher(JointState, "joint_states", 10)
+        self._send_transform = transform_publisher(self) if self._values["publish_tf"] else None
         self._state = self.create_publisher(String, "~/state", LATCHED)
         self._estop_active = self.create_publisher(Bool, "~/estop_active", LATCHED)
         self._published: tuple[str, bool] | None = None
@@ -219,7 +233,11 @@ class OmniBotDriver(Node):
 
     def _publish_odometry(self, estimate: OdometryEstimate, clock_offset_ns: int) -> None:
         stamp = messages.time_message(round(estimate.stamp_s * 1e9) + clock_offset_ns)
-        self._odometry.publish(messages.odometry_message(estimate, stamp, self._message_settings))
+        odometry = messages.odometry_message(estimate, stamp, self._message_settings)
+        self._odometry.publish(odometry)
+        if self._send_transform is not None:
+            self._send_transform(messages.transform_message(odometry))
+        self._joints.publish(messages.joint_state_message(estimate, stamp, self._message_settings))
 
     def _publish_state(self) -> None:
         """Latched topics show what is so now, whichever thread says so last."""
@@ -249,6 +267,9 @@ class OmniBotDriver(Node):
         if trouble is None:
             if self._is_news(text := f"port {self._values['port']} is open"):
                 self.get_logger().info(text)
+            advice = selfcheck.latency_advice(self._values["port"])
+            if advice and self._is_news(advice):
+                self.get_logger().warning(advice)
         elif self._is_news(trouble):
             self.get_logger().error(f"{trouble} (retrying)")
 
@@ -275,6 +296,9 @@ class OmniBotDriver(Node):
         self.create_service(Trigger, "~/start", self._on_start, callback_group=waiting)
         self.create_service(SetBool, "~/pause", self._on_pause, callback_group=waiting)
         self.create_service(Trigger, "~/reset", self._on_reset, callback_group=waiting)
+        self.create_service(
+            Trigger, "~/calibrate_gyro", self._on_calibrate_gyro, callback_group=waiting
+        )
 
     def _on_twist(self, twist: Twist, info: MessageInfo) -> None:
         self._command(
@@ -313,6 +337,7 @@ class OmniBotDriver(Node):
         try:
             self._link.command(action, info["source_timestamp"])
         except CommandRefused as error:
+            self._refusals = Refusals(count=self._refusals.count + 1, last=str(error))
             self._warn_of_refusal(str(error))
 
     def _warn_of_refusal(self, text: str) -> None:
@@ -343,22 +368,59 @@ class OmniBotDriver(Node):
     async def _on_start(
         self, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        return await self._ask(Request.START, response)
+        return await self._request(Request.START, response)
 
     async def _on_pause(
         self, request: SetBool.Request, response: SetBool.Response
     ) -> SetBool.Response:
-        return await self._ask(Request.PAUSE if request.data else Request.START, response)
+        return await self._request(Request.PAUSE if request.data else Request.START, response)
 
     async def _on_reset(
         self, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        return await self._ask(Request.RESET, response)
+        return await self._request(Request.RESET, response)
 
-    async def _ask(self, request: Request, response: Any) -> Any:
+    async def _on_calibrate_gyro(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        await self._ask(Session.calibrate_gyro, response)
+        if response.success:
+            bias = list(self._link.call(lambda session, _now: session.gyro_bias))
+            self.set_parameters([rclpy.Parameter("gyro_bias", value=bias)])
+            if file := self._values["calibration_file"]:
+                await self._save(Path(file).expanduser(), bias, response)
+        return response
+
+    async def _save(self, file: Path, bias: list[float], response: Trigger.Response) -> None:
+        """On a thread of its own: a disk may take its time, and nobody else is to wait for it."""
+        answer = Future()
+
+        def save() -> None:
+            try:
+                calibration.save(file, {"gyro_bias": bias})
+                answer.set_result("")
+            except Exception as error:  # whoever asked is owed an answer
+                answer.set_result(str(error))
+            if self.executor is not None:
+                self.executor.wake()
+
+        threading.Thread(target=save, name="omnibot-save", daemon=True).start()
+        trouble = await answer
+        if trouble:
+            response.success = False
+            response.message += f"; it is applied, but not saved: {trouble}"
+        else:
+            response.message += f"; saved to {file}"
+
+    async def _request(self, request: Request, response: Any) -> Any:
+        return await self._ask(
+            lambda session, answer, now: session.request(request, answer, now), response
+        )
+
+    async def _ask(self, question: Callable[[Session, Future, float], None], response: Any) -> Any:
         answer = Future()
         try:
-            self._link.call(lambda session, now: session.request(request, answer, now))
+            self._link.call(lambda session, now: question(session, answer, now))
         except RequestRefused as error:
             response.success, response.message = False, str(error)
             return response

@@ -9,9 +9,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, GYRO_COUNTS_PER_DPS, ImuScale
+from omnibot_driver.core.inertial import ImuCorrection
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBotSettings
@@ -19,14 +21,15 @@ from omnibot_driver.core.plausibility import MotionLimits
 from omnibot_driver.core.session import SessionSettings
 from omnibot_driver.core.uncertainty import OdometryNoise
 
-Value = bool | int | float | str | list[int]
+Value = bool | int | float | str | list[int] | list[float]
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """One row of the table. The default's type is the parameter's type.
 
-    ``low`` and ``high`` are inclusive; ``fixed`` means: given at start, read-only afterwards.
+    ``low`` and ``high`` are inclusive, for each number of a list; ``fixed`` means: given at start,
+    read-only afterwards. A list is of three, signs where the default's are integers.
     """
 
     name: str
@@ -44,7 +47,8 @@ class Parameter:
         if self.choices:
             return "one of " + ", ".join(map(str, self.choices))
         if self.low is not None:
-            return f"{self.low:.10g} to {self.high:.10g} {self.unit}".rstrip()
+            each = "each " if isinstance(self.default, list) else ""
+            return f"{each}{self.low:.10g} to {self.high:.10g} {self.unit}".rstrip()
         return ""
 
     def check(self, value: object) -> Value:
@@ -58,9 +62,7 @@ class Parameter:
         if type(value) is not type(self.default):
             raise self._refusal(value, f"a value of type {type(self.default).__name__}")
         if isinstance(value, list):
-            if len(value) != 3 or any(item not in (1, -1) for item in value):
-                raise self._refusal(value, "three numbers, each 1 or -1")
-            return [int(item) for item in value]
+            return self._check_three(value)
         assert isinstance(value, bool | int | float | str)
         if self.choices and value not in self.choices:
             raise self._refusal(value, self.allowed)
@@ -68,7 +70,20 @@ class Parameter:
             raise self._refusal(value, self.allowed)
         if self.name.endswith("_frame") and (not value or str(value).startswith("/")):
             raise self._refusal(value, "a frame name without a leading slash")
+        if self.name == "frame_prefix" and str(value).startswith("/"):
+            raise self._refusal(value, "a prefix without a leading slash, such as robot1/")
         return value
+
+    def _check_three(self, value: list[Any]) -> list[int] | list[float]:
+        assert isinstance(self.default, list)
+        if type(self.default[0]) is int:
+            if len(value) != 3 or any(item not in (1, -1) for item in value):
+                raise self._refusal(value, "three numbers, each 1 or -1")
+            return [int(item) for item in value]
+        numbers = all(type(item) in (int, float) for item in value)
+        if len(value) != 3 or not numbers or not all(map(self._in_range, value)):
+            raise self._refusal(value, f"three numbers, {self.allowed}")
+        return [float(item) for item in value]
 
     def _in_range(self, value: bool | int | float | str) -> bool:
         if self.low is None or self.high is None or isinstance(value, str):
@@ -276,6 +291,20 @@ PARAMETERS: Final = (
     Parameter("base_frame", "base_link", "", "Frame that the odometry moves.", fixed=True),
     Parameter("imu_frame", "imu_link", "", "Frame of the IMU's axes.", fixed=True),
     Parameter(
+        "frame_prefix",
+        "",
+        "",
+        "Put before every frame name as it is, like robot_state_publisher's; for example robot1/.",
+        fixed=True,
+    ),
+    Parameter(
+        "publish_tf",
+        True,
+        "",
+        "Publish the transform from odom_frame to base_frame on /tf; false with an EKF that does.",
+        fixed=True,
+    ),
+    Parameter(
         "wheel_radius",
         0.029,
         "m",
@@ -356,6 +385,37 @@ PARAMETERS: Final = (
         "°/s",
         "Full scale that the gyro is set to.",
         choices=tuple(GYRO_COUNTS_PER_DPS),
+        fixed=True,
+    ),
+    Parameter(
+        "gyro_bias",
+        [0.0, 0.0, 0.0],
+        "rad/s",
+        "What the gyro reads at rest, in its own axes; taken off. The service ~/calibrate_gyro"
+        " finds it.",
+        low=-1.0,
+        high=1.0,
+    ),
+    Parameter(
+        "accel_bias",
+        [0.0, 0.0, 0.0],
+        "m/s²",
+        "What the accelerometer reads too much, in its own axes; taken off.",
+        low=-5.0,
+        high=5.0,
+    ),
+    Parameter(
+        "auto_gyro_bias",
+        False,
+        "",
+        "Refine the gyro's bias slowly whenever the robot stands still. Not where the floor turns.",
+    ),
+    Parameter(
+        "calibration_file",
+        "",
+        "",
+        "YAML file that ~/calibrate_gyro writes; the gyro_bias and accel_bias in it replace those"
+        " given here.",
         fixed=True,
     ),
     Parameter(
@@ -512,4 +572,14 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
             fastest_radps2=values["fastest_angular_acceleration"],
             force_step_mps2=values["largest_force_step"],
         ),
+        imu=ImuCorrection(
+            gyro_bias=_vector(values["gyro_bias"]),
+            accel_bias=_vector(values["accel_bias"]),
+            auto_gyro_bias=values["auto_gyro_bias"],
+        ),
     )
+
+
+def _vector(numbers: list[float]) -> Vector3:
+    x, y, z = numbers
+    return x, y, z

@@ -70,6 +70,24 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
     link.close("stop")
 
 
+def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: Path) -> None:
+    """Why it cannot be had, how often it could, what went through it."""
+    listener, name = Listener(), tmp_path / "board"
+    link = link_to(str(name), listener, session())
+    link.start()
+    listener.wait_for(lambda: listener.reports)
+    figures, _ = link.figures()
+    assert (figures.port, figures.opened) == (str(name), 0)
+    assert "does not exist" in figures.trouble
+    name.symlink_to(board.path)
+    listener.wait_for(lambda: len(listener.events) >= 50)
+    figures, measured = link.figures()
+    link.close("stop")
+    assert (figures.trouble, figures.opened) == ("", 1)
+    assert figures.received_bytes >= 14 * measured.tally.imu > 0
+    assert figures.sent_bytes >= len(bytes(8) + STOP)
+
+
 def test_closing_writes_stop_and_ends_the_threads(board: PtyBoard) -> None:
     """Also when it is closed twice."""
     listener, ours = Listener(), session()

@@ -10,14 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver import messages, parameters
+from omnibot_driver.core.diagnosis import Level, Status
 from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.odometry import OdometryEstimate
 from omnibot_driver.core.se2 import Pose
-from omnibot_driver.core.session import ImuEstimate
 from omnibot_driver.core.uncertainty import Covariance
 
 SETTINGS = messages.MessageSettings.from_parameters(parameters.check_all({}))
+PREFIXED = messages.MessageSettings.from_parameters(
+    parameters.check_all({"frame_prefix": "robot1/"})
+)
 STAMP = messages.time_message(1_700_000_000_123_456_789)
 
 
@@ -162,6 +166,70 @@ def test_an_imu_message_has_no_orientation() -> None:
     assert (rate.x, rate.y, rate.z) == (0.1, 0.2, 0.3)
     assert message.linear_acceleration_covariance[[0, 4, 8]] == pytest.approx(0.028**2)
     assert message.angular_velocity_covariance[[0, 4, 8]] == pytest.approx(0.00087**2)
+
+
+poses = st.builds(Pose, *[st.floats(-1e4, 1e4)] * 3)
+
+
+@given(poses)
+def test_the_transform_is_the_odometrys_pose_between_the_same_frames(pose: Pose) -> None:
+    """At the same time; tf has no covariance."""
+    odometry = messages.odometry_message(
+        OdometryEstimate(0.0, pose, None, Covariance()), STAMP, PREFIXED
+    )
+    transform = messages.transform_message(odometry)
+    assert transform.header == odometry.header
+    assert transform.header.frame_id == "robot1/odom"
+    assert transform.child_frame_id == odometry.child_frame_id == "robot1/base_link"
+    at, position = transform.transform.translation, odometry.pose.pose.position
+    assert (at.x, at.y, at.z) == (position.x, position.y, position.z) == (pose.x_m, pose.y_m, 0.0)
+    assert transform.transform.rotation == odometry.pose.pose.orientation
+
+
+def test_every_frame_has_the_prefix_as_it_is() -> None:
+    """Nothing is put between, as robot_state_publisher does it."""
+    assert PREFIXED.odom_frame == "robot1/odom"
+    assert PREFIXED.base_frame == "robot1/base_link"
+    estimate = ImuEstimate(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert messages.imu_message(estimate, STAMP, PREFIXED).header.frame_id == "robot1/imu_link"
+    assert messages.goal_pose(goal(frame="robot1/odom"), PREFIXED.odom_frame) == Pose()
+
+
+def test_joint_states_are_the_manuals_wheels() -> None:
+    """A metre ahead at 0.1 m/s: A back, B forth, C not at all; in rad and rad/s, of r = 29 mm."""
+    estimate = OdometryEstimate(
+        0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), BodyTwist(0.1, 0.0, 0.0)
+    )
+    message = messages.joint_state_message(estimate, STAMP, SETTINGS)
+    assert message.header.stamp == STAMP
+    assert list(message.name) == ["wheel_a_joint", "wheel_b_joint", "wheel_c_joint"]
+    turned = 0.8660254037844386 / 0.029
+    assert list(message.position) == pytest.approx([-turned, turned, 0.0])
+    assert list(message.velocity) == pytest.approx([-turned / 10, turned / 10, 0.0])
+    assert not message.effort
+
+
+def test_joints_whose_rate_is_not_known_have_none() -> None:
+    """As sensor_msgs wants it: an empty array, not zeros."""
+    estimate = OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), None)
+    message = messages.joint_state_message(estimate, STAMP, SETTINGS)
+    assert len(message.position) == 3
+    assert not message.velocity
+
+
+def test_diagnostics_are_named_as_by_diagnostic_updater() -> None:
+    """Node, colon, task; the level is a byte."""
+    statuses = [
+        Status("Link", Level.OK, "connected", {"Port": "p"}),
+        Status("IMU", Level.STALE, "nothing", {}),
+    ]
+    message = messages.diagnostic_message(statuses, STAMP, "omnibot_driver", "/dev/ttyUSB0")
+    assert message.header.stamp == STAMP
+    link, imu = message.status
+    assert (link.name, link.level, link.message) == ("omnibot_driver: Link", b"\0", "connected")
+    assert link.hardware_id == imu.hardware_id == "/dev/ttyUSB0"
+    assert [(value.key, value.value) for value in link.values] == [("Port", "p")]
+    assert imu.level == b"\3"
 
 
 @given(st.floats(-1e4, 1e4))

@@ -52,11 +52,20 @@ PROMISED: dict[str, object] = {
     "use_board_pose": True,
     "accel_range": 2,
     "gyro_range": 250,
+    "frame_prefix": "",
+    "publish_tf": True,
+    "gyro_bias": [0.0, 0.0, 0.0],
+    "accel_bias": [0.0, 0.0, 0.0],
+    "auto_gyro_bias": False,
+    "calibration_file": "",
     "publish_raw": False,
 }
 """Names and defaults that users rely on."""
 
-RANGED = [parameter for parameter in PARAMETERS if parameter.low is not None]
+VECTORS = [BY_NAME["gyro_bias"], BY_NAME["accel_bias"]]
+RANGED = [
+    parameter for parameter in PARAMETERS if parameter.low is not None and parameter not in VECTORS
+]
 FLOATS = [parameter for parameter in PARAMETERS if isinstance(parameter.default, float)]
 CHOICES = [parameter for parameter in PARAMETERS if parameter.choices]
 FRAMES = [parameter for parameter in PARAMETERS if parameter.name.endswith("_frame")]
@@ -149,8 +158,8 @@ WRONG_TYPES: dict[type, list[object]] = {
     float: [True, "0.5", None, [0.5], b"1"],
     str: [1, 1.0, True, None, ["a"], b"a"],
     list: [
-        1, "111", None, True, b"111", [], [1, 1], [1, 1, 1, 1], [1, 0, 1], [1, 2, 1], [1, 1, 0.5],
-        [1, 1, math.nan], ["1", "1", "1"], [None, 1, 1], [[1], [1], [1]],
+        1, "111", None, True, b"111", [], [1, 1], [1, 1, 1, 1], [1, 9, 1], [1, 1, math.nan],
+        ["1", "1", "1"], [None, 1, 1], [[1], [1], [1]],
     ],
 }  # fmt: skip
 
@@ -192,6 +201,13 @@ def test_any_value_is_either_taken_in_the_right_type_or_refused(
     assert parameter.check(taken) == taken
 
 
+@pytest.mark.parametrize("wrong", [[1, 0, 1], [1, 2, 1], [1, 1, 0.5]])
+def test_axis_signs_are_nothing_but_ones(wrong: list[float]) -> None:
+    """A sign is no factor."""
+    with pytest.raises(ParameterError, match="each 1 or -1"):
+        BY_NAME["axis_signs"].check(wrong)
+
+
 @pytest.mark.parametrize("signs", [[1, -1, 1], (1, -1, 1), [1.0, -1.0, 1.0]])
 def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
     """In any sequence; integers come of it."""
@@ -209,6 +225,28 @@ def test_a_frame_name_is_not_empty_and_has_no_leading_slash(
     """tf2 takes neither."""
     with pytest.raises(ParameterError, match=f"'{parameter.name}'"):
         parameter.check(wrong)
+
+
+@pytest.mark.parametrize("wrong", ["/", "/robot1/"])
+def test_a_frame_prefix_has_no_leading_slash(wrong: str) -> None:
+    """tf2 knows no such frames; no prefix at all is one."""
+    with pytest.raises(ParameterError, match=r"'frame_prefix'.*such as robot1/"):
+        BY_NAME["frame_prefix"].check(wrong)
+    assert BY_NAME["frame_prefix"].check("robot1/") == "robot1/"
+    assert BY_NAME["frame_prefix"].check("") == ""
+
+
+@pytest.mark.parametrize("parameter", VECTORS, ids=name_of)
+def test_a_bias_is_three_numbers_each_within_its_range(parameter: Parameter) -> None:
+    """Integers will do; floats come of it."""
+    assert parameter.high is not None
+    taken = parameter.check((1, -1, 0.5))
+    assert taken == [1.0, -1.0, 0.5]
+    assert isinstance(taken, list)
+    assert all(type(number) is float for number in taken)
+    for wrong in (parameter.high + 1, -math.inf, math.nan, True, "1"):
+        with pytest.raises(ParameterError, match=f"'{parameter.name}'.*three numbers, each"):
+            parameter.check([0.0, wrong, 0.0])
 
 
 # The whole table
@@ -279,6 +317,7 @@ def test_values_reach_the_core_under_their_meaning() -> None:
             "odom_gap_acceleration": 3, "odom_gap_angular_acceleration": 4,
             "use_board_pose": False, "base_radius": 0.2, "counts_per_revolution": 1000,
             "fastest_linear_speed": 1.5, "fastest_angular_speed": 5,
+            "gyro_bias": [0.1, 0.2, 0.3], "accel_bias": [1, 2, 3], "auto_gyro_bias": True,
         }
     )  # fmt: skip
     board, session = board_settings(values), session_settings(values)
@@ -297,6 +336,8 @@ def test_values_reach_the_core_under_their_meaning() -> None:
     assert (noise.wheel_scale, noise.base_radius_m) == (0.06, 0.2)
     assert (noise.unheard_mps2, noise.unheard_radps2) == (3.0, 4.0)
     assert (noise.wheel_drift, noise.wheel_slip) == (0.03, 0.05)
+    assert (session.imu.gyro_bias, session.imu.accel_bias) == ((0.1, 0.2, 0.3), (1.0, 2.0, 3.0))
+    assert session.imu.auto_gyro_bias is True
 
 
 # The file

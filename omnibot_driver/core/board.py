@@ -87,6 +87,20 @@ class PausedReading:
 Reading = ImuReading | DisplacementReading | PoseReading | PausedReading
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardFigures:
+    """What a board's translator counts, since the driver began.
+
+    ``rates_hz``: of IMU readings, displacements and poses, as they should be; ``faults``: how often
+    the framing was lost, with ``discarded_bytes``; ``saturated``: commands that did not fit.
+    """
+
+    rates_hz: Vector3
+    faults: int = 0
+    discarded_bytes: int = 0
+    saturated: int = 0
+
+
 class Board(Protocol):
     """One kind of board. Request methods raise RequestRefused where the mode forbids them."""
 
@@ -106,6 +120,13 @@ class Board(Protocol):
         for its rest: the beginning of a sample tells when it was taken better than an end that is
         delivered late. None while the framing is in doubt, or the last read told nothing new.
         """
+
+    @property
+    def figures(self) -> BoardFigures:
+        """For whoever looks after the line."""
+
+    def gravity_advice(self, gravity_mps2: float) -> str:
+        """What such a specific force at rest says of the settings; empty where it is gravity."""
 
     @property
     def advice(self) -> str | None:

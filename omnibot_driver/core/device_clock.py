@@ -75,6 +75,11 @@ class DeviceClock:
         self._settled = False
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
 
+    @property
+    def skew_ppm(self) -> float:
+        """By how much the board's clock is faster than ours, by what has been seen so far."""
+        return 1e6 * (self._period_s / self._slope_s - 1.0)
+
     def stamps(
         self, readings: Sequence[Reading], now: float, newest: tuple[int, float] | None = (0, 0.0)
     ) -> list[float]:

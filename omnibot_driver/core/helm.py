@@ -35,6 +35,8 @@ class Helm:
         self.limits = limits
         self._board, self._odometry = board, odometry
         self._axis_signs, self._control = axis_signs, control
+        self.limited = 0
+        """Wishes that went beyond the limits."""
 
     def base(self, twist: BodyTwist, *, before: Motion | None, since: float) -> Motion:
         """Drive the body, from what was commanded ``before``."""
@@ -42,6 +44,7 @@ class Helm:
         require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
         x, y, yaw = self._axis_signs
         limited = self.limits.twist(twist)
+        self.limited += limited != twist
         return BaseMotion(
             BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps),
             self.limits,
@@ -61,6 +64,7 @@ class Helm:
             )
         require_finite("wheel_cmd", rates_radps)
         limited = self.limits.wheels(rates_radps)
+        self.limited += limited != tuple(rates_radps)
         frame = self._board.wheels(limited)
         return SteadyMotion(
             Authority.WHEELS,

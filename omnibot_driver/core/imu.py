@@ -1,4 +1,4 @@
-"""From the counts of an MPU6050 to SI units; axes stay the sensor's own.
+"""From the counts of an MPU6050 to SI units, and what gravity says of it; axes stay the sensor's.
 
 Source: MPU-6050 product specification, sections 6.1 and 6.2 (sensitivity scale factors).
 """
@@ -14,8 +14,23 @@ ACCEL_COUNTS_PER_G: Final = {2: 16384.0, 4: 8192.0, 8: 4096.0, 16: 2048.0}
 GYRO_COUNTS_PER_DPS: Final = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}
 """By full-scale range in degrees per second."""
 
+ACCEL_TOLERANCE: Final = 0.1
+"""Part of gravity by which a sound sensor may be off, its initial tolerance and bias together."""
+
 Counts = tuple[int, int, int]
 Vector3 = tuple[float, float, float]
+
+
+def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
+    """What a specific force at rest says of the settings; empty if it is gravity."""
+    if abs(gravity_mps2 / STANDARD_GRAVITY - 1.0) <= ACCEL_TOLERANCE:
+        return ""
+    wrong = f"at rest the accelerometer measures {gravity_mps2:.2f} m/s² instead of gravity: "
+    for range_g in ACCEL_COUNTS_PER_G:
+        meant = gravity_mps2 * range_g / accel_range_g
+        if abs(meant / STANDARD_GRAVITY - 1.0) <= ACCEL_TOLERANCE:
+            return wrong + f"set `accel_range` to {range_g}"
+    return wrong + "check `accel_range` and `accel_bias`, or the sensor"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -47,13 +47,17 @@ class OdometrySettings:
 class OdometryEstimate:
     """At ``stamp_s``: pose and covariance in the odometry frame, twist in the body's.
 
-    ``twist`` is None where the time that the displacement took is not known.
+    ``twist`` is None where the time that the displacement took is not known. ``rolled`` is what
+    the wheels have made of the robot since the driver began, as one tangent in the board's own
+    axes; ``rolling`` its rate.
     """
 
     stamp_s: float
     pose: Pose
     twist: BodyTwist | None
     covariance: Covariance
+    rolled: Pose = field(default_factory=Pose)
+    rolling: BodyTwist | None = None
 
 
 class Odometry:
@@ -75,6 +79,7 @@ class Odometry:
         self._backlog = Backlog()
         self._last_stamp_s: float | None = None
         self._last: tuple[Pose, float] | None = None
+        self._rolled = Pose()
         self.reset()
 
     @property
@@ -192,6 +197,7 @@ class Odometry:
         seconds = self._backlog.unheard_s(self._last_stamp_s)
         way = unroll(self._board.way_to(self._backlog.before(told)))
         self._board = self._board.moved(roll(way))
+        self._rolled += way
         self._uncertainty.move(self._follower.target.yaw_rad, self._signed(way))
         self._follower.correct(roll(self._signed(way)), 0.0)
         self._move(Pose(), seconds)
@@ -223,6 +229,8 @@ class Odometry:
             self._belief.doubted = told
             return
         if reachable:
+            if self._uncertainty.gap != NOTHING:  # more than rounding
+                self._rolled += unroll(way)
             self._follower.correct(roll(self._signed(unroll(way))))
             self._uncertainty.settle()
         else:
@@ -255,9 +263,13 @@ class Odometry:
             self._board = advanced(self._board, reading)
         self._move(tangent, seconds)
         self._follower.follow((reading.lost + 1) * seconds)
-        twist = self._signed(tangent).over(seconds) if reading.duration_s else None
+        twist = rolling = None
+        if reading.duration_s:
+            twist, rolling = self._signed(tangent).over(seconds), tangent.over(seconds)
         covariance = self._uncertainty.total(self._follower.wrong)
-        return OdometryEstimate(stamp_s, self._follower.pose, twist, covariance)
+        return OdometryEstimate(
+            stamp_s, self._follower.pose, twist, covariance, self._rolled, rolling
+        )
 
     def _bridge(self, tangent: Pose, seconds: float) -> None:
         """Motion that was not told, taken to be this one."""
@@ -275,6 +287,7 @@ class Odometry:
 
     def _move(self, tangent: Pose, seconds: float) -> None:
         """Along a tangent in the board's body axes."""
+        self._rolled += tangent
         part = self._signed(tangent)
         self._uncertainty.move(self._follower.target.yaw_rad, part)
         self._follower.move(

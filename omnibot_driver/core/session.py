@@ -7,7 +7,7 @@ not log: whatever a user should hear of is an event.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
 from omnibot_driver.core.board import (
@@ -22,8 +22,9 @@ from omnibot_driver.core.board import (
 )
 from omnibot_driver.core.commands import PACE_S, CommandSettings, CommandStream
 from omnibot_driver.core.device_clock import DeviceClock
-from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.helm import ControlMethod, Helm
+from omnibot_driver.core.inertial import ImuCorrection, ImuEstimate, Inertial
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits, require_timely
 from omnibot_driver.core.motion import GoalMotion, Motion
@@ -31,7 +32,9 @@ from omnibot_driver.core.news import News
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
 from omnibot_driver.core.plausibility import MotionLimits, Plausibility, Refused, Stamped
 from omnibot_driver.core.se2 import Pose, Signs
+from omnibot_driver.core.snapshot import CommandFigures, SessionFigures
 from omnibot_driver.core.supervisor import Phase, Request, RequestDone, Supervisor
+from omnibot_driver.core.tally import Tally
 from omnibot_driver.core.watch import Finding, Watch
 
 SILENCE_S: Final = 1.5
@@ -41,15 +44,6 @@ UNHEARD_S: Final = 0.3
 DISCONNECTED: Final = "disconnected"
 
 OnExit = Literal["stop", "pause", "reset"]
-
-
-@dataclass(frozen=True, slots=True)
-class ImuEstimate:
-    """At ``stamp_s``: specific force in m/s², angular velocity in rad/s, in the sensor's axes."""
-
-    stamp_s: float
-    specific_force: Vector3
-    angular_velocity: Vector3
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +69,7 @@ class SessionSettings:
     commands: CommandSettings
     odometry: OdometrySettings
     motion: MotionLimits = field(default_factory=MotionLimits)
+    imu: ImuCorrection = field(default_factory=ImuCorrection)
 
 
 class Session:
@@ -104,12 +99,14 @@ class Session:
         self._helm = Helm(board, self._odometry, settings.limits, axis_signs, control)
         self._plausibility = Plausibility(settings.motion, board.tick_s)
         self._clock = DeviceClock(board.tick_s)
-        self._heard_at = self._came_at = -math.inf
+        self._inertial = Inertial(board, settings.imu)
+        self._tally = Tally()
+        self._heard_at = self._came_at = self._commanded_at = -math.inf
         self._silent = False
         self._heading_assumed = False
         self._watch = Watch()
         self._advice: str | None = None
-        self._lost = 0
+        self._gravity_told = False
         self._lost_news, self._refused_news = News(), News()
         self._events: list[Event] = []
         self._shown = (self.state, self.estop_active)
@@ -132,7 +129,7 @@ class Session:
     @property
     def lost(self) -> int:
         """Displacements that were lost on the line since the driver began."""
-        return self._lost
+        return self._tally.lost_displacements
 
     @property
     def refused(self) -> Refused:
@@ -143,6 +140,29 @@ class Session:
         )
         return Refused(imu, displacements, self._odometry.refused_poses)
 
+    def figures(self, now: float) -> SessionFigures:
+        """All that is counted and measured."""
+        current = self._commands.current
+        return SessionFigures(
+            state=self.state,
+            tally=replace(self._tally),
+            board=self._board.figures,
+            refused=self.refused,
+            skew_ppm=self._clock.skew_ppm,
+            commands=CommandFigures(
+                source=current.authority.value if current else None,
+                age_s=now - self._commanded_at,
+                limited=self._helm.limited,
+                estop=self.estop_active,
+            ),
+            imu=self._inertial.figures,
+        )
+
+    @property
+    def gyro_bias(self) -> Vector3:
+        """What is taken off the gyro's readings, in rad/s."""
+        return self._inertial.calibration.bias
+
     @property
     def wake_at(self) -> float:
         """When ``tick`` must be called at the latest; infinity when nothing is due."""
@@ -150,7 +170,13 @@ class Session:
             return math.inf
         silent_at = math.inf if self._silent else self._heard_at + SILENCE_S
         unheard_at = self._heard_at + UNHEARD_S if self._commands.current else math.inf
-        return min(silent_at, unheard_at, self._supervisor.wake_at, self._commands.wake_at)
+        return min(
+            silent_at,
+            unheard_at,
+            self._supervisor.wake_at,
+            self._commands.wake_at,
+            self._inertial.calibration.wake_at,
+        )
 
     # What happens
 
@@ -160,6 +186,7 @@ class Session:
         self._commands.settings = settings.commands
         self._odometry.settings = settings.odometry
         self._plausibility.limits = settings.motion
+        self._inertial.configure(settings.imu)
 
     def opened(self, now: float) -> None:
         """The port is open."""
@@ -177,6 +204,9 @@ class Session:
         self._take_in(self._board.flush(now), now)
         self._measure(self._plausibility.release(), now)
         self._supervisor.closed()
+        self._inertial.calibration.give_up(
+            "the port was lost meanwhile; call again once it is back"
+        )
         self._commands.discard()
 
     def receive(self, data: bytes, now: float) -> None:
@@ -201,6 +231,7 @@ class Session:
                 self._commands.halt(now)
                 self._supervisor.heard_nothing(now)
         self._supervisor.tick(now)
+        self._inertial.calibration.tick(now)
 
     def stood_still(self, seconds: float, now: float) -> None:
         """This process, or its watchdog, did not run for so long: no command is current."""
@@ -240,6 +271,22 @@ class Session:
         self._supervisor.request(request, token, now)
         if request is not Request.START:
             self._commands.discard()
+
+    def calibrate_gyro(self, token: object, now: float) -> None:
+        """Find the gyro's bias; answered by a RequestDone. Raises RequestRefused at once."""
+        current = self._commands.current
+        if self._closed:
+            reason = "the port is not open; connect the board, then call again"
+        elif not self._board.mode.running:
+            reason = f"the board is {self._board.mode.value}; call ~/start, then call again"
+        elif self._inertial.calibration.measuring:
+            reason = "a calibration is under way; wait for its answer, then call again"
+        elif current is not None and not current.stands:
+            reason = f"the robot is commanded by {current.authority.value}; cease, then call again"
+        else:
+            self._inertial.calibration.measure(token, now)
+            return
+        raise RequestRefused(reason)
 
     def estop(self, active: bool, now: float) -> str:
         """Latch or release the e-stop; returns what is so now, in a sentence."""
@@ -284,9 +331,9 @@ class Session:
 
     def take_events(self) -> list[Event]:
         """What happened since the last call, in order."""
-        if self._supervisor.answers:
-            self._events += self._supervisor.answers
-            self._supervisor.answers.clear()
+        for answers in (self._supervisor.answers, self._inertial.calibration.answers):
+            self._events += answers
+            answers.clear()
         shown = (self.state, self.estop_active)
         if shown != self._shown:
             self._shown = shown
@@ -303,9 +350,9 @@ class Session:
         if not readings:
             return
         self._heard_at, self._silent = now, False
+        self._tally.read(now - stamps_s[-1])
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
-            if isinstance(reading, DisplacementReading | PoseReading):
-                self._lost += reading.lost
+            self._tally.hear(reading)
             self._measure(self._plausibility.admit(reading, stamp_s), now)
         self._check_goal([], now)
         self._tell(now)
@@ -324,9 +371,10 @@ class Session:
     def _measure(self, readings: list[Stamped], now: float) -> None:
         for reading, stamp_s in readings:
             match reading:
-                case ImuReading(force, rate):
-                    self._events.append(ImuEstimate(stamp_s, force, rate))
+                case ImuReading():
+                    self._events.append(self._inertial.estimate(reading, stamp_s))
                 case DisplacementReading(restarted=restarted):
+                    self._inertial.displaced(reading)
                     self._look(reading, now)
                     estimates = self._odometry.displace(reading, stamp_s)
                     self._events += estimates
@@ -378,7 +426,7 @@ class Session:
         )
 
     def _tell(self, now: float) -> None:
-        if lost := self._lost_news.since_told(self._lost, now):
+        if lost := self._lost_news.since_told(self.lost, now):
             self._notify(f"{lost} odometry frames were lost on the line: check cable and hub")
         refused = self.refused
         total = refused.imu + refused.displacements + refused.poses
@@ -388,6 +436,10 @@ class Session:
                 f" {refused.displacements} odometry, {refused.poses} poses): the line changes bits,"
                 " or a limit of motion is set too low"
             )
+        advice = self._inertial.advice
+        if advice and not self._gravity_told:
+            self._notify(advice)
+        self._gravity_told = bool(advice)
 
     def _notify(self, text: str) -> None:
         self._events.append(Notice(text))
@@ -405,5 +457,10 @@ class Session:
             reason = f"nothing was heard from the board for {UNHEARD_S:g} s"
         else:
             self._commands.command(motion, now, expires_at=expires_at)
+            self._commanded_at = now
+            if not motion.stands:
+                self._inertial.calibration.give_up(
+                    "a motion command came in; cease, then call again"
+                )
             return
         raise CommandRefused(f"motion command refused: {reason}")

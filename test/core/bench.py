@@ -1,7 +1,10 @@
 """A session and a simulated board on one workbench, wired to each other in simulated time."""
 
+from dataclasses import replace
+
 from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.helm import ControlMethod
+from omnibot_driver.core.inertial import ImuCorrection
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometryEstimate, OdometrySettings
@@ -32,13 +35,14 @@ class Bench:
     ) -> None:
         self.board = SimulatedBoard(board or BoardSettings())
         frame = self.board.settings.frame
+        self._settings = SessionSettings(
+            limits=limits or SpeedLimits(),
+            commands=CommandSettings(),
+            odometry=OdometrySettings(use_board_pose=use_board_pose),
+        )
         self.session = Session(
             OmniBot(OmniBotSettings(delta_frame=frame)),
-            SessionSettings(
-                limits=limits or SpeedLimits(),
-                commands=CommandSettings(),
-                odometry=OdometrySettings(use_board_pose=use_board_pose),
-            ),
+            self._settings,
             run=run,
             axis_signs=axis_signs,
             control=control or self.board.settings.control,
@@ -103,6 +107,9 @@ class Bench:
                     return event
             assert self.now < end, f"no answer to {request.value} within {limit_s} s"
             self.run(TICK_S)
+
+    def configure(self, *, imu: ImuCorrection) -> None:
+        self.session.configure(replace(self._settings, imu=imu))
 
     def written_since(self, mark: int) -> bytes:
         """What was written after the first ``mark`` writes."""

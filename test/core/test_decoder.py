@@ -202,6 +202,20 @@ def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataO
     assert found[0] == odd
 
 
+def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
+    """An adapter's pause within the last frame and its leap together do not make it a false one."""
+    made = FrameDecoder()
+    made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # it learns how calm the sensor is
+    shock = [
+        ImuFrame((-6375, 8786, -16371), (2, -8, 1005)),
+        DeltaFrame(176, -24, -45, 146),
+        ImuFrame((-5884, 8083, -16389), (3, 13, 1223)),
+    ]
+    content = b"".join(map(encode, shock))
+    found = made.feed(content[:-6], 0.016) + made.feed(content[-6:], 0.032)
+    assert found + made.feed(b"Paused: 0 \n", 0.7) == [*shock, PausedFrame(0)]
+
+
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
     """One byte of waiting, not one frame."""
     made = FrameDecoder()

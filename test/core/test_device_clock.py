@@ -181,6 +181,15 @@ def test_without_displacements_lost_samples_are_counted_by_their_arrival() -> No
         assert spread(stamped.errors()) < 0.5e-3
 
 
+@pytest.mark.parametrize("skew", [*SKEWS, 0.0])
+def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
+    """Positive where it is faster than ours, so that its ticks are shorter."""
+    clock = DeviceClock(0.01)
+    for tick in range(1000):
+        clock.stamps([SAMPLE], tick * 0.01 / (1.0 + skew))
+    assert clock.skew_ppm == pytest.approx(1e6 * skew, abs=1.0)
+
+
 @pytest.mark.parametrize("skew", SKEWS)
 def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
     """Another phase and another SEQ; the stamps go on forward and to the same constant."""

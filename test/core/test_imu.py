@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from strategies import triples
 
-from omnibot_driver.core.imu import ImuScale
+from omnibot_driver.core.imu import ImuScale, gravity_advice
 
 Triple = tuple[int, int, int]
 
@@ -58,3 +58,21 @@ def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int
     scale = ImuScale(accel_range_g=accel, gyro_range_dps=gyro)
     with pytest.raises(KeyError):
         (scale.specific_force((0, 0, 0)), scale.angular_velocity((0, 0, 0)))
+
+
+@pytest.mark.parametrize("actual_g", [2, 4, 8, 16])
+@pytest.mark.parametrize("believed_g", [2, 4, 8, 16])
+def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_g: int) -> None:
+    """By its length at rest, within a tenth."""
+    for error in (0.92, 1.0, 1.08):
+        text = gravity_advice(error * 9.80665 * believed_g / actual_g, believed_g)
+        assert bool(text) == (actual_g != believed_g)
+        assert not text or text.endswith(f"set `accel_range` to {actual_g}")
+
+
+@pytest.mark.parametrize("gravity", [0.0, 7.0, 12.0, 100.0])
+def test_what_is_gravity_in_no_range_is_a_bias_or_a_broken_sensor(gravity: float) -> None:
+    """Nothing is guessed."""
+    assert gravity_advice(gravity, 2).endswith(
+        "check `accel_range` and `accel_bias`, or the sensor"
+    )

@@ -258,6 +258,28 @@ def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
 # Letters
 
 
+def test_commands_that_do_not_fit_the_wire_are_counted() -> None:
+    """One at the very end of it is not."""
+    board = bot(linear_scale=10_000.0)
+    board.velocity(BodyTwist(3.2767, 0.0, 0.0))
+    assert board.figures.saturated == 0
+    board.velocity(BodyTwist(3.3, 0.0, 0.0))
+    assert board.figures.saturated == 1
+
+
+def test_faults_are_counted_over_all_connections() -> None:
+    """A new line has a new decoder, but the robot's cable is the same."""
+    board = bot()
+    board.receive(encode(REST) * 8, 0.0)
+    assert (board.figures.faults, board.figures.discarded_bytes) == (0, 0)
+    for start_s in (1.0, 2.0):
+        before = board.figures
+        board.connect()
+        board.receive(encode(REST) * 40 + bytes(30) + encode(REST) * 40, start_s)
+        assert board.figures.faults > before.faults
+        assert board.figures.discarded_bytes >= before.discarded_bytes + 30
+
+
 def test_stop_and_emergency_stop_are_the_manuals() -> None:
     """From the appendix."""
     assert bot().stop() == STOP

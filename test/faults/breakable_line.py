@@ -7,7 +7,7 @@ from collections.abc import Callable
 from random import Random
 from typing import Final
 
-from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator import BoardSettings, FaultyLine, LineFaults, SimulatedBoard
 
 TICK_S: Final = 0.01
 BYTES_PER_TICK: Final = 115
@@ -26,7 +26,12 @@ def cut(_data: bytes) -> bytes:
 
 def losing(rate: float, random: Random) -> Damage:
     """Single bytes, each with the same probability."""
-    return lambda data: bytes(byte for byte in data if random.random() >= rate)
+    return FaultyLine(LineFaults(lose=rate), random.getrandbits(32)).carry
+
+
+def losing_bursts(rate: float, random: Random) -> Damage:
+    """1 to 200 bytes in a row, over any number of ticks."""
+    return FaultyLine(LineFaults(burst=rate), random.getrandbits(32)).carry
 
 
 def gaining(rate: float, random: Random) -> Damage:
@@ -38,25 +43,6 @@ def gaining(rate: float, random: Random) -> Damage:
             if random.random() < rate:
                 out.append(random.randrange(256))
             out.append(byte)
-        return bytes(out)
-
-    return damage
-
-
-def losing_bursts(rate: float, random: Random) -> Damage:
-    """1 to 200 bytes in a row, over any number of ticks."""
-    left = 0
-
-    def damage(data: bytes) -> bytes:
-        nonlocal left
-        out = bytearray()
-        for byte in data:
-            if not left and random.random() < rate:
-                left = random.randint(1, 200)
-            if left:
-                left -= 1
-            else:
-                out.append(byte)
         return bytes(out)
 
     return damage

@@ -6,6 +6,7 @@ the board, whether the odometry went on without a jump, what the process costs.
 
 import math
 import os
+import re
 import struct
 import threading
 import time
@@ -168,8 +169,13 @@ class Rig:
             self.findings.expect(
                 possible or zeroed, f"odom jumped by {step_m:.3f} m in {seconds:.3f} s"
             )
-        refused = [line for line in self.driver.lines if "cannot be true" in line]
-        self.findings.expect(not refused, f"true readings were refused: {refused}")
+        refused = sum(
+            int(number)
+            for number in re.findall(r"(\d+) readings cannot be true", self.driver.output)
+        )
+        self.findings.expect(  # what framing made up of damaged bytes may be among them
+            refused <= len(imu) / one_in, f"{refused} readings were refused, and no bit was flipped"
+        )
         backwards = sum(stamp_s(b) <= stamp_s(a) for a, b in pairwise(imu))
         self.findings.expect(backwards == 0, f"{backwards} imu stamps do not increase")
         self.findings.published += len(imu) + len(odom)

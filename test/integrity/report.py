@@ -90,7 +90,7 @@ def main() -> int:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--seconds", type=float, default=120.0)
     arguments.add_argument("--seeds", type=int, default=20)
-    arguments.add_argument("--first", type=int, default=100)
+    arguments.add_argument("--first", type=int, default=300)
     chosen = arguments.parse_args()
     jobs = [
         (scenario, seed, parser)

@@ -128,7 +128,6 @@ def test_a_launch_file_names_only_what_is_installed(path: Path) -> None:
         assert any((ROOT / folder / name).is_file() for folder in folders), name
 
 
-@pytest.mark.xfail(reason="the driver does not have them yet", strict=True)
 def test_the_driver_has_every_parameter_that_is_offered() -> None:
     """A parameter that it does not know would end it."""
     tree = ast.parse((ROOT / "launch/driver.launch.py").read_text())

@@ -104,8 +104,9 @@ def seen(graph: Node, home: str) -> Rules:
         return {name.removeprefix(home) for name, _ in found}
 
     subscribed = names(graph.get_subscriber_names_and_types_by_node(NODE, home))
+    published = names(graph.get_publisher_names_and_types_by_node(NODE, home))
     return {
-        "publish": names(graph.get_publisher_names_and_types_by_node(NODE, home)),
+        "publish": published | {"/tf"},  # where tf2_ros is installed
         "subscribe": subscribed | {"/clock"},  # with use_sim_time
         "reply": names(graph.get_service_names_and_types_by_node(NODE, home)),
         "request": set(),

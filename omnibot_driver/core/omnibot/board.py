@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Final, Literal
 
 from omnibot_driver.core.board import (
+    BoardFigures,
     DisplacementReading,
     ImuReading,
     Mode,
@@ -20,11 +21,11 @@ from omnibot_driver.core.board import (
     Vector3,
 )
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, ImuScale
+from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, ImuScale, gravity_advice
 from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
 from omnibot_driver.core.limits import MAX_WORD, to_nearest, to_words
 from omnibot_driver.core.omnibot import frames
-from omnibot_driver.core.omnibot.decoder import FrameDecoder
+from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
 from omnibot_driver.core.omnibot.frames import (
     ByteOrder,
     CommandFrame,
@@ -43,6 +44,7 @@ from omnibot_driver.core.se2 import Pose
 
 TICK_S: Final = 0.01
 IMUS_PER_DELTA: Final = 4
+RATES_HZ: Final = (100.0, 25.0, 5.0)
 DELTA_LSB: Final = (1e-4, 1e-4, 1e-4)
 """m, m, rad."""
 POSE_LSB_M: Final = 1e-3
@@ -85,6 +87,8 @@ class OmniBot:
         self.settings = settings
         self._sequence = Sequence()
         self._suspicion = Suspicion()
+        self._statistics = DecoderStatistics()
+        self._saturated = 0
         self.connect()
 
     def connect(self) -> None:
@@ -92,6 +96,7 @@ class OmniBot:
         self._decoder = FrameDecoder(
             self.settings.pose_byte_order, ACCEL_COUNTS_PER_G[self.settings.imu.accel_range_g]
         )
+        self._decoder.statistics = self._statistics
         self._modes = ModeTracker()
         self._rhythm = Rhythm()
         self._sequence.reconnect()
@@ -117,6 +122,20 @@ class OmniBot:
         if begun.startswith(frames.IMU_HEADER):
             return 1, max(0, frames.IMU_LENGTH - len(begun)) * 10 / self.settings.baudrate
         return (0, 0.0) if self._decoder.fresh else None
+
+    @property
+    def figures(self) -> BoardFigures:
+        """Over all connections."""
+        return BoardFigures(
+            rates_hz=RATES_HZ,
+            faults=self._statistics.faults,
+            discarded_bytes=self._statistics.discarded_bytes,
+            saturated=self._saturated,
+        )
+
+    def gravity_advice(self, gravity_mps2: float) -> str:
+        """By the accelerometer's range."""
+        return gravity_advice(gravity_mps2, self.settings.imu.accel_range_g)
 
     @property
     def advice(self) -> str | None:
@@ -193,8 +212,8 @@ class OmniBot:
         x, y, yaw = map(to_nearest, counts)
         return frames.encode(CommandFrame(frames.VELOCITY_MODE, (x, y, yaw)))
 
-    @staticmethod
-    def _drive(mode: int, counts: Vector3) -> bytes:
+    def _drive(self, mode: int, counts: Vector3) -> bytes:
+        self._saturated += max(map(abs, counts)) > MAX_WORD
         a, b, c = to_words(counts)
         return frames.encode(CommandFrame(mode, (a, b, c))) if (a, b, c) != (0, 0, 0) else STOP
 

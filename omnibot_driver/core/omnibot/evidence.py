@@ -143,7 +143,7 @@ class Expectation:
         cost = 0.0
         if max(abs(frame.dx), abs(frame.dy), abs(frame.dtheta)) > LARGEST_DELTA:
             cost = IMPOSSIBLE
-        after = Context(before.imu, frame.seq, before.pose, 0, before.deltas + 1)
+        after = Context(before.imu, frame.seq, before.pose, 0, before.deltas + 1, before.shaken)
         if before.seq is None:
             return cost, after
         if frame.seq != (before.seq + 1) & 255:
@@ -152,7 +152,7 @@ class Expectation:
 
     @staticmethod
     def _weigh_pose(frame: PoseFrame, before: Context) -> tuple[float, Context]:
-        after = Context(before.imu, before.seq, frame, before.imus, 0)
+        after = Context(before.imu, before.seq, frame, before.imus, 0, before.shaken)
         x, y, theta = frame.x, frame.y, frame.theta
         if not (abs(x) < FARTHEST_POSE and abs(y) < FARTHEST_POSE and abs(theta) < FARTHEST_POSE):
             return IMPOSSIBLE + JUMP, after

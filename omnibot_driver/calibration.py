@@ -1,0 +1,72 @@
+"""The calibration file: biases in YAML, read at the start, written whole or not at all.
+
+It may hold other names as well, which are left as they are.
+"""
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import yaml
+
+from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.parameters import BY_NAME, Value
+
+NAMES: Final = ("gyro_bias", "accel_bias")
+"""What is taken from the file; each is a parameter."""
+
+
+def load(path: Path) -> dict[str, Value]:
+    """The parameters in the file; none where there is no file yet.
+
+    Raises ParameterError with what to do about a file that makes no sense.
+    """
+    content = _read(path)
+    try:
+        return {name: BY_NAME[name].check(content[name]) for name in NAMES if name in content}
+    except ParameterError as error:
+        raise _bad(path, f"is wrong ({error})") from error
+
+
+def save(path: Path, values: Mapping[str, Value]) -> None:
+    """Put these values into the file and leave the others. Raises ParameterError or OSError.
+
+    Whoever reads it meanwhile, or loses power, has the old file or the new one.
+    """
+    content = {**_read(path), **values}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor, name = tempfile.mkstemp(prefix=path.name, dir=path.parent)
+    try:
+        with open(descriptor, "w", encoding="utf-8") as file:
+            os.fchmod(descriptor, 0o644)
+            yaml.safe_dump(content, file, sort_keys=False, default_flow_style=None)
+            file.flush()
+            os.fsync(descriptor)
+        os.replace(name, path)
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(name)
+        raise
+
+
+def _read(path: Path) -> dict[Any, Any]:
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise _bad(path, f"cannot be read ({' '.join(str(error).split())})") from error
+    if content is None:
+        return {}
+    if not isinstance(content, dict):
+        raise _bad(path, "has no names and values")
+    return content
+
+
+def _bad(path: Path, what: str) -> ParameterError:
+    return ParameterError(
+        f"the calibration_file {path} {what}: mend it, or remove it and call ~/calibrate_gyro"
+    )

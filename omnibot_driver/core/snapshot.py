@@ -1,0 +1,54 @@
+"""All that is known of the link and the board at one moment: values only."""
+
+from dataclasses import dataclass
+
+from omnibot_driver.core.board import BoardFigures, Vector3
+from omnibot_driver.core.plausibility import Refused
+from omnibot_driver.core.tally import Tally
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkFigures:
+    """``trouble``: why the port cannot be had, in a sentence; empty while it is open."""
+
+    port: str
+    trouble: str = ""
+    opened: int = 0
+    received_bytes: int = 0
+    sent_bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandFigures:
+    """``source``: the topic that commands, ``age_s`` old by now; None while nobody does."""
+
+    source: str | None = None
+    age_s: float = 0.0
+    limited: int = 0
+    estop: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImuFigures:
+    """``gravity_mps2`` and ``noise_radps`` are of the last standstill; None before the first.
+
+    ``advice``: which parameter gravity contradicts, in a sentence.
+    """
+
+    bias_radps: Vector3
+    gravity_mps2: float | None = None
+    noise_radps: Vector3 | None = None
+    advice: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionFigures:
+    """``skew_ppm``: how much faster the board's clock runs than ours."""
+
+    state: str
+    tally: Tally
+    board: BoardFigures
+    refused: Refused
+    skew_ppm: float
+    commands: CommandFigures
+    imu: ImuFigures

@@ -1,0 +1,70 @@
+"""What came in, in figures: counts that only grow. Knows readings and times, not what to make of
+them.
+"""
+
+from dataclasses import dataclass, field
+
+from omnibot_driver.core.board import (
+    DisplacementReading,
+    ImuReading,
+    PausedReading,
+    PoseReading,
+    Reading,
+    Vector3,
+)
+
+
+@dataclass(slots=True)
+class Tally:
+    """Since the driver began; nothing but ``last_gap`` and the two of the sensor ever shrinks."""
+
+    imu: int = 0
+    displacements: int = 0
+    poses: int = 0
+    restarts: int = 0
+    lost_imu: int = 0
+    lost_displacements: int = 0
+    gaps: int = 0
+    """Stretches of lost displacements."""
+    last_gap: int = 0
+    """How many the last one lost."""
+    reads: int = 0
+    delay_s: float = 0.0
+    """Sum over the reads of how old the newest sample was; the least that ever happens is 0."""
+    squared_delay_s2: float = 0.0
+    same_force: int = 0
+    same_rate: int = 0
+    """How often in a row each sensor has said exactly the same."""
+    _force: Vector3 | None = field(default=None, repr=False)
+    _rate: Vector3 | None = field(default=None, repr=False)
+
+    def read(self, delay_s: float) -> None:
+        """A read brought samples, the newest of which was so old."""
+        self.reads += 1
+        self.delay_s += delay_s
+        self.squared_delay_s2 += delay_s * delay_s
+
+    def hear(self, reading: Reading) -> None:
+        """One more."""
+        match reading:
+            case ImuReading(force, rate, lost):
+                self.imu += 1
+                self.lost_imu += lost
+                self.same_force = self.same_force + 1 if force == self._force else 0
+                self.same_rate = self.same_rate + 1 if rate == self._rate else 0
+                self._force, self._rate = force, rate
+            case DisplacementReading(lost=lost, restarted=restarted):
+                self.displacements += 1
+                self._miss(lost, restarted)
+            case PoseReading(lost=lost, restarted=restarted):
+                self.poses += 1
+                self._miss(lost, restarted)
+            case PausedReading():
+                self.same_force = self.same_rate = 0
+
+    def _miss(self, lost: int, restarted: bool) -> None:
+        self.restarts += restarted
+        if lost:
+            self.lost_displacements += lost
+            self.gaps += 1
+            self.last_gap = lost

@@ -1,0 +1,41 @@
+"""What can be seen of a port's surroundings once it is open, and should be set otherwise.
+
+Reads sysfs; knows no pyserial, no ROS, no board. What stands in the way of opening a port, its
+permissions among it, ``port.py`` says.
+"""
+
+from pathlib import Path
+from typing import Final
+
+SYSFS: Final = Path("/sys")
+LONGEST_LATENCY_MS: Final = 5
+"""Half a tick of the board. FTDI's default is 16 ms, its least 1 ms."""
+WITHOUT_CLOCK: Final = ("sim://", "replay://")
+"""Ports that no real robot is behind."""
+
+
+def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
+    """What to say of the adapter's latency timer; empty if it is short, or there is none."""
+    device = Path(port).resolve().name
+    try:
+        text = (sysfs / "class/tty" / device / "device/latency_timer").read_text(encoding="ascii")
+        latency_ms = int(text)
+    except (OSError, ValueError):
+        return ""
+    if latency_ms <= LONGEST_LATENCY_MS:
+        return ""
+    return (
+        f"the USB adapter of {port} keeps bytes for {latency_ms} ms (its latency_timer), so that"
+        " measurements come in bunches: install udev/99-omnibot.rules, or until it is unplugged:"
+        f" echo 1 | sudo tee /sys/class/tty/{device}/device/latency_timer"
+    )
+
+
+def clock_advice(port: str, use_sim_time: bool) -> str:
+    """What to say of simulated time on a port that keeps real time; empty where all is well."""
+    if not use_sim_time or port.startswith(WITHOUT_CLOCK):
+        return ""
+    return (
+        f"use_sim_time is set, but {port} keeps real time: stamps and the age of commands will be"
+        " wrong; start the driver with use_sim_time:=false"
+    )

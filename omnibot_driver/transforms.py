@@ -1,0 +1,23 @@
+"""``/tf`` where tf2_ros is installed; elsewhere a warning, and a robot that drives all the same."""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from geometry_msgs.msg import TransformStamped
+from rclpy.node import Node
+
+MISSING: Final = (
+    "tf2_ros is not installed, so the transform from odom to the base is not published: install"
+    " ros-jazzy-tf2-ros, or set publish_tf to false"
+)
+
+
+def transform_publisher(node: Node) -> Callable[[TransformStamped], Any] | None:
+    """What publishes a transform; None, and a warning, where nothing can."""
+    try:
+        from tf2_ros import TransformBroadcaster
+    except ImportError as error:
+        node.get_logger().warning(f"{MISSING} ({error})")
+        return None
+    send: Callable[[TransformStamped], Any] = TransformBroadcaster(node).sendTransform
+    return send

@@ -1,0 +1,185 @@
+"""Joint states, diagnostics, transforms and the gyro's calibration, over real DDS."""
+
+import importlib.util
+import math
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from driver_process import Driver
+from nav_msgs.msg import Odometry
+from probe import Probe
+from rcl_interfaces.srv import GetParameters
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float32MultiArray
+from std_srvs.srv import SetBool, Trigger
+
+from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
+
+PLANTED_DPS = (1.5, -2.0, 3.0)
+HAS_TF2 = importlib.util.find_spec("tf2_ros") is not None
+
+
+class Robot:
+    """One board and one driver for all tests of this module: they leave it standing."""
+
+    def __init__(self, stack: ExitStack, folder: Path) -> None:
+        self.file = folder / "calibration.yaml"
+        self.file.write_text("robot: no. 7\n")
+        settings = BoardSettings(gyro_bias_dps=PLANTED_DPS)
+        self.board = stack.enter_context(PtyBoard(SimulatedBoard(settings)))
+        self.driver = stack.enter_context(
+            Driver(
+                port=self.board.path,
+                frame_prefix="robot1/",
+                calibration_file=self.file,
+                use_sim_time=False,
+            )
+        )
+        self.probe = stack.enter_context(Probe(self.driver.namespace))
+        self.probe.wait_for_state("nominal")
+        self.reports = self.probe.listen(DiagnosticArray, "/diagnostics")
+
+    def status(self, name: str) -> Any:
+        """The newest, from this robot."""
+        found = [
+            status
+            for report in self.reports
+            for status in report.status
+            if status.hardware_id == self.board.path and status.name == f"omnibot_driver: {name}"
+        ]
+        return found[-1] if found else None
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
+    with ExitStack() as stack:
+        yield Robot(stack, tmp_path_factory.mktemp("calibration"))
+
+
+def test_the_gyro_is_calibrated_saved_and_loaded_again(
+    robot: Robot, start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
+) -> None:
+    """The bias that was planted is reported, taken off, in the file and in the parameter."""
+    planted = [math.radians(value) for value in PLANTED_DPS]
+    answer = robot.probe.call(Trigger, "calibrate_gyro")
+    assert answer.success, answer.message
+    assert "noise" in answer.message
+    assert answer.message.endswith(f"saved to {robot.file}")
+    saved = yaml.safe_load(robot.file.read_text())
+    assert saved["robot"] == "no. 7"
+    assert saved["gyro_bias"] == pytest.approx(planted, abs=5e-4)
+    imu = robot.probe.listen(Imu, "imu/data_raw")
+    robot.probe.wait_for(lambda: len(imu) >= 100)
+    mean = sum(message.angular_velocity.z for message in imu) / len(imu)
+    assert mean == pytest.approx(0.0, abs=1e-3)
+
+    second = start_driver("/dev/null", calibration_file=robot.file)
+    values = probe_of(second).call(GetParameters, "get_parameters", names=["gyro_bias"]).values
+    assert list(values[0].double_array_value) == saved["gyro_bias"]
+
+
+def test_a_calibration_that_cannot_be_saved_is_applied_and_says_so(robot: Robot) -> None:
+    """Here somebody has broken the file meanwhile; it is left as it is."""
+    robot.file.write_text("gyro_bias: [1, 2")
+    answer = robot.probe.call(Trigger, "calibrate_gyro")
+    assert not answer.success
+    assert answer.message.startswith("gyro bias (0.0")
+    assert "it is applied, but not saved" in answer.message
+    assert "mend it" in answer.message
+    assert robot.file.read_text() == "gyro_bias: [1, 2"
+
+
+def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
+    tmp_path: Path, start_driver: Callable[..., Driver]
+) -> None:
+    """With exit code 2 and a sentence that says what to do."""
+    path = tmp_path / "robot.yaml"
+    path.write_text("gyro_bias: [1, 2")
+    driver = start_driver("/dev/null", calibration_file=path)
+    driver.wait_for_line("calibration_file.*mend it, or remove it")
+    assert driver.process.wait(20.0) == 2
+
+
+def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
+    """wheel_cmd in, joint_states out: the same order, signs and units, and angles that add up."""
+    joints = robot.probe.listen(JointState, "joint_states")
+    commands = robot.probe.publisher(Float32MultiArray, "wheel_cmd")
+    wanted = [4.0, -2.0, 1.0]
+
+    def drive() -> bool:
+        commands.publish(Float32MultiArray(data=wanted))
+        return bool(joints) and list(joints[-1].velocity) == pytest.approx(wanted, abs=0.6)
+
+    robot.probe.wait_for(lambda: drive() and joints[-1].position[0] - joints[0].position[0] > 4.0)
+    assert list(joints[-1].name) == ["wheel_a_joint", "wheel_b_joint", "wheel_c_joint"]
+    turned = [b - a for a, b in zip(joints[0].position, joints[-1].position, strict=True)]
+    ratio = turned[1] / turned[0]
+    assert ratio == pytest.approx(-0.5, abs=0.1)
+    refused = robot.probe.call(Trigger, "calibrate_gyro")
+    assert not refused.success
+    robot.probe.call(SetBool, "estop", data=True)
+    robot.probe.wait_for(lambda: robot.status("E-stop").level == b"\x01")
+    assert "~/estop" in robot.status("E-stop").message
+    robot.probe.call(SetBool, "estop", data=False)
+    assert robot.board.wait_for(lambda b: max(map(abs, b.rim_speeds_mps)) < 0.01, 20.0)
+
+
+def test_diagnostics_come_with_figures(robot: Robot) -> None:
+    """Seven of them; the rates are those of the manual, and nothing is lost."""
+    robot.probe.wait_for(lambda: robot.status("IMU") and "nan" not in str(robot.status("Stream")))
+    names = [status.name for status in robot.reports[-1].status]
+    assert len(names) == 7
+    link = {value.key: value.value for value in robot.status("Link").values}
+    assert link["Connected"] == "yes"
+    assert int(link["Bytes received"]) > 1000
+    stream = {value.key: value.value for value in robot.status("Stream").values}
+    assert stream["Framing faults"] == stream["Sequence gaps"] == "0"
+    rate, _, wanted = stream["IMU rate (Hz)"].partition(" of ")
+    assert float(rate) == pytest.approx(float(wanted), rel=0.2)
+
+
+def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> None:
+    """And it is no error."""
+    odometry = robot.probe.listen(Odometry, "odom")
+    robot.probe.wait_for(lambda: odometry)
+    assert odometry[-1].header.frame_id == "robot1/odom"
+    assert odometry[-1].child_frame_id == "robot1/base_link"
+    told = [line for line in robot.driver.lines if "tf2_ros is not installed" in line]
+    assert len(told) == (0 if HAS_TF2 else 1)
+    assert all("WARN" in line for line in told)
+
+
+def test_who_does_not_want_transforms_hears_nothing_of_tf(
+    start_driver: Callable[..., Driver],
+) -> None:
+    """With an EKF, say. Simulated time on a real port is another matter."""
+    driver = start_driver("/dev/null", publish_tf=False, use_sim_time=True)
+    driver.wait_for_line("use_sim_time is set, but /dev/null keeps real time")
+    assert "tf2" not in driver.output
+
+
+def test_the_transform_follows_odom(robot: Robot) -> None:
+    """The same stamps, frames and poses, on /tf."""
+    tf2_msgs = pytest.importorskip("tf2_msgs.msg", exc_type=ImportError)
+    pytest.importorskip("tf2_ros", exc_type=ImportError)
+    transforms = robot.probe.listen(tf2_msgs.TFMessage, "/tf")
+    odometry = robot.probe.listen(Odometry, "odom")
+
+    def pairs() -> list[tuple[Any, Any]]:
+        found = [t for message in list(transforms) for t in message.transforms]
+        return [
+            (t, o)
+            for t in found
+            for o in list(odometry)
+            if t.header == o.header and t.child_frame_id == o.child_frame_id
+        ]
+
+    robot.probe.wait_for(lambda: len(pairs()) >= 5)
+    for transform, pose in pairs():
+        assert transform.transform.translation.x == pose.pose.pose.position.x
+        assert transform.transform.rotation == pose.pose.pose.orientation

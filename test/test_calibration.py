@@ -1,0 +1,89 @@
+"""The calibration file: whole or not at all, and nobody else's names are touched."""
+
+import stat
+from pathlib import Path
+
+import pytest
+import yaml
+
+from omnibot_driver import calibration
+from omnibot_driver.core.errors import ParameterError
+
+BIAS = [0.01, -0.02, 0.03]
+
+
+@pytest.mark.parametrize("bias", [BIAS, [1 / 3, -1e-9, 1.0], [0.0, -0.0, 5e-324]])
+def test_what_is_saved_is_loaded_exactly(tmp_path: Path, bias: list[float]) -> None:
+    """To the last digit."""
+    path = tmp_path / "robot.yaml"
+    calibration.save(path, {"gyro_bias": bias})
+    assert calibration.load(path) == {"gyro_bias": bias}
+
+
+def test_no_file_yet_is_no_calibration(tmp_path: Path) -> None:
+    """Nor is an empty one; the folder comes with the file."""
+    path = tmp_path / "new" / "robot.yaml"
+    assert calibration.load(path) == {}
+    calibration.save(path, {"gyro_bias": BIAS})
+    path.write_text("")
+    assert calibration.load(path) == {}
+
+
+def test_other_names_in_the_file_stay(tmp_path: Path) -> None:
+    """Also in their order."""
+    path = tmp_path / "robot.yaml"
+    path.write_text("robot: no. 7\ngyro_bias: [0, 0, 0]\naccel_bias: [1, 2, 3]\n")
+    assert calibration.load(path) == {"gyro_bias": [0.0] * 3, "accel_bias": [1.0, 2.0, 3.0]}
+    calibration.save(path, {"gyro_bias": BIAS})
+    content = yaml.safe_load(path.read_text())
+    assert list(content.items()) == [
+        ("robot", "no. 7"),
+        ("gyro_bias", BIAS),
+        ("accel_bias", [1, 2, 3]),
+    ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["gyro_bias: [1, 2", "- 1\n- 2\n", "just words", "gyro_bias: 1", "gyro_bias: [0, 0, 99]",
+     "accel_bias: [a, b, c]", "gyro_bias: null", "\udcff"],
+)  # fmt: skip
+def test_a_file_that_makes_no_sense_is_an_error_that_says_what_to_do(
+    tmp_path: Path, text: str
+) -> None:
+    """It names the file; nothing is overwritten."""
+    path = tmp_path / "robot.yaml"
+    path.write_bytes(text.encode("utf-8", "surrogateescape"))
+    with pytest.raises(ParameterError, match="mend it, or remove it") as caught:
+        calibration.load(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    """Read as little as written."""
+    with pytest.raises(ParameterError, match="cannot be read"):
+        calibration.load(tmp_path)
+
+
+def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a disk that is full."""
+    path = tmp_path / "robot.yaml"
+    calibration.save(path, {"gyro_bias": BIAS})
+
+    def full(_descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        calibration.save(path, {"gyro_bias": [0.0, 0.0, 0.0]})
+    assert calibration.load(path) == {"gyro_bias": BIAS}
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_others_may_read_the_file(tmp_path: Path) -> None:
+    """It is no secret, though it begins as one."""
+    path = tmp_path / "robot.yaml"
+    calibration.save(path, {"gyro_bias": BIAS})
+    assert stat.S_IMODE(path.stat().st_mode) == 0o644

@@ -1,0 +1,65 @@
+"""What surrounds a port, by a sysfs made up in a temporary folder."""
+
+from pathlib import Path
+
+import pytest
+
+from omnibot_driver import selfcheck
+
+
+def adapter(root: Path, device: str, latency: str) -> Path:
+    """A sysfs with one adapter in it."""
+    folder = root / "class/tty" / device / "device"
+    folder.mkdir(parents=True)
+    (folder / "latency_timer").write_text(latency)
+    return root
+
+
+def test_an_adapter_that_keeps_bytes_is_told_of_with_the_remedy(tmp_path: Path) -> None:
+    """FTDI's default; for good, and for now."""
+    text = selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", "16\n"))
+    assert "16 ms" in text
+    assert "udev/99-omnibot.rules" in text
+    assert text.endswith("echo 1 | sudo tee /sys/class/tty/ttyUSB0/device/latency_timer")
+
+
+def test_a_link_leads_to_the_adapter(tmp_path: Path) -> None:
+    """/dev/omnibot is one."""
+    sysfs = adapter(tmp_path / "sys", "ttyUSB7", "16\n")
+    (tmp_path / "ttyUSB7").touch()
+    link = tmp_path / "omnibot"
+    link.symlink_to(tmp_path / "ttyUSB7")
+    text = selfcheck.latency_advice(str(link), sysfs)
+    assert str(link) in text
+    assert "/sys/class/tty/ttyUSB7/" in text
+
+
+@pytest.mark.parametrize("latency", ["1\n", "5\n", "", "soon\n"])
+def test_a_short_timer_or_one_that_says_nothing_is_left_alone(tmp_path: Path, latency: str) -> None:
+    """Nobody is bothered."""
+    assert selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", latency)) == ""
+
+
+@pytest.mark.parametrize("port", ["/dev/ttyACM0", "/dev/pts/3", "socket://host:1", "sim://", ""])
+def test_a_port_without_such_a_timer_is_left_alone(tmp_path: Path, port: str) -> None:
+    """Other adapters, pseudo-terminals, URLs."""
+    assert selfcheck.latency_advice(port, adapter(tmp_path, "ttyUSB0", "16\n")) == ""
+
+
+@pytest.mark.parametrize(
+    ("port", "use_sim_time", "warned"),
+    [
+        ("/dev/ttyUSB0", True, True),
+        ("socket://host:1", True, True),
+        ("/dev/ttyUSB0", False, False),
+        ("sim://", True, False),
+        ("replay://bag", True, False),
+    ],
+)
+def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
+    port: str, use_sim_time: bool, warned: bool
+) -> None:
+    """Stamps and ages would be nonsense."""
+    text = selfcheck.clock_advice(port, use_sim_time)
+    assert bool(text) == warned
+    assert not warned or (port in text and "use_sim_time:=false" in text)

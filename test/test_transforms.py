@@ -1,0 +1,50 @@
+"""tf2_ros there, and not there."""
+
+import sys
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from omnibot_driver.transforms import transform_publisher
+
+
+class FakeNode:
+    """Notes warnings."""
+
+    def __init__(self) -> None:
+        self.warnings: list[str] = []
+
+    def get_logger(self) -> Any:
+        return SimpleNamespace(warning=self.warnings.append)
+
+
+def test_without_tf2_there_is_one_warning_and_no_publisher(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It says what to install, and how to be rid of it."""
+    monkeypatch.setitem(sys.modules, "tf2_ros", None)
+    node = FakeNode()
+    assert transform_publisher(node) is None
+    (warning,) = node.warnings
+    assert "ros-jazzy-tf2-ros" in warning
+    assert "publish_tf" in warning
+
+
+def test_with_tf2_its_broadcaster_gets_the_transforms(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One broadcaster, of this node, without a word."""
+    sent: list[tuple[object, object]] = []
+
+    class Broadcaster:
+        def __init__(self, node: object) -> None:
+            self._node = node
+
+        def sendTransform(self, transform: object) -> None:
+            sent.append((self._node, transform))
+
+    fake = SimpleNamespace(TransformBroadcaster=Broadcaster)
+    monkeypatch.setitem(sys.modules, "tf2_ros", fake)
+    node = FakeNode()
+    send = transform_publisher(node)
+    assert send is not None
+    send("transform")
+    assert sent == [(node, "transform")]
+    assert not node.warnings
