@@ -86,13 +86,12 @@ class Replay:
     def _play(self) -> None:
         if self._closing.wait(self._recording.delay_s):
             return
-        self._began_at = time.monotonic()
         end = "the recording has ended: nothing more will come"
         opened = False
         try:
             for at_ns, data in self._recording.chunks():
                 if not opened:
-                    opened, self._epoch_ns = True, at_ns
+                    opened, self._epoch_ns, self._began_at = True, at_ns, time.monotonic()
                     self._report(None)
                     self.call(lambda session, now: session.opened(now))
                 if not self._run_until((at_ns - self._epoch_ns) * 1e-9):
