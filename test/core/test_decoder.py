@@ -217,7 +217,7 @@ def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
 
 
 def test_a_knock_right_before_a_silence_is_delivered() -> None:
-    """Out of the calm, with an adapter's pause within it: its end is where the line falls silent."""
+    """Out of the calm, with an adapter's pause within it: it ends where the line falls silent."""
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)
     knock = ImuFrame((-2683, 3744, -16377), (0, 1, 1949))
