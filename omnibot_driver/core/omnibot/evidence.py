@@ -63,8 +63,13 @@ IMPOSSIBLE: Final = 2.0
 OFF_BEAT: Final = 1.0
 """Not four IMU frames to a delta, or not five deltas to a pose."""
 
+CONTRADICTED: Final = 1.5
+"""A pose that is turned otherwise than by the sum of the deltas since the one before."""
+
 IMU_HEADER_WORD: Final = -6
 """FF FA, read as a signed word."""
+ROUNDING: Final = 4.0
+"""Of five deltas, in 0.1 mrad."""
 LARGEST_DELTA: Final = 4000
 """Deltas are in 0.1 mm and 0.1 mrad: 10 m/s or 10 rad/s."""
 FARTHEST_POSE: Final = 1e7
@@ -85,6 +90,8 @@ class Context(NamedTuple):
     """Deltas since the last pose."""
     shaken: bool = False
     """The last IMU frame was a leap, or weightless."""
+    turned: int | None = None
+    """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 
     def damaged(self) -> "Context":
         """Nobody knows how much was lost."""
@@ -108,31 +115,31 @@ class Expectation:
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
         """The cost of a whole frame's content, and what is known after it."""
         if type(frame) is ImuFrame:
-            last, seq, pose, imus, deltas, shaken = before
+            last, seq, pose, imus, deltas, shaken, turned = before
             ax, ay, az = frame.accel
             cost = 0.0
             norm = ax * ax + ay * ay + az * az
             if not self._lightest < norm < self._heaviest:
                 if norm < self._lightest and IMU_HEADER_WORD in frame.accel:
-                    return LOOK_ALIKE, Context(frame, seq, pose, imus + 1, deltas, True)
+                    return LOOK_ALIKE, Context(frame, seq, pose, imus + 1, deltas, True, turned)
                 cost = AFTERSHOCK if shaken else WEIGHTLESS
-            after = Context(frame, seq, pose, imus + 1, deltas, cost > 0.0)
+            after = Context(frame, seq, pose, imus + 1, deltas, cost > 0.0, turned)
             if last is None:
                 return cost, after
             (px, py, pz), (pu, pv, pw) = last.accel, last.gyro
             u, v, w = frame.gyro
-            far, turned = self._accel_limit, self._gyro_limit
+            far, fast = self._accel_limit, self._gyro_limit
             if (
                 -far < ax - px < far
                 and -far < ay - py < far
                 and -far < az - pz < far
-                and -turned < u - pu < turned
-                and -turned < v - pv < turned
-                and -turned < w - pw < turned
+                and -fast < u - pu < fast
+                and -fast < v - pv < fast
+                and -fast < w - pw < fast
             ):
                 return cost, after
-            leaps = _leaps(frame.accel, last.accel, far) + _leaps(frame.gyro, last.gyro, turned)
-            after = Context(frame, seq, pose, imus + 1, deltas, True)
+            leaps = _leaps(frame.accel, last.accel, far) + _leaps(frame.gyro, last.gyro, fast)
+            after = Context(frame, seq, pose, imus + 1, deltas, True, turned)
             return (AFTERSHOCK if shaken else cost + LEAPS[leaps]), after
         if type(frame) is DeltaFrame:
             return self._weigh_delta(frame, before)
@@ -145,16 +152,19 @@ class Expectation:
         cost = 0.0
         if max(abs(frame.dx), abs(frame.dy), abs(frame.dtheta)) > LARGEST_DELTA:
             cost = IMPOSSIBLE
-        after = Context(before.imu, frame.seq, before.pose, 0, before.deltas + 1, before.shaken)
-        if before.seq is None:
+        imu, seq, pose, imus, deltas, shaken, turned = before
+        next_one = seq is not None and frame.seq == (seq + 1) & 255
+        turned = turned + frame.dtheta if next_one and turned is not None else None
+        after = Context(imu, frame.seq, pose, 0, deltas + 1, shaken, turned)
+        if seq is None:
             return cost, after
-        if frame.seq != (before.seq + 1) & 255:
+        if not next_one:
             return cost + JUMP, after
-        return (cost if before.imus == 4 else cost + OFF_BEAT), after
+        return (cost if imus == 4 else cost + OFF_BEAT), after
 
     @staticmethod
     def _weigh_pose(frame: PoseFrame, before: Context) -> tuple[float, Context]:
-        after = Context(before.imu, before.seq, frame, before.imus, 0, before.shaken)
+        after = Context(before.imu, before.seq, frame, before.imus, 0, before.shaken, 0)
         x, y, theta = frame.x, frame.y, frame.theta
         if not (abs(x) < FARTHEST_POSE and abs(y) < FARTHEST_POSE and abs(theta) < FARTHEST_POSE):
             return IMPOSSIBLE + JUMP, after
@@ -165,6 +175,9 @@ class Expectation:
             return JUMP, after
         moved = max(abs(x - last.x), abs(y - last.y), abs(theta - last.theta))
         cost = IMPOSSIBLE if moved > LONGEST_STEP else 0.0
+        turned = before.turned
+        if turned is not None and abs(10.0 * (theta - last.theta) - turned) > ROUNDING:
+            cost += CONTRADICTED
         return (cost if before.deltas == 5 and before.imus == 0 else cost + OFF_BEAT), after
 
     def learn(self, frame: ImuFrame, last: ImuFrame) -> None:
