@@ -28,7 +28,7 @@ class Recording:
     path: Path
     topic: str
     speed: float = 1.0
-    delay_s: float = 1.0
+    delay_s: float = 5.0
 
     def chunks(self) -> Iterator[tuple[int, bytes]]:
         """When something came in, in ns of the recorder's time, and what. Raises LinkError."""
@@ -56,7 +56,7 @@ def open_recording(url: str) -> Recording:
     location, _, query = url[len(SCHEME) :].partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))
     speed = _number(url, "speed", options.pop("speed", "1"), 0.01, math.inf)
-    delay_s = _number(url, "delay", options.pop("delay", "1"), 0.0, 3600.0)
+    delay_s = _number(url, "delay", options.pop("delay", "5"), 0.0, 3600.0)
     topic = options.pop("topic", "")
     if options:
         known = "speed, delay and topic"

@@ -137,7 +137,7 @@ def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
 
 def replay(stack: ExitStack, drive: Drive) -> tuple[Driver, Probe, dict[str, list[Message]]]:
     """A driver on the recorded wire, and what it publishes."""
-    driver = stack.enter_context(Driver(port=f"replay://{drive.bag}?speed=4&delay=2"))
+    driver = stack.enter_context(Driver(port=f"replay://{drive.bag}?speed=4&delay=7"))
     probe = stack.enter_context(Probe(driver.namespace))
     heard = {}
     for topic, kind in MEASURED.items():
