@@ -63,11 +63,11 @@ class Findings:
 class Rig:
     """Context manager. The driver's port is a symbolic link, as udev makes them."""
 
-    def __init__(self, folder: Path, board: BoardSettings | None = None, **parameters: Any) -> None:
-        self.line = BreakableLine(board or BoardSettings())
+    def __init__(self, folder: Path, *, grace_s: float = GRACE_S) -> None:
+        self._grace_s = grace_s
+        self.line = BreakableLine(BoardSettings())
         self.findings = Findings()
         self.port = str(folder / "omnibot")
-        self._parameters = parameters
         self._stack = ExitStack()
         self._unplugged_at_s: float | None = None
         self._terminal: PtyBoard | None = None
@@ -75,7 +75,7 @@ class Rig:
     def __enter__(self) -> Self:
         self.plug()
         self._stack.callback(self.unplug)
-        self.driver = self._stack.enter_context(Driver(port=self.port, **self._parameters))
+        self.driver = self._stack.enter_context(Driver(port=self.port))
         self.probe = self._stack.enter_context(Probe(self.driver.namespace))
         self.imu = self.probe.listen(Imu, "imu/data_raw")
         self.odom = self.probe.listen(Odometry, "odom")
@@ -128,13 +128,13 @@ class Rig:
 
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
         """From ``since_tick`` on the motors may be driven for so long, and not again."""
-        ticks = round((allowed_s + GRACE_S) / TICK_S)
+        ticks = round((allowed_s + self._grace_s) / TICK_S)
         self.wait_ticks(max(0, since_tick + ticks + 50 - self.line.tick))
         stood_s = max(0, self.line.driven_at - since_tick) * TICK_S
         self.findings.stood_after_s.append(stood_s)
         self.findings.expect(
-            stood_s <= allowed_s + GRACE_S,
-            f"{what}: motors driven for {stood_s:.2f} s, allowed {allowed_s + GRACE_S:.2f} s",
+            stood_s <= allowed_s + self._grace_s,
+            f"{what}: motors driven for {stood_s:.2f} s, allowed {allowed_s + self._grace_s:.2f} s",
         )
 
     def expect_obeys_again(self) -> None:
