@@ -67,3 +67,9 @@ def link_to(
         failed=listener.failed,
         **taps,
     )
+
+
+def driver_threads() -> list[str]:
+    """Those of links, recordings and simulated boards; a test runner has threads of its own."""
+    names = (thread.name for thread in threading.enumerate())
+    return sorted(name for name in names if name.startswith(("omnibot-", "simulated board")))

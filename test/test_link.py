@@ -20,7 +20,7 @@ from pathlib import Path
 import pytest
 import serial
 import serial.rfc2217
-from listener import LAST_WORDS, PATIENCE_S, Listener, link_to, session
+from listener import LAST_WORDS, PATIENCE_S, Listener, driver_threads, link_to, session
 
 from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.kinematics import BodyTwist
@@ -41,9 +41,9 @@ def board() -> Iterator[PtyBoard]:
 @pytest.fixture(autouse=True)
 def _nothing_is_left_behind() -> Iterator[None]:
     """Every link that a test opens gives its threads and descriptors back."""
-    threads, descriptors = threading.active_count(), os.listdir("/proc/self/fd")
+    threads, descriptors = driver_threads(), os.listdir("/proc/self/fd")
     yield
-    assert threading.active_count() == threads
+    assert driver_threads() == threads
     assert len(os.listdir("/proc/self/fd")) == len(descriptors)
 
 

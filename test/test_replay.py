@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import pytest
-from listener import Listener, link_to, session
+from listener import Listener, driver_threads, link_to, session
 
 from omnibot_driver.core.errors import LinkError, RequestRefused
 from omnibot_driver.core.kinematics import BodyTwist
@@ -76,9 +76,9 @@ def play(tape: Tape) -> Heard:
 
 @pytest.fixture(autouse=True)
 def _nothing_is_left_behind() -> Iterator[None]:
-    threads = threading.active_count()
+    threads = driver_threads()
     yield
-    assert threading.active_count() == threads
+    assert driver_threads() == threads
 
 
 def simulated(ticks: int, *, silent: range = range(0), line: FaultyLine | None = None) -> Chunks:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 import serial
-from listener import PATIENCE_S, Listener, link_to, session
+from listener import PATIENCE_S, Listener, driver_threads, link_to, session
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.kinematics import BodyTwist
@@ -21,9 +21,9 @@ from omnibot_driver.urls.protocol_sim import InProcessBoard
 @pytest.fixture(autouse=True)
 def _nothing_is_left_behind() -> Iterator[None]:
     """The board ends with its port."""
-    threads = threading.active_count()
+    threads = driver_threads()
     yield
-    assert threading.active_count() == threads
+    assert driver_threads() == threads
 
 
 def test_a_robot_drives_without_a_port_and_without_another_process() -> None:
