@@ -107,3 +107,18 @@ def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
     sequence = begun(7)
     sequence.reconnect()
     assert sequence.delta(200, 103.0) == Step(0, None, restarted=True)
+
+
+def test_a_read_that_comes_late_with_much_at_once_is_no_restart() -> None:
+    """Right after the counter wrapped, with one delta lost: the IMU frames came for both."""
+    sequence = Sequence()
+    sequence.delta(2, 10.0, imus=4)
+    assert sequence.delta(4, 12.4, imus=8) == Step(1)
+    assert sequence.delta(5, 12.4, imus=4) == Step(0)
+
+
+def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
+    """Few IMU frames came since, for a count that would say that many deltas are missing."""
+    sequence = Sequence()
+    sequence.delta(200, 10.0, imus=4)
+    assert sequence.delta(0, 13.0, imus=4).restarted

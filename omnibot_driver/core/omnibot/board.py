@@ -43,7 +43,6 @@ from omnibot_driver.core.omnibot.suspicion import Suspicion
 from omnibot_driver.core.se2 import Pose
 
 TICK_S: Final = 0.01
-IMUS_PER_DELTA: Final = 4
 RATES_HZ: Final = (100.0, 25.0, 5.0)
 DELTA_LSB: Final = (1e-4, 1e-4, 1e-4)
 """m, m, rad."""
@@ -252,7 +251,7 @@ class OmniBot:
 
     def _displacement(self, frame: DeltaFrame, now: float) -> DisplacementReading:
         self._paused_count = None
-        step = self._sequence.delta(frame.seq, now, whole=self._imus == IMUS_PER_DELTA)
+        step = self._sequence.delta(frame.seq, now, imus=self._imus)
         self._imus = 0
         words = (frame.dx, frame.dy, frame.dtheta)
         if self.settings.delta_frame == "wheel_counts":

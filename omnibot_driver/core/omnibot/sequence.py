@@ -10,6 +10,7 @@ from typing import Final
 
 DELTA_PERIOD_S: Final = 0.04
 DELTAS_PER_POSE: Final = 5
+IMUS_PER_DELTA: Final = 4
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
@@ -54,8 +55,11 @@ class Sequence:
         """The line is new."""
         self._reconnected, self._pose = True, None
 
-    def delta(self, count: int, now: float, *, whole: bool = False) -> Step:
-        """A delta with this count came in; ``whole``: with all that belongs to one period."""
+    def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
+        """A delta with this count came in, and so many IMU frames since the one before.
+
+        Reads may come seldom, and bring much at once: then IMU frames tell what time does not.
+        """
         before, self._delta = self._delta, count
         elapsed_s, self._delta_at = now - self._delta_at, now
         paused, self._paused = self._paused, False
@@ -70,11 +74,15 @@ class Sequence:
         lost += wraps * WRAP
         late_s = abs((lost + 1) * DELTA_PERIOD_S - elapsed_s)
         from_zero = count * DELTA_PERIOD_S <= elapsed_s + EARLY_S
-        if lost and late_s > LATE_S and (from_zero or reconnected):
+        accounted = 2 * imus >= IMUS_PER_DELTA * (lost + 1)
+        anew = reconnected or (from_zero and not accounted)
+        if lost and late_s > LATE_S and anew:
             self._pose = None
             return Step(0, None, restarted=True)
-        latest_s = (lost + 1) * DELTA_PERIOD_S - (DELTA_PERIOD_S / 2 if whole else LATE_S)
-        ahead = lost > 0 and elapsed_s < latest_s
+        latest_s = (lost + 1) * DELTA_PERIOD_S - (
+            DELTA_PERIOD_S / 2 if imus == IMUS_PER_DELTA else LATE_S
+        )
+        ahead = lost > 0 and elapsed_s < latest_s and not accounted
         self._ahead = ahead and not self._ahead
         if self._ahead:
             lost = max(0, round(elapsed_s / DELTA_PERIOD_S) - 1)
