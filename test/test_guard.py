@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from terminal import fill
 
 from omnibot_driver import guard
 from omnibot_driver.keeper import Keeper
@@ -42,14 +43,8 @@ class Line:
         return self.heard
 
     def fill(self) -> None:
-        """Until the kernel takes no more, not even after moving it from one buffer to the next."""
-        taken = 1
-        while taken:
-            taken = 0
-            with contextlib.suppress(BlockingIOError):
-                while True:
-                    taken += os.write(self.near, b"x")
-            time.sleep(0.05)
+        """See ``terminal``."""
+        fill(self.near)
 
     def hang_up(self) -> None:
         os.close(self._far)

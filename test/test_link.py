@@ -21,6 +21,7 @@ import pytest
 import serial
 import serial.rfc2217
 from listener import LAST_WORDS, PATIENCE_S, Listener, driver_threads, link_to, session
+from terminal import fill
 
 from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.kinematics import BodyTwist
@@ -199,14 +200,8 @@ class Terminal:
         self.path = os.ttyname(self._near)
 
     def fill(self) -> None:
-        """Until the kernel takes no more, not even after moving it from one buffer to the next."""
-        taken = 1
-        while taken:
-            taken = 0
-            with contextlib.suppress(BlockingIOError):
-                while True:
-                    taken += os.write(self._near, b"x")
-            time.sleep(0.05)
+        """See ``terminal``."""
+        fill(self._near)
 
     def read_until(self, words: bytes) -> bytes:
         """All that has been written, up to the time when these words are in it."""

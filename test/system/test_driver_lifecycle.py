@@ -7,7 +7,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -98,7 +97,7 @@ def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
     driver: Driver = start_driver(path, auto_start=False)
     probe_of(driver).wait_for_state("connecting")
     assert os.read(far, 100).endswith(STOP)
-    fill(path)
+    fill_terminal(path)
     assert driver.end(signal.SIGINT) == 0
     heard = b""
     while LAST_WORDS not in heard:
@@ -106,16 +105,10 @@ def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
         heard += os.read(far, 4096)
 
 
-def fill(terminal: str) -> None:
-    """Until the kernel takes no more, not even after moving it from one buffer to the next."""
-    descriptor = os.open(terminal, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    taken = 1
-    while taken:
-        taken = 0
-        with contextlib.suppress(BlockingIOError):
-            while True:
-                taken += os.write(descriptor, b"x")
-        time.sleep(0.05)
+def fill_terminal(path: str) -> None:
+    """From the side of a program that opened it."""
+    descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    fill(descriptor)
     os.close(descriptor)
 
 
