@@ -20,6 +20,7 @@ from rcl_interfaces.srv import DescribeParameters, SetParameters
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
+from terminal import fill
 
 from omnibot_driver.simulator import BoardMode, PtyBoard, SimulatedBoard
 
