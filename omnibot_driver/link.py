@@ -96,6 +96,12 @@ class Link:
         finally:
             self._deliver(events)
 
+    @property
+    def blocked(self) -> bool:
+        """The port is open and takes nothing; it is about to be opened anew."""
+        with self._changed:
+            return self._write_error is not None
+
     def command(self, action: Callable[[Session, float], None], sent_ns: int) -> None:
         """``call``, with a command sent at this time of day by the sender's clock.
 
@@ -146,11 +152,15 @@ class Link:
             try:
                 with closing(self._open()) as port:
                     self._report(None)
+                    comes_back = False
                     try:
                         self._attach(port)
                         self._read(port)
+                    except LinkError:
+                        comes_back = True
+                        raise
                     finally:
-                        self._detach()
+                        self._detach(comes_back=comes_back)
             except LinkError as error:
                 self._trouble = str(error)
                 self._report(self._trouble)
@@ -194,11 +204,12 @@ class Link:
                 events = self._settle()
             self._deliver(events)
 
-    def _detach(self) -> None:
+    def _detach(self, *, comes_back: bool) -> None:
         """Whatever ended the reading, the robot is not left with a command to carry out."""
         with self._changed:
             self._write(self._session.farewell("stop"))
-            stopped = self._write_error is None or not self._closing.is_set()
+            comes_back &= not self._closing.is_set()
+            stopped = self._write_error is None or comes_back
             keeper, self._port, self._keeper = self._keeper, None, None
             self._session.closed(time.monotonic())
             events = self._settle()

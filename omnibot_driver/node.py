@@ -354,6 +354,8 @@ class OmniBotDriver(Node):
     def _on_estop(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         active = bool(request.data)
         response.message = self._link.call(lambda session, now: session.estop(active, now))
+        if active and self._link.blocked:
+            response.message += "; the port takes nothing: the stop follows when it is open again"
         response.success = True
         return response
 

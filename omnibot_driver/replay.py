@@ -67,6 +67,11 @@ class Replay:
         finally:
             self._deliver(events, self._epoch_ns)
 
+    @property
+    def blocked(self) -> bool:
+        """Nothing is written, so nothing is in its way."""
+        return False
+
     def command(self, action: Callable[[Session, float], None], _sent_ns: int) -> None:
         """``call``; nobody is moved by it."""
         self.call(action)

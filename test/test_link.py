@@ -250,6 +250,45 @@ def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) 
     wait_for_threads_to_end()
 
 
+def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
+    """Whoever pressed it is told; it is the first to be written once there is room."""
+    listener, ours = Listener(), session(run=False)
+    link = link_to(terminal.path, listener, ours)
+    link.start()
+    terminal.read_until(STOP)
+    assert not link.blocked
+    terminal.fill()
+    link.call(lambda session, now: session.estop(True, now))
+    assert link.blocked
+    terminal.read_until(STOP + bytes.fromhex("FF FE 10 00 00 00 00 00 00"))
+    link.close("stop")
+
+
+def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: Terminal) -> None:
+    """The driver's own farewell finds no room; somebody has to say it."""
+    listener, ours = Listener(), session(run=False)
+    link = link_to(terminal.path, listener, ours)
+    link.start()
+    terminal.read_until(STOP)
+    terminal.fill()
+
+    closed, farewell_over = ours.closed, threading.Event()
+
+    def defective(data: bytes, now: float) -> None:
+        raise RuntimeError("a defect")
+
+    def tell_and_close(now: float) -> None:
+        farewell_over.set()
+        closed(now)
+
+    ours.receive, ours.closed = defective, tell_and_close  # type: ignore[method-assign]
+    os.write(terminal.far, b"x")
+    assert farewell_over.wait(PATIENCE_S)
+    terminal.read_until(LAST_WORDS)
+    link.close("stop")
+    wait_for_threads_to_end()
+
+
 def wait_for_threads_to_end() -> None:
     for thread in threading.enumerate():
         if thread.name.startswith("omnibot-"):
