@@ -15,7 +15,10 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11",
     install_requires=["pyserial", "PyYAML"],
-    extras_require={"replay": ["rosbags"]},
+    extras_require={
+        "replay": ["rosbags"],
+        "tools": ["matplotlib", "numpy", "rich", "rosbags", "scipy", "textual"],
+    },
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={NAME: ["py.typed"]},
     data_files=[

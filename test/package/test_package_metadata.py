@@ -31,7 +31,10 @@ ROSDEP_KEYS = {
 OPTIONAL = {"robot_localization", "rviz2"}
 
 # What pip brings and rosdep has no name for, by the extra that asks for it.
-EXTRAS = {"replay": ["rosbags"]}
+EXTRAS = {
+    "replay": ["rosbags"],
+    "tools": ["matplotlib", "numpy", "rich", "rosbags", "scipy", "textual"],
+}
 
 # Enough for values and arithmetic; nothing that waits, reads a clock or touches the world.
 PURE_MODULES = {
