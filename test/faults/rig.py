@@ -100,7 +100,6 @@ class Rig:
         self.estops = self.probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
         self.probe.wait_for_state("nominal")
         self.hand = self.make_hand()
-        self._stack.callback(self.hand.leave)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -108,7 +107,9 @@ class Rig:
 
     def make_hand(self) -> Hand:
         """Whoever commands the robot."""
-        return Stick(self.probe)
+        stick = Stick(self.probe)
+        self._stack.callback(stick.leave)
+        return stick
 
     # The line
 
