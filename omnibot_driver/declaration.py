@@ -29,7 +29,8 @@ def declare(node: Node) -> dict[str, Any]:
     }
     values = parameters.check_all(given)
     if file := values["calibration_file"]:
-        values |= calibration.load(Path(str(file)).expanduser())
+        found = calibration.load(Path(str(file)).expanduser())
+        values = parameters.check_all({**given, **found})
     for parameter in parameters.PARAMETERS:
         node.declare_parameter(
             parameter.name, values[parameter.name], _descriptor(parameter), ignore_override=True
