@@ -59,8 +59,10 @@ RAW_DEPTH = 1000
 LOOK_EVERY_S = WARN_EVERY_S = 2.0
 UNHEARD = ("disconnected", "connecting")
 MessageInfo = dict[str, int]
-NOT_OURS = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..+")
-"""Parameters that rclpy itself declares for every node."""
+NOT_OURS = re.compile(
+    r"use_sim_time|start_type_description_service|(qos_overrides|diagnostic_updater)\..+"
+)
+"""Parameters that rclpy itself, or diagnostic_updater, declares for every node."""
 
 
 class OmniBotDriver(Node):
