@@ -150,8 +150,8 @@ IMU: Final = (
         "calibration_file",
         "",
         "",
-        "YAML file that ~/calibrate_gyro writes; the gyro_bias and accel_bias in it replace those"
-        " given here.",
+        "YAML file that ~/calibrate_gyro and the tool calibrate write; what they found replaces"
+        " what is given here (docs/calibrate.md).",
         fixed=True,
     ),
 )
