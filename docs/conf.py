@@ -6,6 +6,7 @@ The site is made from the whole repository, so that a link leads in it where it 
 project = "omnibot_driver"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_rtd_theme"]
 myst_heading_anchors = 4
+myst_enable_extensions = ["html_image"]
 highlight_language = "none"
 html_theme = "sphinx_rtd_theme"
 autodoc_default_options = {"members": True, "member-order": "bysource"}
