@@ -24,10 +24,11 @@ setup(
     package_data={NAME: ["py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
-        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}", ["package.xml", "LICENSE", *glob("*.md"), *glob("*.rst")]),
+        (f"share/{NAME}/docs", glob("docs/*.md")),
         *(
             (f"share/{NAME}/{folder}", glob(f"{folder}/*.*"))
-            for folder in ("config", "docs", "launch", "rviz", "systemd", "udev", "urdf")
+            for folder in ("config", "docs/pictures", "launch", "rviz", "systemd", "udev", "urdf")
         ),
     ],
     entry_points={
