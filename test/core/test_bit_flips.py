@@ -10,8 +10,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from omnibot_driver.core.imu import ImuScale
+from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.se2 import Pose
-from omnibot_driver.core.session import ImuEstimate
 from omnibot_driver.simulator import BoardPose, BoardSettings
 
 IMU, DELTA, POSE = b"\xff\xfa", b"\xff\xfb", b"\xff\xfc"

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.session import RequestDone
-from omnibot_driver.core.supervisor import Request
+from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.simulator import BoardMode, BoardSettings
 
 RUNNING = ("nominal", "imu_only")
