@@ -15,6 +15,7 @@ from omnibot_driver.tools.needs import ToolError, need
 
 SUBCOMMANDS: Final = {
     "imu": "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
+    "scale": "linear_scale and angular_scale from commanded and measured speeds: the robot drives",
 }
 
 
