@@ -1,10 +1,10 @@
-"""The MPU6050 as it is mounted: upside down under the robot, +-2 g and +-250 degrees per second.
+"""The MPU6050 as it is mounted, by default upside down; +-2 g and +-250 degrees per second.
 
 Knows the sensor's scales, axes, bias and noise. Must not know the wire. The lever arm between the
 sensor and the body's origin is ignored (at 0.5 rad/s it would add less than 0.01 m/s²).
 """
 
-from math import cos, degrees, radians, sin, sqrt
+from math import cos, degrees, sin, sqrt
 from random import Random
 
 from omnibot_driver.simulator.motors import TICK_S
@@ -29,24 +29,24 @@ class Mpu6050:
         self._random = Random(f"imu {settings.seed}")
         self._wandering = Random(f"gyro bias {settings.seed}")
         self._bias_dps = settings.gyro_bias_dps
+        self._sensor_axes = _axes(*settings.imu_rpy_rad)
 
     def read(self, world: World) -> tuple[Triple, Triple]:
-        """Sample the accelerometer and the gyro, in raw counts along the sensor's axes.
-
-        Rolled by half a turn, the sensor keeps the body's x and sees its y and z reversed.
-        """
-        gauss, settings = self._random.gauss, self._settings
+        """Sample the accelerometer and the gyro, in raw counts along the sensor's axes."""
+        gauss, settings, held = self._random.gauss, self._settings, world.held
         ax_mps2, ay_mps2 = world.acceleration
-        forces_g = self._askew(
-            (ax_mps2 / STANDARD_GRAVITY_MPS2, -ay_mps2 / STANDARD_GRAVITY_MPS2, -1.0)
+        level = cos(held.pitch_rad)
+        up = (-sin(held.pitch_rad), level * sin(held.roll_rad), level * cos(held.roll_rad))
+        force_g = self._seen(
+            up[0] + ax_mps2 / STANDARD_GRAVITY_MPS2, up[1] + ay_mps2 / STANDARD_GRAVITY_MPS2, up[2]
         )
+        rates_dps = self._seen(0.0, 0.0, degrees(world.truth.yaw_rate + held.yaw_rate))
         ax, ay, az = (
             _counts((g + bias + gauss(0.0, settings.accel_noise_g)) * COUNTS_PER_G)
-            for g, bias in zip(forces_g, settings.accel_bias_g, strict=True)
+            for g, bias in zip(force_g, settings.accel_bias_g, strict=True)
         )
         if settings.gyro_walk_dps:
             self._wander()
-        rates_dps = self._askew((0.0, 0.0, -degrees(world.truth.yaw_rate)))
         gx, gy, gz = (
             _counts((rate + bias + gauss(0.0, settings.gyro_noise_dps)) * COUNTS_PER_DPS)
             for rate, bias in zip(rates_dps, self._bias_dps, strict=True)
@@ -58,9 +58,19 @@ class Mpu6050:
         x, y, z = (bias + self._wandering.gauss(0.0, step_dps) for bias in self._bias_dps)
         self._bias_dps = x, y, z
 
-    def _askew(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
-        """A vector along the axes of a straight sensor, along those of the tilted one."""
-        roll, pitch = map(radians, self._settings.imu_tilt_deg)
-        x, y, z = vector
-        x, z = cos(pitch) * x + sin(pitch) * z, cos(pitch) * z - sin(pitch) * x
-        return x, cos(roll) * y + sin(roll) * z, cos(roll) * z - sin(roll) * y
+    def _seen(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """A vector in the body's axes, along the sensor's."""
+        along_x, along_y, along_z = (
+            axis[0] * x + axis[1] * y + axis[2] * z for axis in self._sensor_axes
+        )
+        return along_x, along_y, along_z
+
+
+def _axes(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float, float], ...]:
+    """The sensor's three axes in the body's, after fixed-axis roll, pitch and yaw."""
+    sr, cr, sp, cp, sy, cy = sin(roll), cos(roll), sin(pitch), cos(pitch), sin(yaw), cos(yaw)
+    return (
+        (cy * cp, sy * cp, -sp),
+        (cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr),
+        (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr),
+    )
