@@ -13,7 +13,10 @@ from typing import Any, Final
 from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
 from omnibot_driver.tools.needs import ToolError, need
 
-SUBCOMMANDS: Final[dict[str, str]] = {}
+SUBCOMMANDS: Final = {
+    "imu": "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
+    "scale": "linear_scale and angular_scale from commanded and measured speeds: the robot drives",
+}
 
 
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
