@@ -31,6 +31,7 @@ setup(
     ],
     entry_points={
         "console_scripts": [
+            f"calibrate = {NAME}.tools.calibrate.__main__:main",
             f"demo = {NAME}.demo.__main__:main",
             f"driver = {NAME}.driver:main",
             f"simulator = {NAME}.simulator.__main__:main",

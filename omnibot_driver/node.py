@@ -154,7 +154,7 @@ class OmniBotDriver(Node):
         }
         values = parameters.check_all(given)
         if file := values["calibration_file"]:
-            values |= calibration.load(Path(file).expanduser())
+            values = parameters.check_all({**given, **calibration.load(Path(file).expanduser())})
         for parameter in parameters.PARAMETERS:
             self.declare_parameter(
                 parameter.name,

@@ -414,8 +414,8 @@ PARAMETERS: Final = (
         "calibration_file",
         "",
         "",
-        "YAML file that ~/calibrate_gyro writes; the gyro_bias and accel_bias in it replace those"
-        " given here.",
+        "YAML file that ~/calibrate_gyro and the tool calibrate write; what they found replaces"
+        " what is given here (docs/calibrate.md).",
         fixed=True,
     ),
     Parameter(

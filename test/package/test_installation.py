@@ -127,7 +127,7 @@ def test_colcon_installs_what_ros2_looks_for(prefix: Path) -> None:
 def test_colcon_installs_the_executables(prefix: Path) -> None:
     """`ros2 run` offers every executable file in lib/omnibot_driver: these and no more."""
     files = list((prefix / "lib" / PACKAGE).iterdir())
-    assert {file.name for file in files} == {"demo", "driver", "simulator"}
+    assert {file.name for file in files} == {"calibrate", "demo", "driver", "simulator"}
     assert all(os.access(file, os.X_OK) for file in files)
 
 

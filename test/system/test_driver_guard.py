@@ -1,6 +1,7 @@
 """A host that is lost: the driver is killed, crashes or hangs while the robot moves."""
 
 import contextlib
+import math
 import os
 import signal
 import time
@@ -119,6 +120,8 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
     commands = probe.publisher(TwistStamped, "cmd_vel")
+    commands.publish(TwistStamped(twist=twist(math.nan)))
+    driver.wait_for_line("motion command refused")  # so it hears this publisher
     driver.process.send_signal(signal.SIGSTOP)
     stamped = TwistStamped(twist=twist(0.2))
     stamped.header.stamp = probe.node.get_clock().now().to_msg()
