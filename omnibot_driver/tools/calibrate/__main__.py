@@ -13,8 +13,9 @@ from typing import Any, Final
 from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
 from omnibot_driver.tools.needs import ToolError, need
 
-SUBCOMMANDS: Final[dict[str, str]] = {
+SUBCOMMANDS: Final = {
     "step": "step response of each wheel, its motor, and gains for its controller: in the air",
+    "imu": "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
 }
 
 

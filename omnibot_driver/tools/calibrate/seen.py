@@ -63,33 +63,22 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
     if turned != [wheel]:
         raise Contradiction(
             f"wheel {name} was commanded and wheel {WHEELS[turned[0]]} was seen to turn. By the"
-            " manual A is front right, B front left, C at the back: if another wheel has that place,"
-            " look for the front by turning round the robot; if there is none, its wheels sit"
-            " elsewhere, which no parameter mends"
+            " manual A is front right, B front left, C at the back: if another side may be the"
+            " front, look from there; if none is, the wheels sit elsewhere, which no parameter mends"
         )
     return seen[wheel]
 
 
-def axis_sign(axis: int, seen: Pattern, wheel_signs: Pattern) -> int:
-    """1, or -1 for an axis that is reversed as a whole.
-
-    ``wheel_signs``: of each wheel by itself. Raises Contradiction for anything else.
-    """
-    expected = tuple(sign * wheel for sign, wheel in zip(wanted(axis), wheel_signs, strict=True))
-    if wheel_signs == (-1, -1, -1):
-        expected = wanted(axis)  # all the wheels reversed, as a whole, is all the axes reversed
+def axis_sign(axis: int, seen: Pattern) -> int:
+    """1, or -1 for an axis that is reversed as a whole. Raises Contradiction for anything else."""
+    expected = wanted(axis)
     if seen == expected:
         return 1
     if seen == tuple(-sign for sign in expected):
         return -1
-    wrong = [
-        WHEELS[n]
-        for n in range(3)
-        if seen[n] != (expected[n] if _agreeing(seen, expected) >= 2 else -expected[n])
-    ]
     raise Contradiction(
         f"for +{AXES[axis]} the wheels turn {in_words(expected)}, or all of them the other way;"
-        f" {in_words(seen)} is neither, because of wheel {' and '.join(wrong)}"
+        f" {in_words(seen)} is neither"
     )
 
 
@@ -97,7 +86,3 @@ def mirrored(signs: Sequence[int]) -> bool:
     """Whether these axes are a mirror image, which no place of the front explains."""
     x, y, yaw = signs
     return x * y != yaw
-
-
-def _agreeing(seen: Sequence[int], expected: Sequence[int]) -> int:
-    return sum(a == b for a, b in zip(seen, expected, strict=True))
