@@ -14,6 +14,7 @@ from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruptio
 from omnibot_driver.tools.needs import ToolError, need
 
 SUBCOMMANDS: Final = {
+    "commission": "which way round everything is: a guided walk, wheels off the ground",
     "step": "step response of each wheel, its motor, and gains for its controller: in the air",
     "imu": "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
 }

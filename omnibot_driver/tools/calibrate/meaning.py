@@ -26,6 +26,9 @@ ALIKE: Final = 0.35
 """Of a turn: directions that differ by less are the same, by 1 minus it or more another."""
 
 
+LEAST_M: Final = 1e-3
+
+
 @dataclass(frozen=True, slots=True)
 class Drift:
     """Mean velocity of a while, as the driver understands it: the body's axes, m/s and rad/s.
@@ -59,6 +62,14 @@ def drift(odometry: Odometry, begin_s: float, end_s: float) -> Drift:
     early, late = (_speed(half) for half in np.array_split(twist, 2))
     vx, vy, yaw_rate = (float(value) for value in twist.mean(axis=0))
     return Drift(vx, vy, yaw_rate, early, late)
+
+
+def require_motion(odometry: Odometry) -> None:
+    """Raises ToolError for a robot that has not moved at all."""
+    if not len(odometry.pose) or np.ptp(odometry.pose[:, :2], axis=0).max() < LEAST_M:
+        raise ToolError(
+            "the robot does not move when told: check the motors' power, and what the driver logs"
+        )
 
 
 def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod:

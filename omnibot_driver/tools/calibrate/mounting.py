@@ -74,6 +74,11 @@ def up(imu: Imu) -> Array:
     return force / length
 
 
+def bias(imu: Imu) -> Array:
+    """What the gyro says of rest."""
+    return np.asarray(np.mean(imu.rate_radps, axis=0))
+
+
 def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
     """From three directions straight up, of unit length. Raises Contradiction."""
     nose_rad, left_rad = _tilt(level, nose_up, "front"), _tilt(level, left_up, "left side")

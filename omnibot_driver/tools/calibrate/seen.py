@@ -53,7 +53,8 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
     turned = [n for n in range(3) if seen[n]]
     if not turned:
         raise Contradiction(
-            f"no wheel was seen to turn, but the board's encoders say that wheel {name} did"
+            f"no wheel was seen to turn, but wheel {name} was commanded: look again, and whether the"
+            " motors have power"
         )
     if len(turned) > 1:
         raise Contradiction(
@@ -64,7 +65,7 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
         raise Contradiction(
             f"wheel {name} was commanded and wheel {WHEELS[turned[0]]} was seen to turn. By the"
             " manual A is front right, B front left, C at the back: if another side may be the"
-            " front, look from there; if none is, the wheels sit elsewhere, which no parameter mends"
+            " front, look from there; if none is, no parameter mends the order of the wheels"
         )
     return seen[wheel]
 
