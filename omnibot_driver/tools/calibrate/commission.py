@@ -191,7 +191,7 @@ class _Walk:
         while True:
             self._console.say(f"\n{what}:")
             self._drive([(JOG_S, command)], topic=topic, obeys=self._obeys)
-            seen = self._console.ask(
+            seen: Pattern | str = self._console.ask(
                 "What did A, B, C do?",
                 _understand,
                 "Please answer with three of + - 0, such as +00, or r to see it again.",

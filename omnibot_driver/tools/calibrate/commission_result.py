@@ -42,9 +42,10 @@ def result_of(found: Found) -> Result:
     record: dict[str, Any] = {}
     if found.mounting is not None:
         chosen = found.mounting.snapped() or found.mounting
-        record["imu_rpy"] = [round(angle, 4) for angle in chosen.rpy_rad]
+        angles = [round(angle, 4) + 0.0 for angle in chosen.rpy_rad]  # no -0.0
+        record["imu_rpy"] = angles
         findings += _angles(found.mounting, chosen)
-        words = " ".join(f"{angle:.4f}" for angle in chosen.rpy_rad)
+        words = " ".join(f"{angle:.4f}" for angle in angles)
         notes.append(
             "The driver does not turn the IMU's axes, the robot's description does: start"
             f" description.launch.py with xacro_args:=\"imu_rpy:='{words}'\""
@@ -65,8 +66,8 @@ def _angles(measured: Mounting, chosen: Mounting) -> list[Finding]:
     rows = zip(names, measured.rpy_rad, chosen.rpy_rad, sigmas, strict=True)
     return [
         Finding(
-            name=f"{name} (taken as {math.degrees(taken):.0f}°)",
-            value=round(math.degrees(angle), 1),
+            name=f"{name} (taken as {round(math.degrees(taken))}°)",
+            value=round(math.degrees(angle), 1) + 0.0,
             sigma=sigma,
             unit="°",
         )

@@ -53,8 +53,8 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
     turned = [n for n in range(3) if seen[n]]
     if not turned:
         raise Contradiction(
-            f"no wheel was seen to turn, but wheel {name} was commanded: look again, and whether the"
-            " motors have power"
+            f"no wheel was seen to turn, but wheel {name} was commanded: look again, and whether"
+            " the motors have power"
         )
     if len(turned) > 1:
         raise Contradiction(
