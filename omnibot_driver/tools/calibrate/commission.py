@@ -114,8 +114,8 @@ class _Walk:
         found.control_method = control_method(slow, fast, slow_mps)
         if found.control_method == "position":
             say(
-                f"It did not hold its speed ({slow.late_mps:.3f}, then {fast.late_mps:.3f} m/s):"
-                " positional control."
+                f"Told to go {slow_mps:.3f} m/s, then {2 * slow_mps:.3f}, it went {slow.late_mps:.3f}"
+                f" and {fast.late_mps:.3f} in the end: positional control."
             )
             return
         say(f"{slow.speed_mps:.3f} m/s, then {fast.speed_mps:.3f}: velocity control.")
@@ -191,14 +191,15 @@ class _Walk:
         while True:
             self._console.say(f"\n{what}:")
             self._drive([(JOG_S, command)], topic=topic, obeys=self._obeys)
-            seen: Pattern | str = self._console.ask(
+            seen = self._console.ask(
                 "What did A, B, C do?",
                 _understand,
                 "Please answer with three of + - 0, such as +00, or r to see it again.",
             )
-            if not isinstance(seen, str):
+            if seen:
                 self._console.say(f"So: {in_words(seen)}.")
-                return seen
+                a, b, c = seen
+                return a, b, c
 
     # What gravity tells
 
@@ -256,5 +257,6 @@ class _Walk:
         return log
 
 
-def _understand(answer: str) -> Pattern | str | None:
-    return "again" if answer == "r" else understand(answer)
+def _understand(answer: str) -> tuple[int, ...] | None:
+    """A pattern, or nothing to see it again."""
+    return () if answer == "r" else understand(answer)

@@ -2,17 +2,23 @@
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
+from matplotlib.patches import Circle
 
 from omnibot_driver.parameters import Value
 from omnibot_driver.tools.calibrate.mounting import Mounting
 from omnibot_driver.tools.calibrate.result import Finding, Result
-from omnibot_driver.tools.calibrate.seen import Pattern, mirrored
+from omnibot_driver.tools.calibrate.seen import WHEELS, Pattern, mirrored
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+WHEEL_BEARINGS_RAD: Final = (-math.pi / 3, math.pi / 3, math.pi)
+"""Of A, B, C, from the front to the left (manual, Control equation)."""
+SEEN_FROM_ABOVE: Final = 0.3
+COLOURS: Final = {"x": "C3", "y": "C2", "z": "C0"}
 
 
 @dataclass(slots=True)
@@ -101,33 +107,39 @@ def _remarks(found: Found) -> list[str]:
 
 
 def draw(figure: "Figure", found: Found) -> None:
-    """The sensor's axes in the body, from above and from the side; or what was found in words."""
+    """From above: the axes that the board calls x and y, and those of the IMU."""
+    left, right = figure.subplots(1, 2)
+    for axes in (left, right):
+        axes.add_artist(Circle((0.0, 0.0), 1.0, fill=False, color="0.7"))
+        for name, bearing_rad in zip(WHEELS, WHEEL_BEARINGS_RAD, strict=True):
+            axes.text(math.cos(bearing_rad), math.sin(bearing_rad), name, ha="center", va="center")
+        axes.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.3), aspect="equal", xlabel="forward")
+        axes.set_ylabel("left")
+        axes.grid(alpha=0.3)
+    left.set_title("The board's x and y")
+    right.set_title("The IMU's axes")
+    if found.axis_signs is None:
+        _say(left, "not looked at")
+    else:
+        x, y, yaw = found.axis_signs
+        _arrow(left, (0.8 * x, 0.0), "x")
+        _arrow(left, (0.0, 0.8 * y), "y")
+        _say(left, f"yaw {'counter-' if yaw > 0 else ''}clockwise")
     if found.mounting is None:
-        lines = [f"{name}: {getattr(found, name)}" for name in ("control_method", "delta_frame")]
-        lines.append(f"axis_signs: {found.axis_signs}")
-        figure.text(0.1, 0.5, "\n".join(lines), fontsize=14)
-        return
-    axes: Any = figure.subplots(1, 2)
-    views = (
-        ("from above", 0, 1, "forward x", "left y"),
-        ("from the right", 0, 2, "forward x", "up z"),
-    )
-    for place, (view, right, upward, across, along) in zip(axes, views, strict=True):
-        for number, (name, colour) in enumerate(zip("xyz", ("C3", "C2", "C0"), strict=True)):
-            column = found.mounting.rotation[:, number]
-            tip = np.array([column[right], column[upward]])
-            place.annotate(
-                "", xy=tuple(tip), xytext=(0, 0), arrowprops={"arrowstyle": "->", "color": colour}
-            )
-            if np.linalg.norm(tip) > 0.3:
-                place.text(*(1.1 * tip), name, color=colour, ha="center", va="center")
-        place.add_artist(_circle())
-        place.set(xlim=(-1.3, 1.3), ylim=(-1.3, 1.3), aspect="equal")
-        place.set(title=f"The IMU's axes {view}", xlabel=across, ylabel=along)
-        place.grid(alpha=0.3)
+        _say(right, "not looked at")
+    else:
+        for name, column in zip("xyz", found.mounting.rotation.T, strict=True):
+            if math.hypot(column[0], column[1]) > SEEN_FROM_ABOVE:
+                _arrow(right, (0.8 * column[0], 0.8 * column[1]), name)
+            else:
+                _say(right, f"{name} points {'up' if column[2] > 0 else 'down'}")
 
 
-def _circle() -> Any:
-    from matplotlib.patches import Circle
+def _arrow(axes: "Axes", tip: tuple[float, float], name: str) -> None:
+    arrow = {"arrowstyle": "->", "color": COLOURS[name], "linewidth": 2}
+    axes.annotate("", xy=tip, xytext=(0.0, 0.0), arrowprops=arrow)
+    axes.text(1.15 * tip[0], 1.15 * tip[1], name, color=COLOURS[name], ha="center", va="center")
 
-    return Circle((0.0, 0.0), 1.0, fill=False, color="0.8")
+
+def _say(axes: "Axes", text: str) -> None:
+    axes.text(0.0, -1.2, text, ha="center", va="center")
