@@ -33,6 +33,7 @@ setup(
         "console_scripts": [
             f"demo = {NAME}.demo.__main__:main",
             f"driver = {NAME}.driver:main",
+            f"monitor = {NAME}.tools.monitor.__main__:main",
             f"simulator = {NAME}.simulator.__main__:main",
         ],
     },
