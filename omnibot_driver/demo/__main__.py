@@ -62,6 +62,8 @@ def run(seconds: float, asked_to_end: Callable[[], bool]) -> None:
         if not go_on_until(lambda: done_with() or not robot.missing(), PATIENCE_S):
             missing = ", ".join(robot.missing())
             raise driver.failure(f"after {PATIENCE_S:g} s still missing: {missing}")
+        if dashboard.possible:
+            go_on_until(lambda: done_with() or robot.watched(), PATIENCE_S)
         if done_with():
             return
         started_s, counts = time.monotonic(), (robot.imu.count, robot.odom.count)

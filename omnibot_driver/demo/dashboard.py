@@ -9,7 +9,7 @@ from omnibot_driver.tools.monitor.screen import has_screen
 
 
 class Dashboard:
-    """``monitor`` on this terminal, where that is ``possible``, until somebody quits it or ``close``.
+    """``monitor`` on this terminal, where that is ``possible``, until it is quitted or closed.
 
     It shows the driver of this namespace, as soon as there is one.
     """

@@ -42,7 +42,7 @@ class Robot:
             signal_handler_options=SignalHandlerOptions.NO,
         )
         self.close = rclpy.try_shutdown
-        node = rclpy.create_node("demo", namespace=namespace)
+        self._node = node = rclpy.create_node("demo", namespace=namespace)
         self._cmd_vel = node.create_publisher(Twist, "cmd_vel", 1)
         node.create_subscription(Imu, "imu/data_raw", self._on_imu, 50)
         node.create_subscription(Odometry, "odom", self._on_odom, 50)
@@ -63,6 +63,10 @@ class Robot:
         wanted_hz = {"imu/data_raw": 50, "odom": 12}
         missing = [f"{name} ({hz:.0f} Hz)" for name, hz in now_hz.items() if hz < wanted_hz[name]]
         return missing if self._state == "nominal" else [*missing, f"nominal state ({self._state})"]
+
+    def watched(self) -> bool:
+        """Whether somebody else listens to the odometry too."""
+        return self._node.count_subscribers("odom") > 1
 
     def stands(self) -> bool:
         """Whether it has been standing still for a while since it was driving."""

@@ -20,6 +20,9 @@ from omnibot_driver.tools.monitor.plot import ARROWS, draw_path
 from omnibot_driver.tools.monitor.teleop import LEVELS, DeadMan
 
 REFRESH_S: Final = 0.2
+PARTS: Final = ("title", "estop", "path", "figures", "verdicts", "teleop", "said")
+MOST_IN_FULL: Final = 4
+"""Verdicts, that all are in full; of more there is the beginning, as there is no room."""
 COLOURS: Final = {
     Level.OK: "green",
     Level.WARN: "yellow",
@@ -79,10 +82,10 @@ class Monitor(App[None]):
     #title { background: $panel; }
     #estop { color: $text-muted; }
     #estop.latched { background: red; color: white; text-style: bold; text-align: center; }
-    #middle { height: 1fr; }
+    #middle { height: 1fr; min-height: 8; }
     #path { width: 1fr; height: 1fr; border: round $panel; }
     #figures { width: 43; height: 1fr; padding: 0 0 0 1; }
-    #verdicts { height: auto; max-height: 9; padding: 0 1; }
+    #verdicts { height: auto; max-height: 10; padding: 0 1; }
     #said { height: auto; max-height: 2; min-height: 1; padding: 0 1; background: $panel; }
     Release { align: center middle; }
     Release Static { width: 48; height: auto; padding: 1 2; border: heavy red;
@@ -100,18 +103,17 @@ class Monitor(App[None]):
     def __init__(self, robot: Robot) -> None:
         super().__init__()
         self._robot = robot
+        self._parts = {name: Static(id=name, markup=False) for name in PARTS}
 
     def compose(self) -> ComposeResult:
         """From top to bottom."""
-        yield Static(id="title", markup=False)
-        yield Static(id="estop", markup=False)
-        with Horizontal(id="middle"):
-            yield Static(id="path", markup=False)
-            yield Static(id="figures", markup=False)
-        yield Static(id="verdicts", markup=False)
+        parts = self._parts
+        yield from (parts["title"], parts["estop"])
+        yield Horizontal(parts["path"], parts["figures"], id="middle")
+        yield parts["verdicts"]
         if self._robot.dead_man:
-            yield Static(id="teleop", markup=False)
-        yield Static(id="said", markup=False)
+            yield parts["teleop"]
+        yield parts["said"]
         yield Footer()
 
     def on_mount(self) -> None:
@@ -125,26 +127,23 @@ class Monitor(App[None]):
         """Show what is known now."""
         view = self._robot.view()
         self._show_title(view)
-        line = self._part("estop")
+        line = self._parts["estop"]
         line.set_class(bool(view.estop) or view.estop_asked, "latched")
         line.update(text.estop(view) + ("  ·  R releases it" if view.estop else ""))
         self._show_path(view)
-        self._part("figures").update(Text("\n".join(text.figures(view))))
-        verdicts = [(COLOURS[level], words) for level, words in text.verdicts(view)]
-        verdicts.append(("", text.counts(view)))
-        lines = [Text(words, style) for style, words in verdicts]
-        self._part("verdicts").update(Text("\n").join(lines))
-        self._part("said").update(Text(text.clean(view.said)))
+        self._parts["figures"].update(Text("\n".join(text.figures(view))))
+        self._show_verdicts(view)
+        self._parts["said"].update(Text(text.clean(view.said)))
         if self._robot.dead_man:
             self._show_teleop(self._robot.dead_man)
 
     def _show_title(self, view: View) -> None:
         silent = view.silent_s > text.SILENT_S
         colour = "bold red" if silent else f"bold {STATES.get(view.state, 'red')}"
-        self._part("title").update(Text(text.title(view), colour))
+        self._parts["title"].update(Text(text.title(view), colour))
 
     def _show_path(self, view: View) -> None:
-        plot = self._part("path")
+        plot = self._parts["path"]
         picture = draw_path(view.path, plot.content_size.width, plot.content_size.height, view.pose)
         plot.border_title = "odom, x → y ↑"
         plot.border_subtitle = f"{picture.width_m:.2f} m wide"
@@ -152,18 +151,21 @@ class Monitor(App[None]):
         drawn.highlight_regex(f"[{ARROWS}]", "bold yellow")
         plot.update(drawn)
 
+    def _show_verdicts(self, view: View) -> None:
+        verdicts = text.verdicts(view)
+        columns = self._parts["verdicts"].content_size.width
+        longest = columns if len(verdicts) > MOST_IN_FULL else None
+        lines = [Text(words[:longest], COLOURS[level]) for level, words in verdicts]
+        self._parts["verdicts"].update(Text("\n").join([*lines, Text(text.counts(view))]))
+
     def _show_teleop(self, dead_man: DeadMan) -> None:
         linear, angular = dead_man.speeds
-        self._part("teleop").update(
+        self._parts["teleop"].update(
             Text(
                 f"steer: WASD or arrows, J L turn, +/- speed {dead_man.level}/{LEVELS}: "
                 f"{linear:.2f} m/s {angular:.2f} rad/s"
             )
         )
-
-    def _part(self, name: str) -> Static:
-        """Of the screen below, whatever question stands before it."""
-        return self.screen_stack[0].query_one(f"#{name}", Static)
 
     # Keys
 

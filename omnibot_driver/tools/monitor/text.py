@@ -22,7 +22,6 @@ COUNTS: Final = (
     ("Link", "Reconnects", "reconnects"),
     ("Commands", "Refused", "refused"),
 )
-LARGEST_IN_FULL: Final = 1e4
 SILENT_S: Final = 3.0
 """Diagnostics come every second."""
 
@@ -36,8 +35,8 @@ def number(value: float | None, places: int = 2) -> str:
     """In seven columns, whatever it is."""
     if value is None:
         return "–".rjust(WIDTH)
-    if abs(value) >= LARGEST_IN_FULL and math.isfinite(value):
-        return f"{value:{WIDTH}.0e}"
+    if 999.9 < abs(value) < math.inf:
+        return f"{value:{WIDTH}.0f}" if abs(value) < 99_999.0 else f"{value:{WIDTH}.0e}"
     return f"{round(value, places) + 0.0:{WIDTH}.{places}f}"  # + 0.0 makes a rounded -0.0 positive
 
 
