@@ -4,7 +4,7 @@ Knows the sensor's scales, axes, bias and noise. Must not know the wire. The lev
 sensor and the body's origin is ignored (at 0.5 rad/s it would add less than 0.01 m/s²).
 """
 
-from math import cos, degrees, radians, sin, sqrt
+from math import cos, degrees, sin, sqrt
 from random import Random
 
 from omnibot_driver.simulator.motors import TICK_S
@@ -27,9 +27,7 @@ class Mpu6050:
     def __init__(self, settings: BoardSettings) -> None:
         self._settings = settings
         self._random = Random(f"imu {settings.seed}")
-        roll, pitch, yaw = settings.imu_rpy_rad
-        askew_roll, askew_pitch = map(radians, settings.imu_tilt_deg)
-        self._sensor_axes = _axes(roll + askew_roll, pitch + askew_pitch, yaw)
+        self._sensor_axes = _axes(*settings.imu_rpy_rad)
         self._wandering = Random(f"gyro bias {settings.seed}")
         self._bias_dps = settings.gyro_bias_dps
 
