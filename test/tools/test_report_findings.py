@@ -293,7 +293,10 @@ def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
     first, second = troubles(drive)
     assert first.level is Level.BAD
     assert "the gyro is stuck" in first.text
-    assert "Time said WARN 2 times, from 10 s on: “measurements wait” (2×)" in second.text
+    assert (
+        "Time (/dev/ttyUSB0) said WARN 2 times, from 10 s on: “measurements wait” (2×)"
+        in second.text
+    )
 
 
 def test_topics_that_are_missing_are_named(drive: Drive) -> None:

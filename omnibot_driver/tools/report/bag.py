@@ -10,6 +10,7 @@ from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from omnibot_driver.tools.needs import ToolError
+from omnibot_driver.tools.report.findings import counted
 from omnibot_driver.tools.report.log import Log
 from omnibot_driver.tools.report.recorder import Recorder
 from omnibot_driver.tools.report.robots import choose, find
@@ -29,9 +30,8 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
         connections = [connection for reader in readers for connection in reader.connections]
         if not any(reader.message_count for reader in readers):
             raise ToolError(f"{path} is empty: nothing was recorded into it")
-        robot, topics = choose(
-            find((item.topic, item.msgtype) for item in connections), namespace, str(path)
-        )
+        robots = find((item.topic, item.msgtype) for item in connections)
+        robot, topics = choose(robots, namespace, str(path))
         recorder = Recorder(robot)
         total = sum(item.msgcount for item in connections if item.topic in topics)
         types = get_typestore(Stores.ROS2_JAZZY)
@@ -48,11 +48,11 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
                     damaged += 1
         progress(total, total)
     if damaged:
-        troubles.append(f"{damaged} messages are damaged and were passed over")
+        troubles.append(f"{counted(damaged, 'message')} damaged, and passed over")
     if not recorder.count:
         why = "; ".join(troubles) or "its topics are empty"
         raise ToolError(f"{path} has no message of the robot {robot}: {why}")
-    return recorder.log(tuple(troubles))
+    return recorder.log(tuple(troubles), alone=len(robots) == 1)
 
 
 def _messages(
@@ -65,7 +65,7 @@ def _messages(
     try:
         yield from reader.messages(wanted)
     except Exception as error:  # whatever a damaged file makes the library stumble over
-        troubles.append(f"{reader.path} cannot be read to its end: {error}")
+        troubles.append(f"{reader.path} cannot be read to its end: {_in_a_line(error)}")
 
 
 def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
@@ -80,8 +80,8 @@ def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
         return [stack.enter_context(Reader(path))], []
     except Exception as error:
         raise ToolError(
-            f"{path} cannot be read: {error}. If its recorder was killed, repair it with"
-            f" `ros2 bag reindex {path if path.is_dir() else path.parent}`"
+            f"{path} cannot be read: {_in_a_line(error)}. If its recorder was killed,"
+            f" repair it with `ros2 bag reindex {path if path.is_dir() else path.parent}`"
         ) from error
 
 
@@ -98,7 +98,11 @@ def _open_unfinished(path: Path, stack: ExitStack) -> tuple[list[Reader], list[s
         try:
             readers.append(stack.enter_context(Reader(file)))
         except Exception as error:
-            troubles.append(f"{file.name} cannot be read: {error}")
+            troubles.append(f"{file.name} cannot be read: {_in_a_line(error)}")
     if not readers:
         raise ToolError(f"{path} cannot be read: {'; '.join(troubles)}")
     return readers, troubles
+
+
+def _in_a_line(error: Exception) -> str:
+    return " ".join(str(error).split()).rstrip(".")

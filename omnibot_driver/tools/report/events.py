@@ -59,7 +59,10 @@ def _states(log: Log) -> Iterator[Finding]:
 
 def _alive(log: Log, state: Span) -> bool:
     """Whether the driver went on speaking in this state."""
-    return any(status.at_s > state.begin_s + SILENT_S for status in log.diagnostics)
+    return any(
+        status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what
+        for status in log.diagnostics
+    )
 
 
 def _estop(log: Log) -> Iterator[Finding]:
@@ -80,20 +83,27 @@ def _estop(log: Log) -> Iterator[Finding]:
 
 
 def _diagnostics(log: Log) -> Iterator[Finding]:
-    """The worst word of each status, with how long it stood."""
+    """The worst word of each status, and how often it was said."""
+    if log.diagnostics and not log.alone:
+        ports = ", ".join(sorted({status.hardware_id for status in log.diagnostics}))
+        yield Finding(
+            Level.NOTE,
+            "Diagnostics",
+            f"/diagnostics is of several robots, on {ports}; all are told of here.",
+        )
     troubles = [
         status
         for status in log.diagnostics
         if status.level in (1, 2) and not _told_elsewhere(status)
     ]
-    for (_, name), group in groupby(sorted(troubles, key=_key), key=_key):
+    for (port, name), group in groupby(sorted(troubles, key=_key), key=_key):
         statuses = list(group)
         worst = max(statuses, key=lambda status: status.level)
         same = [status for status in statuses if status.message == worst.message]
         yield Finding(
             Level.BAD if worst.level == 2 else Level.WARN,
             "Diagnostics",
-            f"{name} said {LEVELS[worst.level]} {counted(len(statuses), 'time')}, from"
+            f"{name} ({port}) said {LEVELS[worst.level]} {counted(len(statuses), 'time')}, from"
             f" {statuses[0].at_s:.0f} s on: “{worst.message}” ({len(same)}×).",
             "docs/diagnostics.md explains each status.",
         )

@@ -37,7 +37,7 @@ def listen(
         node = rclpy.create_node("omnibot_report")
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        robot, topics, kinds = _discover(node, executor, namespace, asked_to_end)
+        robot, topics, kinds, alone = _discover(node, executor, namespace, asked_to_end)
         recorder = Recorder(robot)
         for topic, role in topics.items():
             _subscribe(node, recorder, topic, role, kinds[topic])
@@ -54,7 +54,7 @@ def listen(
         raise ToolError(
             f"the driver of {robot} said nothing for {seconds:g} s: is it still running?"
         )
-    return recorder.log()
+    return recorder.log(alone=alone)
 
 
 def _discover(
@@ -62,8 +62,8 @@ def _discover(
     executor: SingleThreadedExecutor,
     namespace: str | None,
     asked_to_end: Callable[[], bool],
-) -> tuple[str, Topics, dict[str, str]]:
-    """The robot, its topics, and their types."""
+) -> tuple[str, Topics, dict[str, str], bool]:
+    """The robot, its topics, all types, and whether there is no other robot."""
     deadline_s = time.monotonic() + DISCOVERY_S
     while True:
         executor.spin_once(timeout_sec=0.1)
@@ -88,7 +88,7 @@ def _discover(
                 " ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE as here?"
             ) from error
         if late or "imu/data_raw" in topics.values():
-            return robot, topics, kinds
+            return robot, topics, kinds, len(robots) == 1
 
 
 def _subscribe(node: Node, recorder: Recorder, topic: str, role: str, kind: str) -> None:

@@ -1,7 +1,7 @@
 """What was heard of one robot, as columns. Times are seconds since the log began."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -78,6 +78,7 @@ class Status:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Log:
     """``start_ns``: the time of day at which it began. ``troubles``: what could not be read.
+    ``alone``: there is no other robot, so /diagnostics, which all share, is this one's.
 
     Values, in SI units: ``imu`` angular velocity and specific force (6); ``odom`` x, y, yaw, and
     the twist (6); ``joint_states`` and ``wheel_cmd`` wheel rates (3); ``cmd_vel`` the twist (3).
@@ -95,11 +96,8 @@ class Log:
     estops: tuple[Span, ...] = ()
     diagnostics: tuple[Status, ...] = ()
     absent: tuple[str, ...] = ()
-    troubles: tuple[str, ...] = field(default=())
-
-    @property
-    def estop_told(self) -> bool:
-        return bool(self.estops)
+    troubles: tuple[str, ...] = ()
+    alone: bool = True
 
     @property
     def latched(self) -> list[Span]:
@@ -118,9 +116,3 @@ class Log:
         begin_s, end_s = begin_s - SETTLING_S, end_s + SETTLING_S
         touched = [span for span in self.states if span.begin_s < end_s and span.end_s > begin_s]
         return len(touched) > 1 or any(span.what not in running for span in touched)
-
-    def running_s(self, running: tuple[str, ...]) -> float:
-        """For how long measurements were to be expected."""
-        if not self.states:
-            return self.duration_s
-        return sum(span.length_s for span in self.states if span.what in running)

@@ -117,7 +117,7 @@ class Recorder:
             self._events[role].append((arrived_ns, message.data))
         self.count += 1
 
-    def log(self, troubles: tuple[str, ...] = ()) -> Log:
+    def log(self, troubles: tuple[str, ...] = (), *, alone: bool = True) -> Log:
         """All of it. There must have been a message."""
         times = [
             *(time for column in self._columns.values() for time in column.arrived_ns[:1]),
@@ -143,6 +143,7 @@ class Recorder:
             diagnostics=self._statuses(start_ns),
             absent=(*absent, *(name for name, events in self._events.items() if not events)),
             troubles=troubles,
+            alone=alone,
         )
 
     def _spans(

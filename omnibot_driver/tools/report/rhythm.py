@@ -145,7 +145,7 @@ def _gaps(log: Log, rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
     share = lost / (lost + len(rhythm.steps_s))
     counted_lost = grown(log, stream.lost)
     if counted_lost is None:
-        advice = "Record /diagnostics as well: it tells whether the line or the recorder lost them."
+        advice = "Whether the line or the recorder lost them, only /diagnostics of it alone tells."
     elif counted_lost == 0:
         advice = (
             "The driver counts no loss, so the network, the recorder or a busy computer lost them:"
@@ -189,10 +189,12 @@ def _arrival(rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
 
 
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
-    """By how much counts in /diagnostics have grown in all; None where they are not told.
+    """By how much this robot's counts in /diagnostics have grown; None where they are not told.
 
     A count that fell began anew with another driver.
     """
+    if not log.alone:
+        return None
     growth = [
         later - earlier if later >= earlier else later
         for key in keys

@@ -220,8 +220,11 @@ def _vibration(imu: Series, rest: Mask) -> Iterator[Finding]:
     above = moved.frequency_hz > VIBRATION_HZ
     power = (moved.density[above, 3:] ** 2).sum(axis=1)
     width_hz = float(moved.frequency_hz[1] - moved.frequency_hz[0])
-    rms, peak_hz = float(np.sqrt(power.sum() * width_hz)), moved.frequency_hz[above][power.argmax()]
-    figure = f"In motion it shakes by {rms:.2f} m/s² rms above {VIBRATION_HZ:g} Hz, most at {peak_hz:.1f} Hz"
+    rms = float(np.sqrt(power.sum() * width_hz))
+    figure = (
+        f"In motion it shakes by {rms:.2f} m/s² rms above {VIBRATION_HZ:g} Hz,"
+        f" most at {moved.frequency_hz[above][power.argmax()]:.1f} Hz"
+    )
     if rms > STRONG_VIBRATION_MPS2:
         yield Finding(
             Level.WARN, "IMU", f"{figure}.", "Look for a loose roller, a bent axle or rough ground."
