@@ -17,6 +17,7 @@ setup(
     install_requires=["pyserial", "PyYAML"],
     extras_require={
         "replay": ["rosbags"],
+        "test": ["pytest"],  # without it `colcon test` passes, and has run nothing
         "tools": ["matplotlib", "numpy", "rich", "rosbags", "scipy", "textual"],
     },
     packages=find_packages(include=[NAME, f"{NAME}.*"]),

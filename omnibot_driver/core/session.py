@@ -306,6 +306,10 @@ class Session:
         self._commands.discard()
         return data + (self._board.emergency_stop() if self.estop_active else b"")
 
+    def broken_off(self) -> bytes:
+        """What is to follow a write that failed half-way, before the port is closed."""
+        return self._board.wake() + (self._board.emergency_stop() if self.estop_active else b"")
+
     # What comes of it
 
     def take_output(self, now: float) -> bytes:

@@ -52,8 +52,6 @@ class BoardSettings:
     gyro_bias_dps, gyro_noise_dps: degrees per second in the sensor's axes; noise rms per reading.
     gyro_walk_dps: how far the bias wanders in a second, rms; with the root of time.
     accel_bias_g, accel_noise_g: in the sensor's axes; noise rms per reading.
-    imu_tilt_deg: what a sensor that is mounted askew adds to a roll of 180 and a pitch of 0
-        (fixed-axis angles, as in a robot's description).
     gyro_stuck: raw counts that the gyro reads for ever, whatever the motion.
     boot_time_s: from power-up or reset until the board is paused; dead meanwhile.
     initial_pose: the board's own pose at construction, for a board that has already driven.
@@ -85,7 +83,6 @@ class BoardSettings:
     gyro_walk_dps: float = 0.0
     accel_bias_g: tuple[float, float, float] = (0.0, 0.0, 0.0)
     accel_noise_g: float = 0.0028
-    imu_tilt_deg: tuple[float, float] = (0.0, 0.0)
     gyro_stuck: Triple | None = None
     boot_time_s: float = 0.3
     initial_pose: BoardPose = BoardPose()

@@ -12,6 +12,7 @@ import yaml
 from driver_process import Driver
 
 from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
+from omnibot_driver.tools.calibrate import robot as robot_module
 from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.interruption import Interruption
 from omnibot_driver.tools.calibrate.robot import connect
@@ -44,6 +45,7 @@ class Rig:
             self.questions.append(question)
             return answer(question)
 
+        robot_module.LOST_S = 3.0  # a busy machine is no lost robot
         files = ("--output", str(self.output), "--plot", str(self.folder))
         return main([*words, *files, "--namespace", self.driver.namespace], read)
 

@@ -114,7 +114,7 @@ def test_planted_errors_are_found_and_the_driver_loads_them(
         "gyro_bias_dps": planted,
         "gyro_noise_dps": 0.08,
         "accel_bias_g": (0.0, 0.0, -0.02),
-        "imu_tilt_deg": (1.5, -2.0),
+        "imu_rpy_rad": (math.radians(181.5), math.radians(-2.0), 0.0),
     }
     with rig(tmp_path, {"gyro_bias": [0.01, 0.0, 0.0]}, **sensor) as robot:
         robot.output.write_text("robot: number 7\n")

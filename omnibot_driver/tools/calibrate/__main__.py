@@ -17,6 +17,7 @@ SUBCOMMANDS: Final = {
     "commission": "which way round everything is: a guided walk, wheels off the ground",
     "step": "step response of each wheel, its motor, and gains for its controller: in the air",
     "imu": "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
+    "scale": "linear_scale and angular_scale from commanded and measured speeds: the robot drives",
 }
 
 

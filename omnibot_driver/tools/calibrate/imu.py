@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from omnibot_driver.core.imu import STANDARD_GRAVITY
+from omnibot_driver.tools.calibrate.arguments import positive
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.log import Imu
 from omnibot_driver.tools.calibrate.rest import Rest, rest, still
@@ -26,13 +27,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Of this subcommand alone."""
     parser.add_argument(
         "--minutes",
-        type=_positive,
+        type=positive,
         default=1.0,
         help="to rest (default 1; for a wandering bias ten and more)",
     )
     parser.add_argument(
         "--gravity",
-        type=_positive,
+        type=positive,
         default=STANDARD_GRAVITY,
         metavar="M/S²",
         help="where you are (default %(default)s)",
@@ -95,19 +96,11 @@ def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> R
         )
         for name, (_noise, unit) in stddevs.items()
     ]
-    findings += [
-        Finding(
-            name=f"accel_bias {axis}",
-            value=float(accel_bias[n]),
-            sigma=abs(float(found.up[n])) * along_sigma,
-            unit="m/s²",
-            before=now["accel_bias"][n],
-        )
-        for n, axis in enumerate(AXES)
-    ]
     roll_rad, pitch_rad = found.level_rad
     sigma_deg = math.degrees(found.level_sigma_rad)
     findings += [
+        Finding(name="accel_bias along gravity", value=too_long_mps2, sigma=along_sigma,
+                unit="m/s²", before=float(found.up @ now["accel_bias"])),
         Finding(name="gravity as measured", value=found.gravity_mps2,
                 sigma=float(found.force_sigma.max()), unit="m/s²"),
         Finding(name="IMU roll", value=math.degrees(roll_rad) % 360, sigma=sigma_deg, unit="°"),
@@ -175,13 +168,3 @@ def draw(figure: "Figure", found: Rest, imu: Imu) -> None:
     right.set(xscale="log", yscale="log")
     right.grid(which="both", alpha=0.3)
     right.legend()
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is no number above 0")
-    return value

@@ -40,6 +40,8 @@ LOST_S: Final = 0.3
 FOUND_WITHIN_S: Final = 5.0
 ANSWER_WITHIN_S: Final = 12.0
 STANDS_WITHIN_S: Final = 3.0
+STOOD_S: Final = 0.3
+"""Standing for so long is standing still."""
 STANDING: Final = 0.01
 """m/s and rad/s: slower is standing."""
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -355,13 +357,13 @@ class Robot:
         """Whether the robot stands. Not interrupted by anything; short where it is not heard."""
         began_s = now_s = time.monotonic()
         standing_since_s = math.inf
-        while now_s < max(began_s, min(self._odometry_at, began_s + STANDS_WITHIN_S)) + 2 * LOST_S:
+        while now_s < max(began_s, min(self._odometry_at, began_s + STANDS_WITHIN_S)) + 2 * STOOD_S:
             self._send(topic, HALT)
             self._hear(PERIOD_S)
             now_s = time.monotonic()
             moves = max(map(abs, self._twist)) > STANDING
             standing_since_s = math.inf if moves else min(standing_since_s, now_s)
-            if now_s - standing_since_s > LOST_S:
+            if now_s - standing_since_s > STOOD_S:
                 return True
         return False
 
