@@ -17,7 +17,7 @@ from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.node import OmniBotDriver
 from omnibot_driver.output import UnblockedOutput
 
-STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 USAGE: Final = "parameters are given like this: --ros-args -p port:=/dev/ttyUSB0"
 
 
