@@ -17,6 +17,8 @@ from omnibot_driver.tools.report.log import Log
 from omnibot_driver.tools.report.recorder import DIAGNOSTICS, EVENTS, Recorder
 from omnibot_driver.tools.report.robots import Topics, choose, find
 
+LOOK_ROUND_S: Final = 2.0
+"""Even where one robot is found at once there may be others."""
 DISCOVERY_S: Final = 5.0
 DEPTH: Final = 1000
 COMMANDS: Final = ("cmd_vel", "wheel_cmd")
@@ -64,11 +66,13 @@ def _discover(
     asked_to_end: Callable[[], bool],
 ) -> tuple[str, Topics, dict[str, str], bool]:
     """The robot, its topics, all types, and whether there is no other robot."""
-    deadline_s = time.monotonic() + DISCOVERY_S
+    began_s = time.monotonic()
     while True:
         executor.spin_once(timeout_sec=0.1)
+        spent_s = time.monotonic() - began_s
+        if spent_s < LOOK_ROUND_S and not asked_to_end():
+            continue
         kinds = {topic: types[0] for topic, types in node.get_topic_names_and_types()}
-        late = time.monotonic() >= deadline_s or asked_to_end()
         robots = {
             name: topics
             for name, topics in find(kinds.items()).items()
@@ -79,7 +83,9 @@ def _discover(
         try:
             robot, topics = choose(robots, namespace, "ROS")
         except ToolError as error:
-            if not late:
+            if robots and namespace is None:
+                raise
+            if spent_s < DISCOVERY_S and not asked_to_end():
                 continue
             if robots:
                 raise
@@ -87,8 +93,7 @@ def _discover(
                 f"no driver was heard for {DISCOVERY_S:g} s: is one running, with the same"
                 " ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE as here?"
             ) from error
-        if late or "imu/data_raw" in topics.values():
-            return robot, topics, kinds, len(robots) == 1
+        return robot, topics, kinds, len(robots) == 1
 
 
 def _subscribe(node: Node, recorder: Recorder, topic: str, role: str, kind: str) -> None:
