@@ -60,6 +60,11 @@ class Mpu6050:
         )
         return along_x, along_y, along_z
 
+    def _wander(self) -> None:
+        step_dps = self._settings.gyro_walk_dps * sqrt(TICK_S)
+        x, y, z = (bias + self._wandering.gauss(0.0, step_dps) for bias in self._bias_dps)
+        self._bias_dps = x, y, z
+
 
 def _axes(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float, float], ...]:
     """The sensor's three axes in the body's, after fixed-axis roll, pitch and yaw."""
