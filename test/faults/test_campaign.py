@@ -1,4 +1,4 @@
-"""Nearly every fault once, on the real node: the robot stands still in time and nothing false is said."""
+"""Nearly every fault once: the robot stands still in time and nothing false is said."""
 
 from collections.abc import Iterator
 from random import Random
