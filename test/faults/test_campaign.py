@@ -20,7 +20,9 @@ CASES = {name: case for name, case in survivable(seed=0).items() if name not in 
 
 
 @pytest.fixture(scope="module")
-def rig(tmp_path_factory: pytest.TempPathFactory, lenience: dict[str, float]) -> Iterator[Rig]:
+def rig(
+    _ros: None, tmp_path_factory: pytest.TempPathFactory, lenience: dict[str, float]
+) -> Iterator[Rig]:
     with Rig(tmp_path_factory.mktemp("line"), **lenience) as rig:
         yield rig
 

@@ -21,7 +21,7 @@ SOME_GOALS = (
 
 @pytest.fixture(scope="module")
 def network(
-    tmp_path_factory: pytest.TempPathFactory, lenience: dict[str, float]
+    _ros: None, tmp_path_factory: pytest.TempPathFactory, lenience: dict[str, float]
 ) -> Iterator[NetworkRig]:
     with NetworkRig(tmp_path_factory.mktemp("network"), **lenience) as rig:
         rig.wait_ticks(100)
@@ -41,7 +41,7 @@ def test_a_server_that_fails_leaves_a_robot_that_stands_and_obeys_again(
 
 @pytest.fixture(scope="module")
 def goals(
-    tmp_path_factory: pytest.TempPathFactory, lenience: dict[str, float]
+    _ros: None, tmp_path_factory: pytest.TempPathFactory, lenience: dict[str, float]
 ) -> Iterator[GoalRig]:
     with GoalRig(tmp_path_factory.mktemp("goals"), **lenience) as rig:
         rig.wait_ticks(100)
