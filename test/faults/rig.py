@@ -180,7 +180,7 @@ class Rig:
         times = sum(bool(re.search(pattern, line)) for line in self.driver.lines[mark:])
         self.findings.expect(times == 1, f"the log says {times} times: {pattern}")
 
-    def expect_ended(self, *exit_codes: int) -> None:
+    def expect_ended(self, *exit_codes: int, late_s: float = 0.0) -> None:
         """The driver leaves in time and with one of these."""
         begin_s = time.monotonic()
         try:
@@ -190,7 +190,9 @@ class Rig:
             code = self.driver.process.wait()
         took_s = time.monotonic() - begin_s
         self.findings.expect(code in exit_codes, f"exit code {code}: {self.driver.output}")
-        self.findings.expect(took_s < self._ends_within_s, f"it took {took_s:.1f} s to end")
+        self.findings.expect(
+            took_s < self._ends_within_s + late_s, f"it took {took_s:.1f} s to end"
+        )
 
     def expect_obeys_again(self) -> None:
         """A fresh command moves the robot; it stands when the hand leaves."""
