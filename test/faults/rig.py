@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from breakable_line import TICK_S, BreakableLine
+from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import PATIENCE_S, Driver
 from hands import Hand, Navigator, Stick
 from nav_msgs.msg import Odometry
@@ -99,6 +100,7 @@ class Rig:
         self.odom = self.probe.listen(Odometry, "odom")
         self.states = self.probe.listen(String, "omnibot_driver/state", latched=True)
         self.estops = self.probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
+        self._diagnostics = self.probe.listen(DiagnosticArray, "/diagnostics")
         self.probe.wait_for_state("nominal")
         self.hand = self.make_hand()
         return self
@@ -173,6 +175,17 @@ class Rig:
         self.findings.expect(
             stood_s <= allowed_s + self._grace_s,
             f"{what}: motors driven for {stood_s:.2f} s, allowed {allowed_s + self._grace_s:.2f} s",
+        )
+
+    def wait_for_diagnosis(self, pattern: str) -> None:
+        """``/diagnostics`` say so of this port, from now on."""
+        mark = len(self._diagnostics)
+        self.probe.wait_for(
+            lambda: any(
+                status.hardware_id == self.port and re.search(pattern, status.message)
+                for message in self._diagnostics[mark:]
+                for status in message.status
+            )
         )
 
     def expect_said_once(self, pattern: str, mark: int) -> None:
