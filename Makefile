@@ -46,7 +46,7 @@ docs: $(VENV)/.docs  ## write what is generated, and build the documents as a si
 integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), into docs/integrity.md
 	$(PY) test/integrity/report.py
 
-faults: $(VENV)/.test  ## break everything, with the real node (10 minutes), into docs/safety.md
+faults: $(VENV)/.test  ## break everything, with the real node (15 minutes), into docs/safety.md
 	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py
 
 soak: $(VENV)/.test  ## random faults for MINUTES (10)
