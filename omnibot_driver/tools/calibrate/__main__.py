@@ -16,6 +16,7 @@ from omnibot_driver.tools.needs import ToolError, need
 SUBCOMMANDS: Final = {
     "imu": "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
     "scale": "linear_scale and angular_scale from commanded and measured speeds: the robot drives",
+    "geometry": "wheel and base radius from lines, turns, squares and a tape measure",
 }
 
 
@@ -27,7 +28,7 @@ def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) 
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)
     try:
-        for library in ("numpy", "rich", "matplotlib"):
+        for library in ("numpy", "scipy", "rich", "matplotlib"):
             need(library)
         arguments = _parser().parse_args(own)
         with Interruption() as interruption:
