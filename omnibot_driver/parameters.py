@@ -329,6 +329,23 @@ PARAMETERS: Final = (
         high=1_000_000,
     ),
     Parameter(
+        "odom_linear_scale",
+        1.0,
+        "m/m",
+        "True way over the way that the board tells, which takes its wheels for nominal ones;"
+        " calibrate geometry finds it.",
+        low=0.5,
+        high=2.0,
+    ),
+    Parameter(
+        "odom_angular_scale",
+        1.0,
+        "rad/rad",
+        "Likewise, for turning.",
+        low=0.5,
+        high=2.0,
+    ),
+    Parameter(
         "fastest_linear_speed",
         2.0,
         "m/s",
@@ -564,6 +581,8 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
             use_board_pose=values["use_board_pose"],
             fastest_mps=values["fastest_linear_speed"],
             fastest_radps=values["fastest_angular_speed"],
+            linear_scale=values["odom_linear_scale"],
+            angular_scale=values["odom_angular_scale"],
         ),
         motion=MotionLimits(
             fastest_mps=values["fastest_linear_speed"],

@@ -18,6 +18,7 @@ SUBCOMMANDS: Final = {
     "step": "step response of each wheel, its motor, and gains for its controller: in the air",
     "imu": "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
     "scale": "linear_scale and angular_scale from commanded and measured speeds: the robot drives",
+    "geometry": "wheel and base radius from lines, turns, squares and a tape measure",
 }
 
 
