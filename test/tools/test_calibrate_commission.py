@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 
 import pytest
 from calibrate_rig import parameters_of, rig
+from seeing_user import User
 
 from omnibot_driver.parameters import PARAMETERS
-from omnibot_driver.simulator import PtyBoard
 from omnibot_driver.tools.calibrate import commission
 from omnibot_driver.tools.calibrate.commission_result import Found, result_of
 from omnibot_driver.tools.calibrate.console import Console
@@ -25,41 +25,6 @@ def _quickly(monkeypatch: pytest.MonkeyPatch) -> None:
         ("SETTLING_S", 0.3),
     ):
         monkeypatch.setattr(commission, name, value)
-
-
-class User:
-    """Sees the wheels, holds the robot as asked; ``wrong`` answers come first."""
-
-    def __init__(self, port: PtyBoard, *wrong: str) -> None:
-        self._port, self._wrong = port, list(wrong)
-        self._seen: list[tuple[float, float, float]] = []
-        self._step = port.board.step
-        port.board.step = self._look  # type: ignore[method-assign]
-
-    def _look(self) -> bytes:
-        sent = self._step()
-        self._seen.append(self._port.board.rim_speeds_mps)
-        return sent
-
-    def __call__(self, question: str) -> str:
-        with self._port.lock:
-            seen, self._seen = self._seen, []
-            self._port.board.hold()
-            if "A, B, C" in question:
-                return self._wrong.pop(0) if self._wrong else _pattern(seen[-150:])
-            if "front" in question:
-                self._port.board.hold(pitch_rad=-0.5, roll_rad=0.05)
-            elif "left side" in question:
-                self._port.board.hold(roll_rad=0.6)
-            elif "to the left" in question:
-                self._port.board.hold(yaw_rate=0.6)
-        return "y"
-
-
-def _pattern(speeds: list[tuple[float, float, float]]) -> str:
-    means = [sum(column) / len(speeds) for column in zip(*speeds, strict=True)]
-    most = max(map(abs, means))
-    return "".join("0" if abs(mean) < 0.1 * most else "+-"[mean < 0] for mean in means)
 
 
 def told(capsys: pytest.CaptureFixture[str]) -> str:
