@@ -36,6 +36,7 @@ setup(
             f"calibrate = {NAME}.tools.calibrate.__main__:main",
             f"demo = {NAME}.demo.__main__:main",
             f"driver = {NAME}.driver:main",
+            f"monitor = {NAME}.tools.monitor.__main__:main",
             f"simulator = {NAME}.simulator.__main__:main",
         ],
     },

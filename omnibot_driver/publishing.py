@@ -18,9 +18,11 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, String, UInt8MultiArray
 
 from omnibot_driver import messages, selfcheck
+from omnibot_driver.core.events import Event, Notice, StateChanged
 from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.odometry import OdometryEstimate
-from omnibot_driver.core.session import Event, Notice, RequestDone, Session, StateChanged
+from omnibot_driver.core.session import Session
+from omnibot_driver.core.supervisor import RequestDone
 from omnibot_driver.transforms import transform_publisher
 
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

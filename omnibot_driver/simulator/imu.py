@@ -4,9 +4,10 @@ Knows the sensor's scales, axes, bias and noise. Must not know the wire. The lev
 sensor and the body's origin is ignored (at 0.5 rad/s it would add less than 0.01 m/s²).
 """
 
-from math import cos, degrees, sin
+from math import cos, degrees, sin, sqrt
 from random import Random
 
+from omnibot_driver.simulator.motors import TICK_S
 from omnibot_driver.simulator.settings import BoardSettings
 from omnibot_driver.simulator.wire import Triple
 from omnibot_driver.simulator.world import World
@@ -27,6 +28,8 @@ class Mpu6050:
         self._settings = settings
         self._random = Random(f"imu {settings.seed}")
         self._sensor_axes = _axes(*settings.imu_rpy_rad)
+        self._wandering = Random(f"gyro bias {settings.seed}")
+        self._bias_dps = settings.gyro_bias_dps
 
     def read(self, world: World) -> tuple[Triple, Triple]:
         """Sample the accelerometer and the gyro, in raw counts along the sensor's axes."""
@@ -39,11 +42,14 @@ class Mpu6050:
         )
         rates_dps = self._seen(0.0, 0.0, degrees(world.truth.yaw_rate + held.yaw_rate))
         ax, ay, az = (
-            _counts((g + gauss(0.0, settings.accel_noise_g)) * COUNTS_PER_G) for g in force_g
+            _counts((g + bias + gauss(0.0, settings.accel_noise_g)) * COUNTS_PER_G)
+            for g, bias in zip(force_g, settings.accel_bias_g, strict=True)
         )
+        if settings.gyro_walk_dps:
+            self._wander()
         gx, gy, gz = (
             _counts((rate + bias + gauss(0.0, settings.gyro_noise_dps)) * COUNTS_PER_DPS)
-            for rate, bias in zip(rates_dps, settings.gyro_bias_dps, strict=True)
+            for rate, bias in zip(rates_dps, self._bias_dps, strict=True)
         )
         return (ax, ay, az), settings.gyro_stuck or (gx, gy, gz)
 
@@ -53,6 +59,11 @@ class Mpu6050:
             axis[0] * x + axis[1] * y + axis[2] * z for axis in self._sensor_axes
         )
         return along_x, along_y, along_z
+
+    def _wander(self) -> None:
+        step_dps = self._settings.gyro_walk_dps * sqrt(TICK_S)
+        x, y, z = (bias + self._wandering.gauss(0.0, step_dps) for bias in self._bias_dps)
+        self._bias_dps = x, y, z
 
 
 def _axes(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float, float], ...]:

@@ -44,12 +44,14 @@ class BoardSettings:
     wheel_radius_m, base_radius_m, counts_per_revolution: as the firmware believes them
         (manual, Vehicle Parameters).
     wheel_radius_scale: true radius of wheels A, B, C over `wheel_radius_m`.
+    base_radius_scale: true distance of the wheels from the centre over `base_radius_m`.
     slip: mean fraction of each wheel's rim motion that is lost on the floor; the momentary fraction
         wanders about it for each wheel by itself.
     imu_rpy_rad: how the IMU is mounted: the fixed-axis roll, pitch and yaw that turn the body's
         axes into the sensor's, as in a URDF.
     gyro_bias_dps, gyro_noise_dps: degrees per second in the sensor's axes; noise rms per reading.
-    accel_noise_g: rms per reading.
+    gyro_walk_dps: how far the bias wanders in a second, rms; with the root of time.
+    accel_bias_g, accel_noise_g: in the sensor's axes; noise rms per reading.
     gyro_stuck: raw counts that the gyro reads for ever, whatever the motion.
     boot_time_s: from power-up or reset until the board is paused; dead meanwhile.
     initial_pose: the board's own pose at construction, for a board that has already driven.
@@ -73,10 +75,13 @@ class BoardSettings:
     base_radius_m: float = 0.143
     counts_per_revolution: int = 390 * 4
     wheel_radius_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    base_radius_scale: float = 1.0
     slip: float = 0.0
     imu_rpy_rad: tuple[float, float, float] = (pi, 0.0, 0.0)
     gyro_bias_dps: tuple[float, float, float] = (-0.046, -0.038, -0.031)
     gyro_noise_dps: float = 0.05
+    gyro_walk_dps: float = 0.0
+    accel_bias_g: tuple[float, float, float] = (0.0, 0.0, 0.0)
     accel_noise_g: float = 0.0028
     gyro_stuck: Triple | None = None
     boot_time_s: float = 0.3

@@ -49,7 +49,7 @@ class World:
         self._motors = tuple(Motor(constants) for constants in settings.motors)
         rim_m_per_count = 2 * pi * settings.wheel_radius_m / settings.counts_per_revolution
         self._rim_m_per_count = [rim_m_per_count * scale for scale in settings.wheel_radius_scale]
-        self._base_radius_m = settings.base_radius_m
+        self._base_radius_m = settings.base_radius_m * settings.base_radius_scale
         self._mean_slip = settings.slip
         self._slip = [settings.slip] * 3
         self._pose = PlanarPose(0.0, 0.0, 0.0)

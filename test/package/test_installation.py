@@ -120,7 +120,7 @@ def test_the_installed_documents_link_to_installed_files(prefix: Path) -> None:
 def test_colcon_installs_the_executables(prefix: Path) -> None:
     """`ros2 run` offers every executable file in lib/omnibot_driver: these and no more."""
     files = list((prefix / "lib" / PACKAGE).iterdir())
-    assert {file.name for file in files} == {"calibrate", "demo", "driver", "simulator"}
+    assert {file.name for file in files} == {"calibrate", "demo", "driver", "monitor", "simulator"}
     assert all(os.access(file, os.X_OK) for file in files)
 
 
@@ -163,5 +163,5 @@ def test_pip_installs_the_same_files(sources: Path, tmp_path: Path) -> None:
     run([*pip, "--prefix", tmp_path / "prefix", copy], tmp_path)
     for name in SHARED_FILES:
         assert (tmp_path / "prefix/share" / name).is_file(), name
-    for name in ("driver", "simulator"):
+    for name in ("driver", "monitor", "simulator"):
         assert os.access(tmp_path / "prefix/bin" / name, os.X_OK)

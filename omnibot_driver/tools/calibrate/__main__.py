@@ -13,7 +13,12 @@ from typing import Any, Final
 from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
 from omnibot_driver.tools.needs import ToolError, need
 
-SUBCOMMANDS: Final[dict[str, str]] = {}
+SUBCOMMANDS: Final = {
+    "commission": "which way round everything is: a guided walk, wheels off the ground",
+    "step": "step response of each wheel, its motor, and gains for its controller: in the air",
+    "imu": "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
+    "scale": "linear_scale and angular_scale from commanded and measured speeds: the robot drives",
+}
 
 
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
@@ -24,7 +29,7 @@ def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) 
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)
     try:
-        for library in ("numpy", "rich", "matplotlib"):
+        for library in ("numpy", "scipy", "rich", "matplotlib"):
             need(library)
         arguments = _parser().parse_args(own)
         with Interruption() as interruption:

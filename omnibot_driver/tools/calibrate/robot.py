@@ -40,6 +40,8 @@ LOST_S: Final = 0.3
 FOUND_WITHIN_S: Final = 5.0
 ANSWER_WITHIN_S: Final = 12.0
 STANDS_WITHIN_S: Final = 3.0
+STOOD_S: Final = 0.3
+"""Standing for so long is standing still."""
 STANDING: Final = 0.01
 """m/s and rad/s: slower is standing."""
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -293,12 +295,14 @@ class Robot:
         bounds: Bounds,
         *,
         topic: Topic = "cmd_vel",
+        obeys: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
         """Move as the law says, within the bounds, then stand still; what was heard meanwhile.
 
         ``show`` is told the seconds. Raises ToolError, with the robot told to stand still, on
-        whatever is not as it should be: e-stop, lost data, another commander, no motion.
+        whatever is not as it should be: e-stop, lost data, another commander, no motion. Without
+        ``obeys`` the last of these is what is to be found out.
         """
         if self.parameters["control_method"] != "velocity":
             raise ToolError(
@@ -308,7 +312,7 @@ class Robot:
         self._sent.clear()
         self._foreign = False
         try:
-            self._follow(law, bounds, topic, show)
+            self._follow(law, bounds, topic, obeys, show)
         finally:
             stands = self._halt(topic)
         self._require_sound()
@@ -320,7 +324,12 @@ class Robot:
         return self.log
 
     def _follow(
-        self, law: Law, bounds: Bounds, topic: Topic, show: Callable[[float], object]
+        self,
+        law: Law,
+        bounds: Bounds,
+        topic: Topic,
+        obeys: bool,
+        show: Callable[[float], object],
     ) -> None:
         first, obedience = self._pose, Obedience(topic)
         began_s = last_s = time.monotonic()
@@ -331,7 +340,8 @@ class Robot:
             bounds.require_allowed(topic, target)
             command = bounds.approach(topic, command, target, max(PERIOD_S, now_s - last_s))
             measured = self._wheel_rates if topic == "wheel_cmd" else self._twist
-            obedience.look(now_s, now_s - last_s, command, measured)
+            if obeys:
+                obedience.look(now_s, now_s - last_s, command, measured)
             self._send(topic, command)
             self._spin(PERIOD_S)
             self._require_sound()
@@ -347,13 +357,13 @@ class Robot:
         """Whether the robot stands. Not interrupted by anything; short where it is not heard."""
         began_s = now_s = time.monotonic()
         standing_since_s = math.inf
-        while now_s < max(began_s, min(self._odometry_at, began_s + STANDS_WITHIN_S)) + 2 * LOST_S:
+        while now_s < max(began_s, min(self._odometry_at, began_s + STANDS_WITHIN_S)) + 2 * STOOD_S:
             self._send(topic, HALT)
             self._hear(PERIOD_S)
             now_s = time.monotonic()
             moves = max(map(abs, self._twist)) > STANDING
             standing_since_s = math.inf if moves else min(standing_since_s, now_s)
-            if now_s - standing_since_s > LOST_S:
+            if now_s - standing_since_s > STOOD_S:
                 return True
         return False
 
