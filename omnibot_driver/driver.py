@@ -17,7 +17,7 @@ from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.node import OmniBotDriver
 from omnibot_driver.output import UnblockedOutput
 
-STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 USAGE: Final = "parameters are given like this: --ros-args -p port:=/dev/ttyUSB0"
 
 
@@ -88,7 +88,7 @@ def _run(ending: Ending) -> None:
                 executor.spin_once()
         except ExternalShutdownException:
             ending.begin()
-        except Exception as error:
+        except BaseException as error:  # SystemExit as well: else nobody would be served any more
             driver.report_defect(error)
 
     spinner = threading.Thread(target=spin, name="omnibot-executor", daemon=True)

@@ -51,7 +51,7 @@ def test_a_corner_turns_the_robot_to_the_next_side(leg: int, before_m: float, ya
     assert abs(math.remainder(heading - direction - math.pi / 2, math.tau)) < 0.15
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(-0.02, 0.02), st.floats(-0.02, 0.02), st.floats(-0.1, 0.1))
 def test_the_square_closes(x_m: float, y_m: float, yaw_rad: float) -> None:
     """A robot that answers after 0.1 s passes all corners and ends a lap where it belongs."""
