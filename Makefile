@@ -47,10 +47,10 @@ integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), in
 	$(PY) test/integrity/report.py
 
 faults: $(VENV)/.test  ## break everything, with the real node (10 minutes), into docs/safety.md
-	PYTHONPATH=test/system $(PY) test/faults/campaign.py
+	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py
 
 soak: $(VENV)/.test  ## random faults for MINUTES (10)
-	PYTHONPATH=test/system $(PY) test/faults/campaign.py --minutes $(or $(MINUTES),10)
+	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py --minutes $(or $(MINUTES),10)
 
 lint: $(VENV)/.test  ## check formatting, style and types
 	$(PY) -m ruff format --check

@@ -109,7 +109,7 @@ class Port:
             raise LinkError(f"lost {self._url} while writing: {error}") from error
 
     def write_if_room(self, data: bytes) -> None:
-        """As much of it as is taken at once, be it nothing: into what room a failed write left."""
+        """As much of it as is taken at once, be it nothing."""
         if (descriptor := self.descriptor) is not None:
             with contextlib.suppress(OSError):
                 os.write(descriptor, data)

@@ -60,11 +60,11 @@ class Driver:
     def output(self) -> str:
         return "".join(self.lines)
 
-    def wait_for_line(self, pattern: str) -> str:
-        """The first line of the output in which the pattern is found."""
+    def wait_for_line(self, pattern: str, since: int = 0) -> str:
+        """The first line of the output, from this one on, in which the pattern is found."""
 
         def find() -> str | None:
-            return next((line for line in self.lines if re.search(pattern, line)), None)
+            return next((line for line in self.lines[since:] if re.search(pattern, line)), None)
 
         with self._said:
             if not self._said.wait_for(lambda: find() or self._ended(), PATIENCE_S):

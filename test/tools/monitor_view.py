@@ -31,6 +31,7 @@ def view(**changes: Any) -> View:
         "rate_radps": (0.0, 0.0, 0.01),
         "statuses": FINE,
         "path": ((0.0, 0.0), (1.5, -0.25)),
+        "steers": True,
         "said": "",
     }
     return View(**{**values, **changes})

@@ -114,7 +114,7 @@ class _Walk:
         found.control_method = control_method(slow, fast, slow_mps)
         if found.control_method == "position":
             say(
-                f"Told to go {slow_mps:.3f} m/s, then {2 * slow_mps:.3f}, it went {slow.late_mps:.3f}"
+                f"Told {slow_mps:.3f} m/s, then {2 * slow_mps:.3f}, it went {slow.late_mps:.3f}"
                 f" and {fast.late_mps:.3f} in the end: positional control."
             )
             return

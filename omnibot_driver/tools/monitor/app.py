@@ -135,7 +135,7 @@ class Monitor(App[None]):
         self._show_verdicts(view)
         self._parts["said"].update(Text(text.clean(view.said)))
         if self._robot.dead_man:
-            self._show_teleop(self._robot.dead_man)
+            self._show_teleop(self._robot.dead_man, view.steers)
 
     def _show_title(self, view: View) -> None:
         silent = view.silent_s > text.SILENT_S
@@ -158,14 +158,13 @@ class Monitor(App[None]):
         lines = [Text(words[:longest], COLOURS[level]) for level, words in verdicts]
         self._parts["verdicts"].update(Text("\n").join([*lines, Text(text.counts(view))]))
 
-    def _show_teleop(self, dead_man: DeadMan) -> None:
+    def _show_teleop(self, dead_man: DeadMan, steers: bool) -> None:
         linear, angular = dead_man.speeds
-        self._parts["teleop"].update(
-            Text(
-                f"steer: WASD or arrows, J L turn, +/- speed {dead_man.level}/{LEVELS}: "
-                f"{linear:.2f} m/s {angular:.2f} rad/s"
-            )
+        words = (
+            f"steer: WASD or arrows, J L turn, +/- speed {dead_man.level}/{LEVELS}: "
+            f"{linear:.2f} m/s {angular:.2f} rad/s"
         )
+        self._parts["teleop"].update(Text(words if steers else "steer: nobody takes cmd_vel yet"))
 
     # Keys
 

@@ -235,6 +235,8 @@ class Feed:
         ]
         name = self.driver.rpartition("/")[2]
         takers.sort(key=lambda info: info.node_name != name)
+        heard_by = self._cmd_vel.get_subscription_count() if self._cmd_vel else 0
+        self._model.steers = heard_by > 1  # one of them is ours
         if not takers:
             return
         kind = TwistStamped if takers[0].topic_type.endswith("/TwistStamped") else Twist

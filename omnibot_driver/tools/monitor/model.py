@@ -39,7 +39,10 @@ class Flow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """All of it at one moment. What is not known is None or empty."""
+    """All of it at one moment. What is not known is None or empty.
+
+    ``steers`` is whether somebody takes what is commanded here.
+    """
 
     driver: str
     state: str
@@ -55,6 +58,7 @@ class View:
     rate_radps: Vector3 | None
     statuses: tuple[Status, ...]
     path: tuple[tuple[float, float], ...]
+    steers: bool
     said: str
 
     @property
@@ -98,6 +102,7 @@ class Model:
     def __init__(self, driver: str, now_s: float) -> None:
         self.said = ""
         self.estop_asked = False
+        self.steers = False
         self._driver = driver
         self._state = ""
         self._estop: bool | None = None
@@ -161,6 +166,7 @@ class Model:
             rate_radps=self._rate,
             statuses=self._statuses,
             path=tuple(self._path),
+            steers=self.steers,
             said=self.said,
         )
 
