@@ -3,9 +3,9 @@
 import math
 import os
 import tempfile
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 os.environ.setdefault("ROS_DOMAIN_ID", "96")
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
@@ -61,33 +61,26 @@ def _drive(probe: Probe, recorder: Recorder, namespace: str) -> None:
         until = len(odom) + messages
         probe.wait_for(lambda: len(odom) >= until)
 
-    def steer_until(done: Any) -> None:
+    def steer_until(done: Callable[[], bool]) -> None:
         nonlocal leg
-        while not done(leg, pose := _pose(odom[-1])):
-            leg, told = steer(pose, leg)
+        while not done():
+            leg, told = steer(_pose(odom[-1]), leg)
             message = Twist()
             message.linear.x, message.linear.y = told.vx_mps, told.vy_mps
             message.angular.z = told.yaw_rate_radps
             publisher.publish(message)
             wait(1)
-        publisher.publish(Twist())
 
     leg = 0
     wait(REST)
-    steer_until(lambda leg, pose: leg == STOPPED_ON_LEG and pose.x_m < 0.5)
-    publisher.publish(_ahead())
-    wait(10)
+    steer_until(lambda: leg == STOPPED_ON_LEG and _pose(odom[-1]).x_m < 0.5)
     assert probe.call(SetBool, "estop", data=True).success
-    wait(REST)
+    released = len(odom) + REST
+    steer_until(lambda: len(odom) >= released)
     assert probe.call(SetBool, "estop", data=False).success
-    steer_until(lambda leg, _pose: leg > STOPPED_ON_LEG)
+    steer_until(lambda: leg > STOPPED_ON_LEG)
+    publisher.publish(Twist())
     wait(REST)
-
-
-def _ahead() -> Twist:
-    message = Twist()
-    message.linear.x = 0.1
-    return message
 
 
 def _pose(message: Odometry) -> Pose:
