@@ -89,6 +89,7 @@ def begins(data: bytes, kind: bytes) -> int:
 
 
 @given(flips)
+@example((DELTA, 6, 0, 0))
 @example((DELTA, 6, 3, 0))
 @example((DELTA, 0, 7, 4))
 @example((POSE, 4, 0, 8))
