@@ -50,8 +50,8 @@ def result_of(found: list[WheelFound], now: Gains) -> Result:
     notes = [sentence for wheel in found for sentence in _remarks(wheel)]
     notes += [
         f"With the gains that it has, {_told(behaviour(motor, now))}.",
-        f"With the better ones, {_told(behaviour(motor, better))} ({worst:.2f} on the wheel that they"
-        " suit least).",
+        f"With the better ones, {_told(behaviour(motor, better))} (on the wheel that they suit"
+        f" least, {worst:.2f}).",
         "No message sets them: they are constants of the firmware.",
     ]
     return Result(
@@ -119,8 +119,8 @@ def _remarks(wheel: WheelFound) -> list[str]:
     if second.rms_radps > MANY * QUANTUM_RADPS:
         remarks.append(
             f"Wheel {wheel.name}: it answers differently from step to step, by more than the"
-            f" {QUANTUM_RADPS} rad/s that encoder and wire make. Is something in its way, the battery"
-            " weak, this computer too busy?"
+            f" {QUANTUM_RADPS} rad/s that encoder and wire make. Is something in its way, the"
+            " battery weak, this computer too busy?"
         )
     if motor.rms_radps > UNEXPLAINED * second.rms_radps:
         remarks.append(
