@@ -44,7 +44,7 @@ STOOD_S: Final = 0.3
 """Standing for so long is standing still."""
 STANDING: Final = 0.01
 """m/s and rad/s: slower is standing."""
-LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @contextmanager
@@ -75,7 +75,8 @@ class Robot:
         self._executor.add_node(node)
         self.log = Log()
         """Of the motion or rest that is under way, or was last."""
-        self._state, self._estop = "", False
+        self._states: list[str] = []
+        self._estop = False
         self._imu_at = self._odometry_at = -math.inf
         self._pose, self._twist = Pose(), HALT
         self._wheel_rates = HALT
@@ -84,9 +85,10 @@ class Robot:
         self.driver = self._find()
         self.parameters = self._get_parameters()
         self._listen()
-        if not self._wait(lambda: self._state and self._imu_at > 0, FOUND_WITHIN_S):
+        if not self._wait(lambda: self._states and self._imu_at > 0, FOUND_WITHIN_S):
+            state = self._states[-1] if self._states else "unknown"
             raise ToolError(
-                f"{self.driver} sends no imu/data_raw (state: {self._state or 'unknown'}): see what"
+                f"{self.driver} sends no imu/data_raw (state: {state}): see what"
                 " it logs, and docs/troubleshooting.md"
             )
 
@@ -208,7 +210,7 @@ class Robot:
         self.log.wheel_rows.append((_seconds(message), *message.position, *rates))
 
     def _on_state(self, message: String) -> None:
-        self._state = message.data
+        self._states.append(message.data)
 
     def _on_estop(self, message: Bool) -> None:
         self._estop = message.data
@@ -247,15 +249,16 @@ class Robot:
     def _require_sound(self, states: Sequence[str] = ("nominal",)) -> None:
         if self._estop:
             raise ToolError("the e-stop is latched: release it with ~/estop, then begin again")
-        if self._state not in states:
-            raise ToolError(
-                f"the driver's state is {self._state}, not {' or '.join(states)}: see what it logs;"
-                " ~/start starts a paused board"
-            )
+        for state in self._states:
+            if state not in states:
+                raise ToolError(
+                    f"the driver's state is or was {state}, not {' or '.join(states)}: see what it"
+                    " logs; ~/start starts a paused board"
+                )
         lost = [
             topic
             for topic, at in (("imu/data_raw", "_imu_at"), ("odom", "_odometry_at"))
-            if self._unheard(at) and not (topic == "odom" and self._state == "imu_only")
+            if self._unheard(at) and not (topic == "odom" and self._states[-1] == "imu_only")
         ]
         if lost:
             raise ToolError(
@@ -267,6 +270,7 @@ class Robot:
         """Hear the robot anew: while a person was asked, nothing was heard."""
         self._imu_at = self._odometry_at = -math.inf
         self._wait(lambda: self._imu_at > 0 and self._odometry_at > 0, 1.0)
+        del self._states[:-1]
         self._require_sound(states)
         self.log = Log()
 
