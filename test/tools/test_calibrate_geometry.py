@@ -156,7 +156,7 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
     """The whole calibration in simulated time; slip shortens every way like a smaller wheel."""
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     console = Console(read=Surveyor(lambda: robot.bench.board), file=io.StringIO())
-    found = geometry.run(robot, console, arguments("--turning", "0.5"))
+    found = geometry.run(robot, console, arguments("--turns", "2", "--side", "0.7"))
     mean = sum(factors) / 3 * (1 - slip)
     planted = {
         "wheel_radius": 0.029 * mean,
