@@ -46,7 +46,7 @@ def load(path: Path) -> dict[str, Value]:
         raise _bad(path, f"is wrong ({error})") from error
 
 
-def save(path: Path, values: Mapping[str, Value]) -> None:
+def save(path: Path, values: Mapping[str, Any]) -> None:
     """Put these values into the file and leave the others. Raises ParameterError or OSError.
 
     Whoever reads it meanwhile, or loses power, has the old file or the new one.

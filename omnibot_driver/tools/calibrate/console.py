@@ -7,7 +7,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, TypeVar
 
 from rich.console import Console as RichConsole
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -15,6 +15,8 @@ from rich.table import Table
 
 from omnibot_driver.tools.calibrate.result import Finding
 from omnibot_driver.tools.needs import ToolError
+
+T = TypeVar("T")
 
 PLAIN_WIDTH: Final = 100
 """Of what goes into a pipe or a file."""
@@ -77,6 +79,16 @@ class Console:
             if low <= value <= high:
                 return value
             self.say(f"Please type a number of {unit} from {low:g} to {high:g}.")
+
+    def ask(self, question: str, understand: Callable[[str], T | None], otherwise: str) -> T:
+        """What an answer means; ``otherwise`` is said to one that means nothing."""
+        while (meant := understand(self._answer(f"{question} "))) is None:
+            self.say(otherwise)
+        return meant
+
+    def wait(self, request: str) -> None:
+        """Until whoever is there has done what no program can."""
+        self._answer(f"{request} [Enter] ")
 
     @contextmanager
     def progress(self, what: str) -> Iterator[Callable[[float], None]]:

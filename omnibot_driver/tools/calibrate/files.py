@@ -60,10 +60,10 @@ def write(result: Result, output: Path, picture: Path) -> None:
     result.draw(figure)
     try:
         figure.savefig(picture, dpi=110)
-        if result.parameters:
+        if result.parameters or result.record:
             for name, value in result.parameters.items():
                 BY_NAME[name].check(value)
-            calibration.save(output, result.parameters)
+            calibration.save(output, {**result.record, **result.parameters})
     except (OSError, ParameterError) as error:
         raise ToolError(f"the result cannot be written: {error}") from error
 

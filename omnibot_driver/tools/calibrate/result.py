@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from omnibot_driver.parameters import Value
 
@@ -26,10 +26,12 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """``parameters``: what the driver should load, by name; ``notes``: sentences for the user;
+    """``parameters``: what the driver should load, by name; ``record``: what else belongs into the
+    file, which the driver leaves alone; ``notes``: sentences for the user;
     ``draw``: fills a figure of 9 by 6 inches."""
 
     findings: list[Finding]
     parameters: Mapping[str, Value]
+    record: Mapping[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     draw: "Callable[[Figure], None]"

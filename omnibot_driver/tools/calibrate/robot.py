@@ -204,12 +204,14 @@ class Robot(Client):
         bounds: Bounds,
         *,
         topic: Topic = "cmd_vel",
+        obeys: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
         """Move as the law says, within the bounds, then stand still; what was heard meanwhile.
 
         ``show`` is told the seconds. Raises ToolError, with the robot told to stand still, on
-        whatever is not as it should be: e-stop, lost data, another commander, no motion.
+        whatever is not as it should be: e-stop, lost data, another commander, no motion. Without
+        ``obeys`` the last of these is what is to be found out.
         """
         if self.parameters["control_method"] != "velocity":
             raise ToolError(
@@ -219,7 +221,7 @@ class Robot(Client):
         self._sent.clear()
         self._foreign = False
         try:
-            self._follow(law, bounds, topic, show)
+            self._follow(law, bounds, topic, obeys, show)
         finally:
             stands = self._halt(topic)
         self._require_sound()
@@ -231,7 +233,12 @@ class Robot(Client):
         return self.log
 
     def _follow(
-        self, law: Law, bounds: Bounds, topic: Topic, show: Callable[[float], object]
+        self,
+        law: Law,
+        bounds: Bounds,
+        topic: Topic,
+        obeys: bool,
+        show: Callable[[float], object],
     ) -> None:
         first, obedience = self._pose, Obedience(topic)
         began_s = last_s = time.monotonic()
@@ -242,7 +249,8 @@ class Robot(Client):
             bounds.require_allowed(topic, target)
             command = bounds.approach(topic, command, target, max(PERIOD_S, now_s - last_s))
             measured = self._wheel_rates if topic == "wheel_cmd" else self._twist
-            obedience.look(now_s, now_s - last_s, command, measured)
+            if obeys:
+                obedience.look(now_s, now_s - last_s, command, measured)
             self._send(topic, command)
             self._spin(PERIOD_S)
             self._require_sound()
