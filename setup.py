@@ -24,10 +24,11 @@ setup(
     package_data={NAME: ["py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
-        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}", ["package.xml", "LICENSE", *glob("*.md"), *glob("*.rst")]),
+        (f"share/{NAME}/docs", glob("docs/*.md")),
         *(
             (f"share/{NAME}/{folder}", glob(f"{folder}/*.*"))
-            for folder in ("config", "docs", "launch", "rviz", "systemd", "udev", "urdf")
+            for folder in ("config", "docs/pictures", "launch", "rviz", "systemd", "udev", "urdf")
         ),
     ],
     entry_points={
@@ -35,6 +36,8 @@ setup(
             f"calibrate = {NAME}.tools.calibrate.__main__:main",
             f"demo = {NAME}.demo.__main__:main",
             f"driver = {NAME}.driver:main",
+            f"monitor = {NAME}.tools.monitor.__main__:main",
+            f"report = {NAME}.tools.report.__main__:main",
             f"simulator = {NAME}.simulator.__main__:main",
         ],
     },

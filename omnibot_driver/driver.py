@@ -88,7 +88,7 @@ def _run(ending: Ending) -> None:
                 executor.spin_once()
         except ExternalShutdownException:
             ending.begin()
-        except Exception as error:
+        except BaseException as error:  # SystemExit as well: else nobody would be served any more
             driver.report_defect(error)
 
     spinner = threading.Thread(target=spin, name="omnibot-executor", daemon=True)

@@ -16,8 +16,10 @@ from functools import partial
 from typing import Final, TypeVar
 
 from omnibot_driver.core.errors import CommandRefused, LinkError
-from omnibot_driver.core.session import Event, Notice, OnExit, Session
+from omnibot_driver.core.events import Event, Notice
+from omnibot_driver.core.session import Session
 from omnibot_driver.core.snapshot import LinkFigures, SessionFigures
+from omnibot_driver.core.supervisor import OnExit
 from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
 from omnibot_driver.port import Port
 from omnibot_driver.standstill import Standstill

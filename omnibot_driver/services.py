@@ -13,8 +13,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver import calibration
 from omnibot_driver.core.errors import RequestRefused
-from omnibot_driver.core.session import RequestDone, Session
-from omnibot_driver.core.supervisor import Request
+from omnibot_driver.core.session import Session
+from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.link import Link
 from omnibot_driver.replay import Replay
 

@@ -24,8 +24,9 @@ from listener import LAST_WORDS, PATIENCE_S, Listener, driver_threads, link_to, 
 from terminal import fill
 
 from omnibot_driver.core.errors import CommandRefused, LinkError
+from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.session import Event, Notice, Session
+from omnibot_driver.core.session import Session
 from omnibot_driver.port import PEER_OPTIONS, Port
 from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
 from omnibot_driver.standstill import SETTLE_S

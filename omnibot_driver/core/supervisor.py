@@ -9,7 +9,7 @@ module knows no bytes and reads no clock.
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, Literal
 
 from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.errors import RequestRefused
@@ -25,6 +25,8 @@ IN_FLIGHT_S: Final = 0.1
 one that is followed by data within this time does not show that the board is paused."""
 ANSWER_WITHIN_S: Final = 4.5
 RESET_WITHIN_S: Final = 9.5
+
+OnExit = Literal["stop", "pause", "reset"]
 
 
 class Request(Enum):
@@ -182,6 +184,17 @@ class Supervisor:
             self._give_up(now)
         elif self.phase is Phase.STARTING and now - self._said_at >= START_RETRY_S:
             self._say(self._board.start(), now)
+
+    def farewell(self, on_exit: OnExit) -> bytes:
+        """The last bytes to the board: it is stopped in any case, and left so."""
+        settled = self.phase is Phase.SETTLED
+        if on_exit == "reset":
+            return self._board.reset()
+        if on_exit == "pause" and settled and self._board.mode.running:
+            return self._board.pause()
+        if on_exit == "pause" and not (settled and self._board.mode is Mode.PAUSED):
+            return self._board.force_pause()
+        return self._board.stop()
 
     def _begin(self, now: float) -> None:
         """The opening sequence; a board that is not wanted running gets no S."""

@@ -27,9 +27,9 @@ class Mpu6050:
     def __init__(self, settings: BoardSettings) -> None:
         self._settings = settings
         self._random = Random(f"imu {settings.seed}")
+        self._sensor_axes = _axes(*settings.imu_rpy_rad)
         self._wandering = Random(f"gyro bias {settings.seed}")
         self._bias_dps = settings.gyro_bias_dps
-        self._sensor_axes = _axes(*settings.imu_rpy_rad)
 
     def read(self, world: World) -> tuple[Triple, Triple]:
         """Sample the accelerometer and the gyro, in raw counts along the sensor's axes."""
@@ -53,17 +53,17 @@ class Mpu6050:
         )
         return (ax, ay, az), settings.gyro_stuck or (gx, gy, gz)
 
-    def _wander(self) -> None:
-        step_dps = self._settings.gyro_walk_dps * sqrt(TICK_S)
-        x, y, z = (bias + self._wandering.gauss(0.0, step_dps) for bias in self._bias_dps)
-        self._bias_dps = x, y, z
-
     def _seen(self, x: float, y: float, z: float) -> tuple[float, float, float]:
         """A vector in the body's axes, along the sensor's."""
         along_x, along_y, along_z = (
             axis[0] * x + axis[1] * y + axis[2] * z for axis in self._sensor_axes
         )
         return along_x, along_y, along_z
+
+    def _wander(self) -> None:
+        step_dps = self._settings.gyro_walk_dps * sqrt(TICK_S)
+        x, y, z = (bias + self._wandering.gauss(0.0, step_dps) for bias in self._bias_dps)
+        self._bias_dps = x, y, z
 
 
 def _axes(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float, float], ...]:

@@ -8,7 +8,7 @@ import pytest
 from bench import EMERGENCY_STOP, OPENING, STOP, Bench
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.session import StateChanged
+from omnibot_driver.core.events import StateChanged
 from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.simulator import BoardMode, BoardSettings
 

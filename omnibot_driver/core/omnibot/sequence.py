@@ -74,7 +74,7 @@ class Sequence:
         lost += wraps * WRAP
         late_s = abs((lost + 1) * DELTA_PERIOD_S - elapsed_s)
         from_zero = count * DELTA_PERIOD_S <= elapsed_s + EARLY_S
-        accounted = 2 * imus >= IMUS_PER_DELTA * (lost + 1)
+        accounted = 2 * imus > IMUS_PER_DELTA * (lost + 1)
         anew = reconnected or (from_zero and not accounted)
         if lost and late_s > LATE_S and anew:
             self._pose = None
