@@ -93,7 +93,8 @@ class View:
                 yield from ((f"{name} x", twist.vx_mps), (f"{name} y", twist.vy_mps))
                 yield f"{name} turn", twist.yaw_rate_radps
         for name, vector in (("acceleration", force), ("angular velocity", rate)):
-            yield from ((f"{name} {axis}", value) for axis, value in zip("xyz", vector or ()))  # noqa: B905
+            for axis, value in zip("xyz", vector or (), strict=False):
+                yield f"{name} {axis}", value
 
 
 class Model:
@@ -102,7 +103,6 @@ class Model:
     def __init__(self, driver: str, now_s: float) -> None:
         self.said = ""
         self.estop_asked = False
-        self.steers = False
         self._driver = driver
         self._state = ""
         self._estop: bool | None = None
@@ -144,7 +144,7 @@ class Model:
         """``/diagnostics`` of this driver."""
         self._statuses, self._heard_s = statuses, now_s
 
-    def view(self, now_s: float) -> View:
+    def view(self, now_s: float, *, steers: bool = False) -> View:
         """All that is known now."""
         moves = self._commanded and now_s - self._commanded[1] < COMMAND_LIVES_S
         imu, odom = (
@@ -166,7 +166,7 @@ class Model:
             rate_radps=self._rate,
             statuses=self._statuses,
             path=tuple(self._path),
-            steers=self.steers,
+            steers=steers,
             said=self.said,
         )
 
