@@ -37,6 +37,7 @@ setup(
             f"demo = {NAME}.demo.__main__:main",
             f"driver = {NAME}.driver:main",
             f"monitor = {NAME}.tools.monitor.__main__:main",
+            f"report = {NAME}.tools.report.__main__:main",
             f"simulator = {NAME}.simulator.__main__:main",
         ],
     },

@@ -86,6 +86,15 @@ def test_the_end_of_the_driver_is_no_lost_board(drive: Drive) -> None:
     assert "ended at 19.5 s" in said(drive, "State", "driver").text
 
 
+def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
+    """20 ms ahead, and slowly back, as of a driver that was kept from reading."""
+    drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
+    drive.imu.late_s = drive.imu.late_s + 0.05
+    (leap,) = troubles(drive)
+    assert "leapt 1 time, by up to 20 ms, first at 8.0 s" in leap.text
+    assert "no gap" in said(drive, "Gaps", "imu/data_raw").text
+
+
 def test_uneven_stamps_are_noticed(drive: Drive) -> None:
     """Stamps that are arrival times, say."""
     drive.imu.stamp_s = drive.imu.stamp_s + np.random.default_rng(2).uniform(0, 4e-3, 2000)

@@ -1,5 +1,6 @@
 """What the driver said of itself: its state, the e-stop, /diagnostics."""
 
+from collections import Counter
 from collections.abc import Iterator
 from itertools import groupby
 from typing import Final
@@ -10,6 +11,7 @@ from omnibot_driver.tools.report.log import Log, Span, Status
 LEVELS: Final = ("OK", "WARN", "ERROR", "STALE")
 FIRST_SECONDS: Final = 3.0
 """In which a driver that has just been started may still be connecting."""
+LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
 """A driver that has published no /diagnostics for so long is not there."""
 
@@ -39,7 +41,7 @@ def _states(log: Log) -> Iterator[Finding]:
     if lost:
         yield Finding(
             Level.BAD
-            if sum(state.length_s for state in lost) > 0.1 * log.duration_s
+            if sum(state.length_s for state in lost) > LONG_OUT_OF_REACH * log.duration_s
             else Level.WARN,
             "State",
             f"The board was out of reach {counted(len(lost), 'time')}, first at"
@@ -98,13 +100,14 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
     ]
     for (port, name), group in groupby(sorted(troubles, key=_key), key=_key):
         statuses = list(group)
-        worst = max(statuses, key=lambda status: status.level)
-        same = [status for status in statuses if status.message == worst.message]
+        worst = max(status.level for status in statuses)
+        words = Counter(status.message for status in statuses if status.level == worst)
+        ((message, times),) = words.most_common(1)
         yield Finding(
-            Level.BAD if worst.level == 2 else Level.WARN,
+            Level.BAD if worst == 2 else Level.WARN,
             "Diagnostics",
-            f"{name} ({port}) said {LEVELS[worst.level]} {counted(len(statuses), 'time')}, from"
-            f" {statuses[0].at_s:.0f} s on: “{worst.message}” ({len(same)}×).",
+            f"{name} ({port}) said {LEVELS[worst]} {counted(len(statuses), 'time')}, from"
+            f" {statuses[0].at_s:.0f} s on: “{message}” ({times}×).",
             "docs/diagnostics.md explains each status.",
         )
     if log.diagnostics and not troubles:
@@ -112,7 +115,9 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
 
 
 def _told_elsewhere(status: Status) -> bool:
-    """The e-stop and the pause, which are no trouble, and the first seconds of a driver."""
+    """The e-stop, what it refuses, and the pause are no trouble; nor the first seconds."""
+    if status.name.endswith("Commands"):
+        return "e-stop" in status.message
     return status.name.endswith("E-stop") or (
         status.name.endswith("Board")
         and (status.at_s < FIRST_SECONDS or status.values.get("Mode") in ("paused", "imu_only"))

@@ -115,7 +115,7 @@ def judge(log: Log) -> Iterator[Finding]:
             )
     found = pairs(log)
     for pair in found:
-        yield from _ceased(pair)
+        yield from _ceased(log, pair)
     told, moved, times_s = _speeds(found)
     if not len(times_s):
         return
@@ -159,10 +159,11 @@ def _sustained(times_s: Array, rows: Mask) -> list[Span]:
     return [item for item in spans if item.length_s >= SUSTAINED_S]
 
 
-def _ceased(pair: Pair) -> Iterator[Finding]:
+def _ceased(log: Log, pair: Pair) -> Iterator[Finding]:
     commands = pair.commands
     waits_s = np.diff(commands.arrived_s)
     moving = (commands.values[:-1] != 0.0).any(axis=1)
+    moving &= ~_stopped(log, commands.arrived_s[:-1] + COMMAND_TIMEOUT_S)
     ceased = np.flatnonzero(moving & (waits_s > COMMAND_TIMEOUT_S))
     if len(ceased):
         yield Finding(
@@ -170,7 +171,7 @@ def _ceased(pair: Pair) -> Iterator[Finding]:
             "Commands",
             f"{pair.topic} ceased {counted(len(ceased), 'time')} in motion for more than"
             f" {COMMAND_TIMEOUT_S:g} s, first at {commands.arrived_s[ceased[0]]:.1f} s: the driver"
-            " stopped the robot each time.",
+            " stopped the robot.",
             "If that was not meant, publish at a steady rate of 10 Hz or more.",
         )
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import Array, Log, Series
@@ -21,6 +22,8 @@ LATE_S: Final = 0.005
 EARLY_S: Final = 0.001
 OTHER_CLOCK_S: Final = 1.0
 FEWEST: Final = 10
+RECOVERY_S: Final = 0.75
+"""In which stamps that leapt ahead are where they belong again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +48,9 @@ ODOMETRY: Final = Stream(
 class Rhythm:
     """``steps_s``: between successive stamps, from ``at_s`` on; ``period_s``: the usual one.
 
-    Gaps: where they begin and how long they are, without those that the driver's state accounts
-    for. ``late_s``: arrival after the stamp, at ``arrived_s``.
+    Gaps: where they begin, how long they are, how many messages are missing, without those that
+    the driver's state accounts for. Leaps: wide steps that were taken back, so nothing is missing.
+    ``late_s``: arrival after the stamp, at ``arrived_s``.
     """
 
     at_s: Array
@@ -54,6 +58,9 @@ class Rhythm:
     period_s: float
     gap_at_s: Array
     gap_s: Array
+    missing: Array
+    leap_at_s: Array
+    leap_s: Array
     arrived_s: Array
     late_s: Array
 
@@ -63,20 +70,38 @@ def measure(log: Log, series: Series, stream: Stream) -> Rhythm:
     stamped = series.only(np.isfinite(series.stamp_s))
     at_s, steps_s = stamped.stamp_s[:-1], np.diff(stamped.stamp_s)
     period_s = float(np.median(steps_s)) if len(steps_s) else 1.0 / stream.rate_hz
-    gaps = [
-        row
-        for row in np.flatnonzero(steps_s > GAP * period_s)
-        if not log.interrupted(at_s[row], at_s[row] + steps_s[row], stream.running)
+    wide = np.flatnonzero(steps_s > GAP * period_s)
+    missing = np.array(
+        [
+            np.rint((steps_s[row:end] - period_s).sum() / period_s)
+            for row, end in zip(wide, _ends(wide, int(RECOVERY_S / period_s)), strict=True)
+        ]
+    )
+    leaps = wide[missing < 1.0]
+    told = [
+        not log.interrupted(at_s[row], at_s[row] + steps_s[row], stream.running) for row in wide
     ]
+    true = (missing >= 1.0) & np.array(told, dtype=bool)
+    gaps = wide[true]
     return Rhythm(
         at_s=at_s,
         steps_s=steps_s,
         period_s=period_s,
         gap_at_s=at_s[gaps],
         gap_s=steps_s[gaps],
+        missing=missing[true],
+        leap_at_s=at_s[leaps],
+        leap_s=steps_s[leaps],
         arrived_s=stamped.arrived_s,
         late_s=stamped.arrived_s - stamped.stamp_s,
     )
+
+
+def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
+    """Until where the rows after each wide step tell whether it was taken back."""
+    ends: NDArray[np.intp] = wide + max(1, most)
+    ends[:-1] = np.minimum(ends[:-1], wide[1:])
+    return ends
 
 
 def judge(log: Log, series: Series, stream: Stream) -> Iterator[Finding]:
@@ -112,6 +137,15 @@ def _steps(rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
             f"{counted(back, 'stamp')} of {stream.name} not later than the one before.",
             "Was the computer's clock set back meanwhile, or do two drivers publish?",
         )
+    if len(rhythm.leap_s):
+        yield Finding(
+            Level.WARN,
+            "Timing",
+            f"Stamps of {stream.name} leapt {counted(len(rhythm.leap_s), 'time')}, by up to"
+            f" {1e3 * (rhythm.leap_s.max() - rhythm.period_s):.0f} ms, first at"
+            f" {rhythm.leap_at_s[0]:.1f} s, and came back: nothing is missing.",
+            "The driver was kept from reading for a while: relieve the computer.",
+        )
     even = rhythm.steps_s[(rhythm.steps_s > 0.0) & (rhythm.steps_s <= GAP * rhythm.period_s)]
     if len(even) < FEWEST:
         return
@@ -140,7 +174,7 @@ def _gaps(log: Log, rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
     if not len(rhythm.gap_s):
         yield Finding(Level.GOOD, "Gaps", f"{stream.name} has no gap while it should come.")
         return
-    lost = int(np.maximum(np.rint(rhythm.gap_s / rhythm.period_s) - 1.0, 1.0).sum())
+    lost = int(rhythm.missing.sum())
     longest = int(rhythm.gap_s.argmax())
     share = lost / (lost + len(rhythm.steps_s))
     counted_lost = grown(log, stream.lost)

@@ -13,7 +13,9 @@ from omnibot_driver.tools.report.log import Array, Log, Mask, Series
 from omnibot_driver.tools.report.travel import moving, steps
 
 GRAVITY_MPS2: Final = 9.80665
-RANGES_G: Final = (2, 4, 8, 16)
+SLIGHT_ERROR: Final = 0.03
+GRAVE_ERROR: Final = 0.1
+"""Of gravity."""
 STUCK_READINGS: Final = 100
 REST_S: Final = 0.5
 """Away from all motion by so much, the robot is at rest."""
@@ -22,7 +24,7 @@ BLOCK: Final = 100
 STILL_GYRO_RADPS: Final = 0.01
 STILL_FORCE_MPS2: Final = 0.3
 LARGEST_BIAS_RADPS: Final = 0.01
-LARGEST_TILT_RAD: Final = np.radians(5.0)
+LARGEST_TILT_DEG: Final = 5.0
 LEAST_TURN_RAD: Final = 1.5
 TURN_TOLERANCE: Final = 0.05
 STRONG_VIBRATION_MPS2: Final = 3.0
@@ -125,9 +127,9 @@ def _gravity(force: Array) -> Iterator[Finding]:
     norm = float(np.linalg.norm(force))
     figure = f"Gravity reads {norm:.3f} m/s² at rest; it should be {GRAVITY_MPS2:.3f}"
     error = abs(norm / GRAVITY_MPS2 - 1.0)
-    if error < 0.03:
+    if error < SLIGHT_ERROR:
         yield Finding(Level.GOOD, "IMU", f"{figure}.")
-    elif error < 0.10:
+    elif error < GRAVE_ERROR:
         yield Finding(
             Level.NOTE, "IMU", f"{figure}.", "Set accel_bias: the accelerometer is off by a little."
         )
@@ -141,9 +143,9 @@ def _gravity(force: Array) -> Iterator[Finding]:
         )
         yield Finding(Level.BAD, "IMU", f"{figure}.", advice)
     if norm > 0.5 * GRAVITY_MPS2:
-        tilt_rad = float(np.arccos(min(1.0, abs(force[2]) / norm)))
-        figure = f"At rest the sensor is tilted by {np.degrees(tilt_rad):.1f}°"
-        if tilt_rad > LARGEST_TILT_RAD:
+        tilt_deg = float(np.degrees(np.arccos(min(1.0, abs(force[2]) / norm))))
+        figure = f"At rest the sensor is tilted by {tilt_deg:.1f}°"
+        if tilt_deg > LARGEST_TILT_DEG:
             yield Finding(
                 Level.WARN,
                 "IMU",
