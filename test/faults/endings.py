@@ -155,9 +155,11 @@ ENDINGS: Final[dict[str, Ending]] = {
 }
 
 
-def terminal_is_closed(make_rig: Callable[[str], Rig]) -> None:
+def terminal_is_closed(
+    make_rig: Callable[[str], Rig], run: Callable[[Rig, Ending], object]
+) -> None:
     """A session over ssh that drops: SIGHUP, and nobody who takes what is printed."""
     master, slave = pty.openpty()
     with make_rig(TERMINAL.format(os.ttyname(slave))) as rig:
         os.close(slave)
-        Ending(lambda _: os.close(master))(rig)
+        run(rig, Ending(lambda _: os.close(master)))

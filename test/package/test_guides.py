@@ -14,6 +14,7 @@ from omnibot_driver.parameters import BY_NAME
 ROOT = Path(__file__).parents[2]
 TROUBLESHOOTING = ROOT / "docs/troubleshooting.md"
 COMMISSIONING = ROOT / "docs/commissioning.md"
+DIAGNOSTICS = ROOT / "docs/diagnostics.md"
 TOUR = ROOT / "docs/tour.md"
 GAP = "…"
 SENSES = {"clockwise": -1, "counter-clockwise": 1, "still": 0}
@@ -75,6 +76,15 @@ def test_every_state_is_explained() -> None:
     """And none besides."""
     assert set(SENTENCES) >= STATES
     assert all(state in SAID for state in STATES)
+
+
+def test_every_status_of_the_diagnostics_has_its_row() -> None:
+    """In the order in which they are published."""
+    code = (ROOT / "omnibot_driver/core/diagnosis.py").read_text()
+    names = dict.fromkeys(re.findall(r'Status\(\s*"([\w-]+)"', code))
+    rows = re.findall(r"^\| ([\w-]+) \|", DIAGNOSTICS.read_text(), re.MULTILINE)
+    assert rows[:1] == ["Status"]
+    assert rows[1 : 1 + len(names)] == list(names)
 
 
 def test_the_tour_shows_what_the_driver_says() -> None:

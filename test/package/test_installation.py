@@ -155,6 +155,17 @@ def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, pr
             assert driver_process.returncode == 0, output
 
 
+def test_colcon_test_runs_the_tests(sources: Path, workspace: Path) -> None:
+    """It looks for pytest in setup.py, and without it passes having run nothing."""
+    one = ["test/core/test_modes.py", " --maxfail=1"]
+    colcon = [sys.executable, "-m", "colcon"]
+    run([*colcon, "test", "--base-paths", sources, "--pytest-args", *one], workspace)
+    summary = run([*colcon, "test-result", "--all"], workspace)
+    found = re.search(r"Summary: (\d+) tests, 0 errors, 0 failures", summary)
+    assert found, summary
+    assert int(found[1]) > 1
+
+
 def test_pip_installs_the_same_files(sources: Path, tmp_path: Path) -> None:
     """A plain `pip install` serves people without colcon."""
     copy = tmp_path / "sources"  # pip builds inside the source tree

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,16 @@ def test_without_wheels_one_sentence_points_to_jazzy(
     assert verdict.startswith("make: ***")
     assert not done.stdout
     assert not (tmp_path / "venv").exists()
+
+
+def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
+    """It is somebody else's; creating one would clear it."""
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs/kept").touch()
+    (tmp_path / "venv").symlink_to(tmp_path / "theirs")
+    done = make("demo", f"VENV={tmp_path / 'venv'}", f"PYTHON={sys.executable}")
+    assert done.returncode != 0
+    assert (tmp_path / "theirs/kept").exists()
 
 
 def test_make_alone_lists_every_target() -> None:

@@ -3,9 +3,11 @@
 import json
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,10 +21,12 @@ from std_msgs.msg import Bool, String
 
 from omnibot_driver.simulator import PtyBoard, SimulatedBoard
 from omnibot_driver.tools.monitor.__main__ import main
+from omnibot_driver.tools.monitor.feed import Feed
 from omnibot_driver.tools.monitor.teleop import ZEROS
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 QUICKLY = ["--timeout", "1"]
+ROOT = Path(__file__).parents[2]
 
 
 def newest(board: SimulatedBoard) -> tuple[str, tuple[int, ...]]:
@@ -118,31 +122,30 @@ def test_who_lets_go_of_the_key_stops_the_robot(
     probe.wait_for(lambda: [twist.linear.x for twist in said[moving:]] == [0.0] * (ZEROS + 1))
 
 
-@pytest.mark.parametrize("end", ["SIGTERM", "closed window"])
 def test_a_monitor_that_is_ended_stops_what_it_steered(
     board: PtyBoard,
     start_driver: Callable[..., Driver],
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
-    end: str,
 ) -> None:
-    """In the middle of a motion, with the message type that this driver takes."""
+    """Killed, or its window closed, in the middle of a motion; here with stamped commands."""
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=5.0)
     probe_of(driver).wait_for_state("nominal")
-    terminal = monitor_of(driver, "--teleop")
-    terminal.wait_for("0.15 m/s")
-    terminal.type("w")
-    assert board.wait_for(drives, 20.0)
-    if end == "SIGTERM":
+
+    def kill(terminal: PseudoTerminal) -> None:
         terminal.process.send_signal(signal.SIGTERM)
         assert terminal.end() == 0
-    else:
-        terminal.hang_up()
-        terminal.end()
-    assert board.wait_for(stands, 4.0)
+
+    for end in (kill, PseudoTerminal.hang_up):
+        terminal = monitor_of(driver, "--teleop")
+        terminal.wait_for("0.15 m/s")
+        terminal.type("w")
+        assert board.wait_for(drives, 20.0)
+        end(terminal)
+        assert board.wait_for(stands, 4.0)
 
 
-# What cannot be shown
+# Without a driver that is one
 
 
 @pytest.fixture
@@ -153,6 +156,23 @@ def fake(stack: ExitStack) -> Probe:
         publisher = probe.node.create_publisher(kind, f"omnibot_driver/{topic}", LATCHED)
         publisher.publish(kind(data=value))
     return probe
+
+
+def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
+    """By topic where the service is missing, until the driver shows the latch."""
+    said = fake.listen(Bool, "estop")
+    feed = Feed([], "fake", "omnibot_driver")
+    try:
+        fake.wait_for_graph(lambda: feed.view().state)
+        feed.estop()
+        assert feed.view().estop_asked
+        assert "nobody offers /fake/omnibot_driver/estop" in feed.view().said
+        fake.wait_for(lambda: len(said) >= 3 and all(message.data for message in said))
+        latch = fake.node.create_publisher(Bool, "omnibot_driver/estop_active", LATCHED)
+        latch.publish(Bool(data=True))
+        fake.wait_for_graph(lambda: feed.view().estop and not feed.view().estop_asked)
+    finally:
+        feed.close()
 
 
 def sentence(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -227,6 +247,15 @@ def test_names_that_are_none_are_refused(
     """In a sentence, not in a traceback."""
     assert main(arguments) == 1
     assert said in capsys.readouterr().err
+
+
+def test_without_ros_one_sentence_says_so() -> None:
+    """A Python without site-packages has no rclpy: no traceback, exit code 1."""
+    command = [sys.executable, "-ES", "-m", "omnibot_driver.tools.monitor", "--once"]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=20.0)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("monitor: this needs ROS 2 Jazzy's Python packages")
+    assert ended.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("wrong", [["--timeout", "0"], ["--teleop", "--once"], ["--nonsense"]])

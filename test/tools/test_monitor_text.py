@@ -13,7 +13,7 @@ from omnibot_driver.core.diagnosis import Level, Status
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.tools.monitor import text
-from omnibot_driver.tools.monitor.plot import BLANK, draw_path, sparkline
+from omnibot_driver.tools.monitor.plot import draw_path, sparkline
 
 anything = st.floats()
 triples = st.tuples(anything, anything, anything)
@@ -106,10 +106,9 @@ def test_the_picture_of_a_square_is_a_square() -> None:
     corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)]
     picture = draw_path(corners, 24, 12)
     assert {len(row) for row in picture.rows} == {24}
-    assert all(ord(char) != BLANK for char in picture.rows[0] + picture.rows[-1])
-    inside = [row[1:-1] for row in picture.rows[1:-1]]
-    assert {ord(char) for row in inside for char in row} == {BLANK}
-    assert all(ord(row[0]) != BLANK != ord(row[-1]) for row in picture.rows)
+    assert " " not in picture.rows[0] + picture.rows[-1]
+    assert {row[1:-1] for row in picture.rows[1:-1]} == {" " * 22}
+    assert all(row[0] != " " != row[-1] for row in picture.rows)
     assert picture.width_m == pytest.approx(1.0, rel=0.03)
 
 

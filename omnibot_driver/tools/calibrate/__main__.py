@@ -15,9 +15,10 @@ from omnibot_driver.tools.needs import ToolError, need
 
 SUBCOMMANDS: Final = {
     "commission": "which way round everything is: a guided walk, wheels off the ground",
-    "step": "step response of each wheel, its motor, and gains for its controller: in the air",
     "imu": "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
     "scale": "linear_scale and angular_scale from commanded and measured speeds: the robot drives",
+    "geometry": "wheel and base radius from lines, turns, squares and a tape measure",
+    "step": "step response of each wheel, its motor, and gains for its controller: in the air",
 }
 
 

@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     """Raises ToolError where an answer stays impossible."""
-    walk = _Walk(robot, console)
+    walk = Walk(robot, console)
     found = Found(before=robot.parameters)
     if "board" in arguments.only or "wheels" in arguments.only:
         console.confirm(
@@ -88,7 +88,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     return result_of(found)
 
 
-class _Walk:
+class Walk:
     """The conversation, with a robot in it."""
 
     def __init__(self, robot: Any, console: Console) -> None:

@@ -6,7 +6,7 @@ later than it seems, and then the recorded step itself tells.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -41,17 +41,30 @@ class Step:
     """Commanded from one rate to another, in rad/s.
 
     ``end_ticks``: whole control ticks from the onset to the end of each delta; ``rate_radps``: the
-    mean over the four ticks before that.
+    mean over the four ticks before that. ``last_radps``: what was commanded ``last_ticks`` before
+    the onset, until it was ``before_radps``; an answer may still be under way.
     """
 
     before_radps: float
     after_radps: float
     end_ticks: Column
     rate_radps: Column
+    last_radps: float
+    last_ticks: int
 
     def sooner(self, ticks: int) -> "Step":
         """The same with an earlier onset."""
-        return replace(self, end_ticks=self.end_ticks + ticks)
+        return replace(self, end_ticks=self.end_ticks + ticks, last_ticks=self.last_ticks - ticks)
+
+    def told_by(self, mean: Callable[[Column], Column]) -> Column:
+        """The rates, given the mean of a unit step's answer by the ticks at which a delta ends."""
+        earlier = self.before_radps - self.last_radps
+        height = self.after_radps - self.before_radps
+        return np.asarray(
+            self.last_radps
+            + earlier * mean(self.end_ticks + self.last_ticks)
+            + height * mean(self.end_ticks)
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +92,8 @@ class Fit:
 
     def told(self, step: Step) -> Column:
         """What the model says of a step's deltas, in rad/s."""
-        mean = self.model.mean(self.values[1:], step.end_ticks * TICK_S)
-        height = step.after_radps - step.before_radps
-        return np.asarray(self.values[0] * (step.before_radps + height * mean))
+        told = step.told_by(lambda ticks: self.model.mean(self.values[1:], ticks * TICK_S))
+        return np.asarray(self.values[0] * told)
 
     def traits(self) -> dict[str, tuple[float, float]]:
         """Rise time (a tenth to nine tenths, s) and overshoot (part), with standard deviations."""
@@ -122,7 +134,12 @@ def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[fl
         reference_s = stamp_s[first]
         onset = math.ceil((seen_s - reference_s) / TICK_S)
         ends = np.rint((stamp_s[first:last] - reference_s) / TICK_S) - onset
-        steps.append(Step(before, after, ends, rates[first:last]))
+        sooner = changes[number - 1] if number else change
+        last_radps = float(told[sooner - 1])
+        if last_radps not in levels:  # from rest, against friction
+            last_radps = before
+        ticks = round((commands.stamp_s[change] - commands.stamp_s[sooner]) / TICK_S)
+        steps.append(Step(before, after, ends, rates[first:last], last_radps, ticks))
     if not steps:
         raise ToolError(
             "no step was recorded whole: odometry was lost on the way; see /diagnostics, and try"
@@ -133,17 +150,15 @@ def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[fl
 
 def fit(model: Model, steps: Sequence[Step]) -> Fit:
     """Least squares. Raises ToolError where the steps do not determine the model."""
-    end_s = np.concatenate([step.end_ticks for step in steps]) * TICK_S
     rates = np.concatenate([step.rate_radps for step in steps])
-    base = np.concatenate([np.full(len(step.end_ticks), step.before_radps) for step in steps])
-    height = np.concatenate(
-        [np.full(len(step.end_ticks), step.after_radps - step.before_radps) for step in steps]
-    )
-    moments_s, where = np.unique(end_s, return_inverse=True)
+    first = min(int(step.end_ticks.min()) for step in steps)
+    last = max(int(step.end_ticks.max()) + step.last_ticks for step in steps)
+    moments_s = TICK_S * np.arange(first, last + 1, dtype=np.float64)
 
     def residuals(parameters: Column) -> Column:
-        mean = model.mean(parameters[1:], moments_s)[where]
-        return np.asarray(parameters[0] * (base + height * mean) - rates)
+        means = model.mean(parameters[1:], moments_s)
+        told = [step.told_by(lambda ticks: means[ticks.astype(int) - first]) for step in steps]
+        return np.asarray(parameters[0] * np.concatenate(told) - rates)
 
     found = least_squares(residuals, model.start, bounds=(model.low, model.high), x_scale="jac")
     freedom = len(rates) - len(found.x)

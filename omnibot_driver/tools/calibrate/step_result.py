@@ -12,7 +12,7 @@ from omnibot_driver.tools.calibrate.wheel_loop import Gains, Motor
 
 UNLIKE_ONE: Final = 0.02
 """A gain that differs more from 1 is the scale's affair."""
-UNEXPLAINED: Final = 1.5
+UNEXPLAINED: Final = 1.2
 """So many times the second order's residuals tell that no motor fits."""
 
 

@@ -23,13 +23,14 @@ REFRESH_S: Final = 0.2
 PARTS: Final = ("title", "estop", "path", "figures", "verdicts", "teleop", "said")
 MOST_IN_FULL: Final = 4
 """Verdicts, that all are in full; of more there is the beginning, as there is no room."""
+GREEN, YELLOW, RED, GREY, CYAN = "#98e024", "#f4bf4f", "#ff5f57", "#a0a0a0", "#58d1eb"
 COLOURS: Final = {
-    Level.OK: "green",
-    Level.WARN: "yellow",
-    Level.ERROR: "bold red",
-    Level.STALE: "bright_black",
+    Level.OK: GREEN,
+    Level.WARN: YELLOW,
+    Level.ERROR: f"bold {RED}",
+    Level.STALE: GREY,
 }
-STATES: Final = {"nominal": "green", "imu_only": "yellow", "paused": "yellow"}
+STATES: Final = {"nominal": GREEN, "imu_only": YELLOW, "paused": YELLOW}
 
 
 class Robot(Protocol):
@@ -83,8 +84,8 @@ class Monitor(App[None]):
     #estop { color: $text-muted; }
     #estop.latched { background: red; color: white; text-style: bold; text-align: center; }
     #middle { height: 1fr; min-height: 8; }
-    #path { width: 1fr; height: 1fr; border: round $panel; }
-    #figures { width: 43; height: 1fr; padding: 0 0 0 1; }
+    #path { width: 1fr; height: 1fr; border: round $foreground-muted; }
+    #figures { width: 44; height: 1fr; padding: 0 0 0 1; }
     #verdicts { height: auto; max-height: 10; padding: 0 1; }
     #said { height: auto; max-height: 2; min-height: 1; padding: 0 1; background: $panel; }
     Release { align: center middle; }
@@ -139,16 +140,16 @@ class Monitor(App[None]):
 
     def _show_title(self, view: View) -> None:
         silent = view.silent_s > text.SILENT_S
-        colour = "bold red" if silent else f"bold {STATES.get(view.state, 'red')}"
-        self._parts["title"].update(Text(text.title(view), colour))
+        colour = RED if silent else STATES.get(view.state, RED)
+        self._parts["title"].update(Text(text.title(view), f"bold {colour}"))
 
     def _show_path(self, view: View) -> None:
         plot = self._parts["path"]
         picture = draw_path(view.path, plot.content_size.width, plot.content_size.height, view.pose)
         plot.border_title = "odom, x → y ↑"
         plot.border_subtitle = f"{picture.width_m:.2f} m wide"
-        drawn = Text("\n".join(picture.rows), "cyan")
-        drawn.highlight_regex(f"[{ARROWS}]", "bold yellow")
+        drawn = Text("\n".join(picture.rows), CYAN)
+        drawn.highlight_regex(f"[{ARROWS}]", f"bold {YELLOW}")
         plot.update(drawn)
 
     def _show_verdicts(self, view: View) -> None:

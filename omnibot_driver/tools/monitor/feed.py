@@ -288,7 +288,8 @@ class Feed:
 
     def _call(self, client: Any, request: Any, what: str) -> None:
         if not client.service_is_ready():
-            self._say(f"{what}: nobody offers {client.srv_name}; is the driver running?")
+            service = self._node.resolve_service_name(client.srv_name)
+            self._say(f"{what}: nobody offers {service}; is the driver running?")
             return
         self._say(f"{what}: asked, no answer yet")
         client.call_async(request).add_done_callback(partial(self._answered, what))

@@ -8,7 +8,7 @@ from typing import Final
 
 from omnibot_driver.core.se2 import Pose
 
-BLANK: Final = 0x2800
+BRAILLE: Final = 0x2800
 DOTS: Final = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 """Bits of the dots of a Braille cell: four rows of two."""
 BARS: Final = " ▁▂▃▄▅▆▇"
@@ -52,7 +52,7 @@ def draw_path(
         right, below = round((x_m - left_m) / m_per_dot), round((top_m - y_m) / m_per_dot)
         return min(max(right, 0), across), min(max(below, 0), down)
 
-    cells = [[BLANK] * columns for _ in range(rows)]
+    cells = [[0] * columns for _ in range(rows)]
     dots = [dot(*point) for point in seen]
     for (right, below), (next_right, next_below) in pairwise([*dots, *dots[-1:]]):
         steps = max(abs(next_right - right), abs(next_below - below), 1)
@@ -60,11 +60,12 @@ def draw_path(
             x = right + round((next_right - right) * step / steps)
             y = below + round((next_below - below) * step / steps)
             cells[y // 4][x // 2] |= DOTS[y % 4][x % 2]
+    drawn = [[chr(BRAILLE + dots) if dots else " " for dots in row] for row in cells]
     if here:
         right, below = dot(here.x_m, here.y_m)
         eighth = round(math.remainder(here.yaw_rad, math.tau) / (math.tau / 8)) % 8
-        cells[below // 4][right // 2] = ord(ARROWS[eighth])
-    return Picture(["".join(map(chr, row)) for row in cells], 2 * columns * m_per_dot)
+        drawn[below // 4][right // 2] = ARROWS[eighth]
+    return Picture(["".join(row) for row in drawn], 2 * columns * m_per_dot)
 
 
 def sparkline(values: Sequence[float], columns: int) -> str:
