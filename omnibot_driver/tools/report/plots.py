@@ -48,6 +48,13 @@ def _legend(axes: Axes) -> None:
         axes.legend(loc="upper right", ncols=4, frameon=False, fontsize=9, borderaxespad=0.1)
 
 
+def _legend_below(axes: Axes) -> None:
+    """Out of the way of what is drawn."""
+    if axes.get_legend_handles_labels()[0]:
+        place = (0.5, -0.14)
+        axes.legend(loc="upper center", bbox_to_anchor=place, ncols=3, frameon=False, fontsize=9)
+
+
 def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
     """As many points as are seen: least and greatest of each stretch, in the order of time."""
     if len(times_s) <= POINTS:
@@ -115,7 +122,7 @@ def path(log: Log) -> Figure:
     above.margins(0.12)
     _dress(above, "y in m", "Path in odom; the arrows are headings")
     above.set_xlabel("x in m")
-    left.legend(loc="outside lower right", frameon=False, fontsize=9, ncols=2)
+    _legend_below(above)
     left.colorbar(lines, ax=above, shrink=0.8, pad=0.02, label="time in s")
     axes_of = right.subplots(3, 1, sharex=True)
     unwrapped = np.degrees(np.unwrap(yaw))
@@ -209,8 +216,7 @@ def spectra(log: Log) -> Figure:
         _dress(axes, unit, title)
         axes.set_xlabel("frequency in Hz")
         axes.set_xlim(0.0, sensing.RATE_HZ / 2)
-    handles, labels = columns[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=6, frameon=False, fontsize=9)
+        _legend_below(axes)
     return figure
 
 
