@@ -55,6 +55,8 @@ class DeviceClock:
         self._line: TickLine | None = None
         self._seen_tick: int | None = None
         self._settled = False
+        self._single_reads = 0
+        """The last so many brought one sample each, so none waited for another."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
 
     @property
@@ -78,7 +80,8 @@ class DeviceClock:
             came = edge.ahead + sum(isinstance(reading, ImuReading) for reading in readings)
             if came:
                 counted = any(isinstance(reading, DisplacementReading) for reading in readings)
-                short = self._compare(line, edge, now, alone=came == 1, counted=counted)
+                self._single_reads = self._single_reads + 1 if came == 1 else 0
+                short = self._compare(line, edge, now, counted=counted)
         # Where a counter took ticks back, the order of the readings must still find room.
         least_s = 0.0 if ticks == sorted(ticks) else SMALLEST_STEP_S
         stamps = []
@@ -113,13 +116,10 @@ class DeviceClock:
         passed = self._displacement_ticks * (reading.lost + 1)
         return self._displaced_tick + passed - self._tick
 
-    def _compare(
-        self, line: TickLine, edge: Edge, now: float, *, alone: bool, counted: bool
-    ) -> int:
+    def _compare(self, line: TickLine, edge: Edge, now: float, *, counted: bool) -> int:
         """Hold the newest tick against its arrival; by how many the count was found to be short.
 
-        ``alone``: the read brought no other sample, so it was not late; ``counted``: a counter told
-        this tick.
+        ``counted``: a counter told this tick.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
@@ -131,7 +131,7 @@ class DeviceClock:
             short = round(lag_s / period_s)
         elif len(lags_s) == BEAT_READS:
             self._settled = True
-            if alone and lag_s > min(max(lags_s), period_s / 2) + 0.95 * period_s:
+            if self._single_reads > BEAT_READS and lag_s > max(lags_s) + 0.95 * period_s:
                 short = max(1, math.floor(lag_s / period_s))
             elif min(lags_s) > period_s / 2:
                 short, counted = round(min(lags_s) / period_s), True
@@ -142,8 +142,8 @@ class DeviceClock:
             short, lag_s = 0, 0.0
         elif short:
             self._tick += short
-            if counted and self._displaced_tick is not None:
-                self._displaced_tick += short
+            if self._displaced_tick is not None:
+                self._displaced_tick = min(self._displaced_tick + short * counted, self._tick)
             tick += short
             lag_s -= short * line.slope_s
         lags_s.append(lag_s)

@@ -62,6 +62,23 @@ ROBOT: Final = (
         high=1_000_000,
     ),
     Parameter(
+        "odom_linear_scale",
+        1.0,
+        "m/m",
+        "True way over the way that the board tells, which takes its wheels for nominal ones;"
+        " calibrate geometry finds it.",
+        low=0.5,
+        high=2.0,
+    ),
+    Parameter(
+        "odom_angular_scale",
+        1.0,
+        "rad/rad",
+        "Likewise, for turning.",
+        low=0.5,
+        high=2.0,
+    ),
+    Parameter(
         "fastest_linear_speed",
         2.0,
         "m/s",

@@ -57,6 +57,8 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
             use_board_pose=values["use_board_pose"],
             fastest_mps=values["fastest_linear_speed"],
             fastest_radps=values["fastest_angular_speed"],
+            linear_scale=values["odom_linear_scale"],
+            angular_scale=values["odom_angular_scale"],
         ),
         motion=MotionLimits(
             fastest_mps=values["fastest_linear_speed"],

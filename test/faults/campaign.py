@@ -64,12 +64,12 @@ class Campaign:
         """One try."""
         try:
             case(rig)
+            row.stood_s = max([row.stood_s, *rig.findings.stood_after_s])
             if again:
                 rig.expect_obeys_again()
         except AssertionError as error:
             rig.findings.expect(False, f"{row.name}: {error}")
         row.tried += 1
-        row.stood_s = max([row.stood_s, *rig.findings.stood_after_s])
         rig.findings.stood_after_s.clear()
         complaints = [f"{row.name}: {complaint}" for complaint in rig.findings.take()]
         row.complaints += len(complaints)

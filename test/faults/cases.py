@@ -144,6 +144,7 @@ def unplugged(rig: Rig) -> None:
     rig.hand.leave()
     rig.unplug()
     rig.probe.wait_for_state("disconnected")
+    rig.wait_for_diagnosis("does not exist")
     rig.plug()
     mark = len(rig.line.board.received)
     since = rig.line.tick

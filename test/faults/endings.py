@@ -36,6 +36,11 @@ def end(self, message):
     Session.receive = receive
 node.OmniBotDriver._on_estop_topic = end
 """
+HANGS: Final = """
+import time
+from omnibot_driver.core.session import Session
+Session.farewell = lambda self, on_exit: time.sleep(60.0)
+"""
 GROUP: Final = "import os; os.setpgid(0, 0)"
 TERMINAL: Final = """
 import fcntl, os, termios
@@ -50,20 +55,25 @@ os.close(terminal)
 
 @dataclass(frozen=True)
 class Ending:
-    """``exit_codes``, ``words``: what is right; the words are the last that the board heard."""
+    """``exit_codes``, ``words``: what is right; the words are the last that the board heard.
+
+    ``allowed_s``, ``late_s``: how long the robot may drive on, and the process live on.
+    """
 
     end: Callable[[Rig], object]
     exit_codes: tuple[int, ...] = (0,)
     words: bytes | tuple[bytes, ...] = STOP
     before: str = ""
+    allowed_s: float = 0.0
+    late_s: float = 0.0
 
     def __call__(self, rig: Rig) -> None:
         """While the robot drives."""
         rig.drive()
         self.end(rig)
         since = rig.line.tick
-        rig.expect_ended(*self.exit_codes)
-        rig.expect_still(since, "the driver ends", 0.0)
+        rig.expect_ended(*self.exit_codes, late_s=self.late_s)
+        rig.expect_still(since, "the driver ends", self.allowed_s)
         rig.hand.leave()
         heard = bytes(rig.line.board.received)
         rig.findings.expect(heard.endswith(self.words), f"last it heard {heard[-26:].hex(' ')}")
@@ -131,6 +141,9 @@ ENDINGS: Final[dict[str, Ending]] = {
     "a callback that hangs, and ctrl-C": Ending(
         lambda rig: (by_topic(rig), rig.wait_ticks(20), by_signals(signal.SIGINT)(rig)),
         before=IN_A_CALLBACK.format("time.sleep(60.0)"),
+    ),
+    "a farewell that hangs, and ctrl-C": Ending(
+        by_signals(signal.SIGINT), (1,), LAST_WORDS, HANGS, allowed_s=0.5, late_s=4.0
     ),
     "an exception in the reader": Ending(by_topic, (1,), before=IN_THE_READER),
     "SIGINT, the port full": Ending(

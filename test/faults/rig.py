@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from breakable_line import TICK_S, BreakableLine
+from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import PATIENCE_S, Driver
 from hands import Hand, Navigator, Stick
 from nav_msgs.msg import Odometry
@@ -99,6 +100,7 @@ class Rig:
         self.odom = self.probe.listen(Odometry, "odom")
         self.states = self.probe.listen(String, "omnibot_driver/state", latched=True)
         self.estops = self.probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
+        self._diagnostics = self.probe.listen(DiagnosticArray, "/diagnostics")
         self.probe.wait_for_state("nominal")
         self.hand = self.make_hand()
         return self
@@ -175,12 +177,23 @@ class Rig:
             f"{what}: motors driven for {stood_s:.2f} s, allowed {allowed_s + self._grace_s:.2f} s",
         )
 
+    def wait_for_diagnosis(self, pattern: str) -> None:
+        """``/diagnostics`` say so of this port, from now on."""
+        mark = len(self._diagnostics)
+        self.probe.wait_for(
+            lambda: any(
+                status.hardware_id == self.port and re.search(pattern, status.message)
+                for message in self._diagnostics[mark:]
+                for status in message.status
+            )
+        )
+
     def expect_said_once(self, pattern: str, mark: int) -> None:
         """In the lines of the log from number ``mark`` on."""
         times = sum(bool(re.search(pattern, line)) for line in self.driver.lines[mark:])
         self.findings.expect(times == 1, f"the log says {times} times: {pattern}")
 
-    def expect_ended(self, *exit_codes: int) -> None:
+    def expect_ended(self, *exit_codes: int, late_s: float = 0.0) -> None:
         """The driver leaves in time and with one of these."""
         begin_s = time.monotonic()
         try:
@@ -190,7 +203,9 @@ class Rig:
             code = self.driver.process.wait()
         took_s = time.monotonic() - begin_s
         self.findings.expect(code in exit_codes, f"exit code {code}: {self.driver.output}")
-        self.findings.expect(took_s < self._ends_within_s, f"it took {took_s:.1f} s to end")
+        self.findings.expect(
+            took_s < self._ends_within_s + late_s, f"it took {took_s:.1f} s to end"
+        )
 
     def expect_obeys_again(self) -> None:
         """A fresh command moves the robot; it stands when the hand leaves."""

@@ -47,6 +47,7 @@ def full_for_long(rig: Rig) -> None:
     states, mark = len(rig.states), len(rig.driver.lines)
     with rig.terminal.kept_full(OLD_COMMAND):
         rig.probe.wait_for(lambda: len(rig.states) >= states + 6)  # opened in vain, twice
+        rig.wait_for_diagnosis("takes no more bytes")
         rig.hand.leave()
     rig.probe.wait_for_state("nominal")
     rig.expect_still(rig.line.tick, "the port takes bytes again, and is open", TIMEOUT_S)
@@ -112,7 +113,7 @@ def server_dies(rig: NetworkRig) -> None:
     mark = len(rig.driver.lines)
     rig.unplug()
     rig.hand.leave()
-    rig.driver.wait_for_line("Connection refused", mark)
+    rig.wait_for_diagnosis("Connection refused")
     rig.plug()
     _expect_still_once_connected(rig, 0, "the server is there again")
     rig.expect_said_once("Connection refused.*retrying", mark)
@@ -125,6 +126,7 @@ def server_vanishes(rig: NetworkRig) -> None:
     rig.server.vanish()
     rig.hand.leave()
     rig.probe.wait_for_state("connecting")
+    rig.wait_for_diagnosis("nothing")
     rig.probe.wait_for_state("disconnected")
     rig.server.come_back()
     _expect_still_once_connected(rig, before, "the server is back")

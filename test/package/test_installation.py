@@ -120,7 +120,8 @@ def test_the_installed_documents_link_to_installed_files(prefix: Path) -> None:
 def test_colcon_installs_the_executables(prefix: Path) -> None:
     """`ros2 run` offers every executable file in lib/omnibot_driver: these and no more."""
     files = list((prefix / "lib" / PACKAGE).iterdir())
-    assert {file.name for file in files} == {"calibrate", "demo", "driver", "monitor", "simulator"}
+    executables = {"calibrate", "demo", "driver", "monitor", "report", "simulator"}
+    assert {file.name for file in files} == executables
     assert all(os.access(file, os.X_OK) for file in files)
 
 

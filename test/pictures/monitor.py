@@ -11,9 +11,15 @@ import threading
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from omnibot_driver.demo.__main__ import ENVIRONMENT
 from omnibot_driver.demo.program import Program
+
+if TYPE_CHECKING:
+    from textual.app import App
+
+    from omnibot_driver.tools.monitor.feed import Feed
 
 PATIENCE_S = 60.0
 
@@ -46,7 +52,7 @@ def main(folder: Path) -> None:
         asyncio.run(_photograph(feed, lambda: robot.leg == 3 and robot.pose.y_m < 0.4, folder))
 
 
-async def _photograph(feed: "Feed", driven: Callable[[], bool], folder: Path) -> None:  # noqa: F821
+async def _photograph(feed: "Feed", driven: Callable[[], bool], folder: Path) -> None:
     from omnibot_driver.tools.monitor.app import Monitor
 
     app = Monitor(feed)
@@ -68,7 +74,7 @@ async def _photograph(feed: "Feed", driven: Callable[[], bool], folder: Path) ->
         (folder / "monitor_estop.svg").write_text(_picture(app))
 
 
-def _picture(app: "App[None]") -> str:  # noqa: F821
+def _picture(app: "App[None]") -> str:
     """The screen, without the fonts that would be loaded from elsewhere."""
     svg = app.export_screenshot(title="ros2 run omnibot_driver monitor")
     return re.sub(r"@font-face \{.*?\}", "", svg, flags=re.DOTALL).replace("Fira Code, ", "")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 from driver_process import Driver
 
@@ -45,7 +46,6 @@ class Rig:
             self.questions.append(question)
             return answer(question)
 
-        robot_module.LOST_S = 3.0  # a busy machine is no lost robot
         files = ("--output", str(self.output), "--plot", str(self.folder))
         return main([*words, *files, "--namespace", self.driver.namespace], read)
 
@@ -61,7 +61,12 @@ def rig(
 ) -> Iterator[Rig]:
     """A simulated board with these settings and a driver with these parameters, both running."""
     board = SimulatedBoard(BoardSettings(running=True, **settings))
-    with PtyBoard(board) as port, Driver(port=port.path, **parameters or {}) as driver:
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        PtyBoard(board) as port,
+        Driver(port=port.path, **parameters or {}) as driver,
+    ):
+        patch.setattr(robot_module, "LOST_S", 3.0)  # a busy machine is no lost robot
         driver.wait_for_line("state: nominal|state: imu_only")
         yield Rig(port, driver, folder)
 

@@ -3,7 +3,6 @@
 import argparse
 import io
 import math
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,9 +14,9 @@ from calibrate_rig import parameters_of, rig, row
 from driver_process import Driver
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from surveyor import Surveyor
 
 from omnibot_driver.core.se2 import Pose
-from omnibot_driver.simulator import SimulatedBoard
 from omnibot_driver.tools.calibrate import geometry
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.geometry_fit import Reading, fit, rolled
@@ -28,34 +27,6 @@ from omnibot_driver.tools.needs import ToolError
 BASE_M = 0.143
 PERFECT = np.ones(3)
 SIGMA = np.array([0.002, 0.002, math.radians(1.0)])
-
-
-class Surveyor:
-    """Marks the floor and measures from there, in whole millimetres and half degrees: the truth."""
-
-    def __init__(self, board: Callable[[], SimulatedBoard]) -> None:
-        self._board = board
-        self._mark = Pose()
-        self._turns = 0.0
-
-    def __call__(self, question: str) -> str:
-        truth = self._board().truth
-        here = Pose(truth.x_m, truth.y_m, truth.yaw_rad)
-        if "Mark the floor" in question:
-            self._mark = here
-            sign = 1 if "left" in question else -1
-            self._turns = (
-                sign * float(question.split(": ")[1].split()[0]) if "turns" in question else 0
-            )
-        way = self._mark.way_to(here)
-        if "forward of" in question:
-            return str(round(1000 * way.x_m))
-        if "left of" in question:
-            return str(round(1000 * way.y_m))
-        if "degrees" in question:
-            turned = math.degrees(here.yaw_rad - self._mark.yaw_rad) - 360 * self._turns
-            return str(round(2 * turned) / 2)
-        return "y"
 
 
 def arguments(*words: str) -> argparse.Namespace:
@@ -156,7 +127,7 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
     """The whole calibration in simulated time; slip shortens every way like a smaller wheel."""
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     console = Console(read=Surveyor(lambda: robot.bench.board), file=io.StringIO())
-    found = geometry.run(robot, console, arguments("--turning", "0.5"))
+    found = geometry.run(robot, console, arguments("--turns", "2", "--side", "0.7"))
     mean = sum(factors) / 3 * (1 - slip)
     planted = {
         "wheel_radius": 0.029 * mean,

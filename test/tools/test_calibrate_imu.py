@@ -80,6 +80,19 @@ def test_allan_deviation_tells_a_wandering_bias_from_noise() -> None:
     assert found.walk == pytest.approx(walk, rel=0.4)
 
 
+def test_a_bias_that_walks_is_known_less_well() -> None:
+    """What is claimed covers the bias that is left at the end of ten minutes."""
+    scores = []
+    for seed in range(12):
+        imu = sensor(600.0, seed)
+        walk = np.cumsum(
+            3e-6 * np.random.default_rng(seed).standard_normal(imu.rate_radps.shape), 0
+        )
+        found = rest(Imu(imu.stamp_s, imu.force_mps2, imu.rate_radps + walk))
+        scores += list((found.bias_radps - BIAS - walk[-1]) / found.bias_sigma)
+    assert 0.5 < np.std(scores) < 2.0
+
+
 def test_readings_that_say_nothing_are_turned_away() -> None:
     """Too few, not finite, stuck, full of gaps: each with its sentence."""
     with pytest.raises(ToolError, match="too few"):

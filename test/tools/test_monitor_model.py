@@ -5,7 +5,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from monitor_view import view
+from monitor_view import FINE, view
 
 from omnibot_driver.core.diagnosis import Level
 from omnibot_driver.core.kinematics import BodyTwist
@@ -107,6 +107,20 @@ def test_commands_do_not_make_a_silent_driver_look_alive() -> None:
     model.state("nominal", 1.0)
     model.commanded(HALT, 9.0)
     assert model.view(10.0).silent_s == 9.0
+
+
+def test_what_was_measured_once_is_not_what_is_measured() -> None:
+    """Velocities, IMU and verdicts of a silent driver are gone; its place stays."""
+    model = Model("/omnibot_driver", 0.0)
+    model.odom(Pose(1.0, 0.0), BodyTwist(0.2, 0.0, 0.0), 1.0)
+    model.imu((0.0, 0.0, 9.8), (0.0, 0.0, 0.0), 1.0)
+    model.diagnosed(FINE, 1.0)
+    seen, later = model.view(1.5), model.view(5.0)
+    assert seen.measured
+    assert (seen.force_mps2, seen.statuses) == ((0.0, 0.0, 9.8), FINE)
+    assert (later.measured, later.force_mps2, later.rate_radps) == (None, None, None)
+    assert later.statuses == ()
+    assert later.pose == Pose(1.0, 0.0)
 
 
 @pytest.mark.parametrize(

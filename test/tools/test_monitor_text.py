@@ -98,7 +98,9 @@ def test_an_estop_is_latched_asked_for_or_not() -> None:
     assert text.estop(view()) == "e-stop not latched"
     assert text.estop(view(estop=True)) == "E-STOP LATCHED"
     assert text.estop(view(estop_asked=True)) == "E-STOP ASKED FOR, NOT YET CONFIRMED"
-    assert text.estop(view(estop=None)) == "e-stop: not heard"
+    for unknown in (view(estop=None), view(silent_s=3.1)):
+        assert text.estop(unknown) == "e-stop: not known"
+    assert text.estop(view(estop=True, silent_s=3.1)) == "E-STOP LATCHED"
 
 
 def test_the_picture_of_a_square_is_a_square() -> None:

@@ -46,10 +46,6 @@ class Console:
         if not self.asks(question):
             raise ToolError("you said no, so nothing was moved or written")
 
-    def ready(self, request: str) -> None:
-        """Wait until a person has done something; --yes cannot do it for them."""
-        self._answer(f"{request}, then press Enter. ")
-
     def asks(self, question: str) -> bool:
         """Yes or no; no unless said."""
         if self._yes:

@@ -74,5 +74,5 @@ def _values(content: Any) -> list[Any]:
 
 def _require_writable(path: Path) -> None:
     folder = next(one for one in path.absolute().parents if one.exists())
-    if not os.access(folder, os.W_OK) or path.is_dir():
+    if not (folder.is_dir() and os.access(folder, os.W_OK)) or path.is_dir():
         raise ToolError(f"{path} cannot be written: choose another place")

@@ -78,7 +78,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     )
     readings = []
     for number, drive in enumerate(drives, 1):
-        console.ready(f"Drive {number} of {len(drives)}: {drive.name}. Mark the floor")
+        console.wait(f"Drive {number} of {len(drives)}: {drive.name}. Mark the floor.")
         path = _drive(robot, console, drive, arguments)
         readings.append(_reading(console, drive, path, arguments))
     return result(readings, fit(readings, robot.parameters["base_radius"]), robot.parameters)

@@ -99,7 +99,7 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
     )
     weights = np.diag([LEVEL_WEIGHT, 1.0, 1.0])
     u, _, vt = np.linalg.svd(body.T @ weights @ np.array([level, nose_up, left_up]))
-    rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    rotation = u @ vt  # no mirror image: right-handed are the three in both
     sigma_rad = math.hypot(abs(square_rad - math.pi / 2) / math.sqrt(2), HAND_RAD)
     return Mounting(rotation, sigma_rad, (nose_rad, left_rad))
 

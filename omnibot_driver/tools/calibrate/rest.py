@@ -24,7 +24,8 @@ LOST_PART: Final = 0.02
 @dataclass(frozen=True, slots=True)
 class Rest:
     """Arrays are of x, y, z of the sensor. ``bias_radps``: mean rate, ``force_mps2``: mean force,
-    each with its standard deviation ``…_sigma``; ``…_noise``: rms of one reading.
+    each with its standard deviation ``…_sigma`` (of a bias that walks: from what it is at the end);
+    ``…_noise``: rms of one reading.
     """
 
     bias_radps: Column
@@ -81,9 +82,11 @@ def rest(imu: Imu) -> Rest:
     size = max(2, round(BLOCK_S / period_s))
     rate_noise, force_noise = _within(rates, size), _within(forces, size)
     curves = tuple(allan(axis, period_s) for axis in rates.T)
+    noises = tuple(noise(curve) for curve in curves)
+    walked = np.array([one.walk for one in noises]) * np.sqrt(len(rates) * period_s / 3)
     return Rest(
         rates.mean(axis=0),
-        _of_mean(rates, rate_noise, size),
+        np.hypot(_of_mean(rates, rate_noise, size), walked),
         rate_noise,
         forces.mean(axis=0),
         _of_mean(forces, force_noise, size),
@@ -91,7 +94,7 @@ def rest(imu: Imu) -> Rest:
         len(rates),
         period_s,
         curves,
-        tuple(noise(curve) for curve in curves),
+        noises,
     )
 
 

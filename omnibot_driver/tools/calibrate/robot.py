@@ -1,33 +1,31 @@
 """The robot as a calibration has it: a client of the running driver. Must not know what is found.
 
-Everything runs in the caller's thread: whoever waits, spins. Every motion is `drive`, whatever
-happens ends in commands to stand still; and if this process dies, the driver's watchdog stops it.
+Every motion is `drive`, whatever happens ends in commands to stand still; and if this process dies,
+the driver's watchdog stops the robot.
 """
 
 import math
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Final
 
 import rclpy
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
-from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.exceptions import InvalidNamespaceException
 from rclpy.node import Node
-from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float32MultiArray, String
-from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.se2 import Pose
-from omnibot_driver.parameters import BY_NAME, PARAMETERS, Value
+from omnibot_driver.tools.calibrate.client import FOUND_WITHIN_S, Client
 from omnibot_driver.tools.calibrate.interruption import Interruption
 from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.motion import HALT, Bounds, Law, Obedience, Topic
@@ -37,14 +35,12 @@ PERIOD_S: Final = 0.02
 """Between commands."""
 LOST_S: Final = 0.3
 """A robot that is not heard for so long is driven no further."""
-FOUND_WITHIN_S: Final = 5.0
-ANSWER_WITHIN_S: Final = 12.0
 STANDS_WITHIN_S: Final = 3.0
 STOOD_S: Final = 0.3
 """Standing for so long is standing still."""
 STANDING: Final = 0.01
 """m/s and rad/s: slower is standing."""
-LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 @contextmanager
@@ -53,11 +49,16 @@ def connect(
 ) -> Iterator["Robot"]:
     """The driver in this namespace. Raises ToolError where there is none."""
     context = Context()
-    rclpy.init(
-        args=list(ros_arguments), context=context, signal_handler_options=SignalHandlerOptions.NO
-    )
+    quiet = SignalHandlerOptions.NO
     try:
-        node = Node("calibrate", namespace=namespace, context=context)
+        rclpy.init(args=list(ros_arguments), context=context, signal_handler_options=quiet)
+    except (RCLError, UnknownROSArgsError) as error:
+        raise ToolError(f"ROS does not understand its arguments: {error}") from error
+    try:
+        try:
+            node = Node("calibrate", namespace=namespace, context=context)
+        except InvalidNamespaceException as error:
+            raise ToolError(f"'{namespace}' is no namespace: {error}") from error
         try:
             yield Robot(node, context, interruption)
         finally:
@@ -66,104 +67,26 @@ def connect(
         rclpy.shutdown(context=context)
 
 
-class Robot:
-    """``driver``: the full name of the driver's node; ``parameters``: its own, by name."""
+class Robot(Client):
+    """``log`` is of the motion or rest that is under way, or was last."""
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
-        self._node, self._interruption = node, interruption
-        self._executor = SingleThreadedExecutor(context=context)
-        self._executor.add_node(node)
+        super().__init__(node, context, interruption)
         self.log = Log()
-        """Of the motion or rest that is under way, or was last."""
-        self._state, self._estop = "", False
+        self._states: list[str] = []
+        self._estop = False
         self._imu_at = self._odometry_at = -math.inf
         self._pose, self._twist = Pose(), HALT
         self._wheel_rates = HALT
         self._sent: Counter[Vector3] = Counter()
         self._foreign = False
-        self.driver = self._find()
-        self.parameters = self._get_parameters()
         self._listen()
-        if not self._wait(lambda: self._state and self._imu_at > 0, FOUND_WITHIN_S):
+        if not self._wait(lambda: self._states and self._imu_at > 0, FOUND_WITHIN_S):
+            state = self._states[-1] if self._states else "unknown"
             raise ToolError(
-                f"{self.driver} sends no imu/data_raw (state: {self._state or 'unknown'}): see what"
-                " it logs, and docs/troubleshooting.md"
+                f"{self.driver} sends no imu/data_raw (state: {state}): see what it logs, and"
+                " docs/troubleshooting.md"
             )
-
-    # Finding the driver
-
-    def _find(self) -> str:
-        own = self._node.get_namespace().rstrip("/")
-        found: list[str] = []
-
-        def here() -> list[str]:
-            found[:] = drivers(self._node)
-            return [name for name in found if name.rpartition("/")[0] == own]
-
-        if not self._wait(here, FOUND_WITHIN_S):
-            place = f"in the namespace {own}" if own else "without a namespace"
-            others = (
-                f"there are {', '.join(found)}: choose by --namespace"
-                if found
-                else "nor any other: start it (ros2 run omnibot_driver driver), and check that"
-                " ROS_DOMAIN_ID is the same"
-            )
-            raise ToolError(f"no driver is running {place}; {others}")
-        if len(here()) > 1:
-            raise ToolError(f"there are several drivers here: {', '.join(here())}; end all but one")
-        return here()[0]
-
-    def _get_parameters(self) -> dict[str, Value]:
-        names = [parameter.name for parameter in PARAMETERS]
-        request = GetParameters.Request(names=names)
-        answer = self._call(GetParameters, f"{self.driver}/get_parameters", request)
-        values = [parameter_value_to_python(value) for value in answer.values]
-        return {
-            name: list(value) if isinstance(value, Sequence) and type(value) is not str else value
-            for name, value in zip(names, values, strict=False)
-        }
-
-    def set_parameters(self, values: Mapping[str, Value]) -> None:
-        """In the running driver. Raises ToolError with its reason for a refusal."""
-        messages = [
-            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
-        ]
-        request = SetParameters.Request(parameters=messages)
-        answer = self._call(SetParameters, f"{self.driver}/set_parameters", request)
-        for name, result in zip(values, answer.results, strict=True):
-            if not result.successful:
-                raise ToolError(f"the driver refuses {name}: {result.reason}")
-        self.parameters.update(values)
-
-    def apply(self, values: Mapping[str, Value]) -> None:
-        """Likewise, those that may change while the driver runs."""
-        changeable = {name: value for name, value in values.items() if not BY_NAME[name].fixed}
-        if changeable:
-            self.set_parameters(changeable)
-
-    def call(self, service: str, on: bool | None = None) -> str:
-        """A service of the driver, with ``data`` where it takes any; what it answers.
-
-        Raises ToolError where the driver says that it failed.
-        """
-        kind = Trigger if on is None else SetBool
-        request = Trigger.Request() if on is None else SetBool.Request(data=on)
-        answer = self._call(kind, f"{self.driver}/{service}", request)
-        if not answer.success:
-            raise ToolError(f"~/{service}: {answer.message}")
-        return str(answer.message)
-
-    def _call(self, kind: Any, name: str, request: Any) -> Any:
-        client = self._node.create_client(kind, name)
-        try:
-            if not self._wait(client.service_is_ready, FOUND_WITHIN_S):
-                raise ToolError(f"{name} is not there: does the driver still run?")
-            future = client.call_async(request)
-            if not self._wait(future.done, ANSWER_WITHIN_S):
-                raise ToolError(f"{name} does not answer: does the driver still run?")
-            return future.result()
-        finally:
-            self._node.destroy_client(client)
 
     # Hearing
 
@@ -208,7 +131,7 @@ class Robot:
         self.log.wheel_rows.append((_seconds(message), *message.position, *rates))
 
     def _on_state(self, message: String) -> None:
-        self._state = message.data
+        self._states.append(message.data)
 
     def _on_estop(self, message: Bool) -> None:
         self._estop = message.data
@@ -219,23 +142,7 @@ class Robot:
         self._sent[command] -= 1
         self._foreign = self._foreign or self._sent[command] < 0
 
-    # Waiting
-
-    def _wait(self, done: Callable[[], object], seconds: float) -> bool:
-        """Whether it came about."""
-        deadline_s = time.monotonic() + seconds
-        while not (held := done()) and time.monotonic() < deadline_s:
-            self._spin(0.05)
-        return bool(held)
-
-    def _spin(self, seconds: float) -> None:
-        self._interruption.check()
-        self._hear(seconds)
-
-    def _hear(self, seconds: float) -> None:
-        deadline_s = time.monotonic() + seconds
-        while (left_s := deadline_s - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left_s)
+    # Watching
 
     def _unheard(self, at: str) -> bool:
         """Not for too long; what waits to be read is read first, for we may have been slow."""
@@ -247,15 +154,16 @@ class Robot:
     def _require_sound(self, states: Sequence[str] = ("nominal",)) -> None:
         if self._estop:
             raise ToolError("the e-stop is latched: release it with ~/estop, then begin again")
-        if self._state not in states:
-            raise ToolError(
-                f"the driver's state is {self._state}, not {' or '.join(states)}: see what it logs;"
-                " ~/start starts a paused board"
-            )
+        for state in self._states:
+            if state not in states:
+                raise ToolError(
+                    f"the driver's state is or was {state}, not {' or '.join(states)}: see what it"
+                    " logs; ~/start starts a paused board"
+                )
         lost = [
             topic
             for topic, at in (("imu/data_raw", "_imu_at"), ("odom", "_odometry_at"))
-            if self._unheard(at) and not (topic == "odom" and self._state == "imu_only")
+            if self._unheard(at) and not (topic == "odom" and self._states[-1] == "imu_only")
         ]
         if lost:
             raise ToolError(
@@ -267,6 +175,7 @@ class Robot:
         """Hear the robot anew: while a person was asked, nothing was heard."""
         self._imu_at = self._odometry_at = -math.inf
         self._wait(lambda: self._imu_at > 0 and self._odometry_at > 0, 1.0)
+        del self._states[:-1]
         self._require_sound(states)
         self.log = Log()
 
@@ -392,13 +301,6 @@ class Robot:
                 f"somebody else commands the robot on cmd_vel ({', '.join(sorted(others))}): end"
                 " that first"
             )
-
-
-def drivers(node: Node) -> list[str]:
-    """Full names of the drivers that run, by the service that only they have."""
-    offered = (name for name, _kinds in node.get_service_names_and_types())
-    tail = "/calibrate_gyro"
-    return sorted(name.removesuffix(tail) for name in offered if name.endswith(tail))
 
 
 def _seconds(message: Any) -> float:

@@ -1,8 +1,8 @@
 """From recorded steps of one wheel to models with uncertainties. Pure calculation.
 
 Time counts from the *onset*: the board's control tick that could first see the command. The ticks
-are known from the stamps; a command that came in close to a tick may have been seen one sooner or
-later than it seems, and then the recorded step itself tells.
+are known from the stamps; a command that came in close to a tick, or waited on a busy computer, was
+seen at another one than it seems, and then the recorded step itself tells.
 """
 
 import math
@@ -29,6 +29,10 @@ BEFORE: Final = 3
 """Deltas before the onset that belong to a step."""
 FEWEST_DELTAS: Final = 10
 ROUNDS: Final = 4
+SOONER: Final = range(-20, 3)
+"""Ticks by which an onset may be sooner than it seems; a late command has a later one."""
+UNLIKE: Final = 3.0
+"""So many times the usual misfit is something else than noise."""
 
 
 LOOK_S: Final = np.arange(0.0, 2.0, 1e-3)
@@ -172,10 +176,11 @@ def fit(model: Model, steps: Sequence[Step]) -> Fit:
 
 @dataclass(frozen=True, slots=True)
 class WheelFound:
-    """One wheel: its steps, and the models that were fitted to them."""
+    """One wheel: its steps, how many others were left out, and the models that were fitted."""
 
     name: str
     steps: list[Step]
+    left_out: int
     first: Fit
     second: Fit
     motor_fit: Fit
@@ -194,15 +199,15 @@ class WheelFound:
 
 def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
     """All three models; ``now``: the gains in the firmware."""
-    whole = aligned(steps)
+    whole = alike(aligned(alike(aligned(steps))))
     first, second, motor = (
         fit(model, whole) for model in (FIRST_ORDER, SECOND_ORDER, motor_model(now))
     )
-    return WheelFound(name, whole, first, second, motor)
+    return WheelFound(name, whole, len(steps) - len(whole), first, second, motor)
 
 
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """The steps with the onset that each of them shows, a tick sooner or later at the most.
+    """The steps with the onset that each of them shows: a command may have been late.
 
     All of them sooner or later would be a delay, so the middle one stays.
     """
@@ -210,7 +215,7 @@ def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
     for _ in range(ROUNDS):
         guess = fit(model, [step.sooner(n) for step, n in zip(steps, shifts, strict=True)])
         best = [
-            min((-1, 0, 1), key=lambda n, step=step: _misfit(guess, step.sooner(n)))  # type: ignore[misc]
+            min(SOONER, key=lambda n, step=step: _misfit(guess, step.sooner(n)))  # type: ignore[misc]
             for step in steps
         ]
         middle = sorted(best)[len(best) // 2]
@@ -221,5 +226,13 @@ def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
     return [step.sooner(n) for step, n in zip(steps, shifts, strict=True)]
 
 
+def alike(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
+    """Without those that differ from all others."""
+    guess = fit(model, steps)
+    misfits = [_misfit(guess, step) for step in steps]
+    most = UNLIKE * sorted(misfits)[len(misfits) // 2]
+    return [step for step, misfit in zip(steps, misfits, strict=True) if misfit <= most]
+
+
 def _misfit(guess: Fit, step: Step) -> float:
-    return float(np.sum((guess.told(step) - step.rate_radps) ** 2))
+    return float(np.sqrt(np.mean((guess.told(step) - step.rate_radps) ** 2)))

@@ -12,6 +12,9 @@ from omnibot_driver.tools.calibrate.wheel_loop import Gains, Motor
 
 UNLIKE_ONE: Final = 0.02
 """A gain that differs more from 1 is the scale's affair."""
+QUANTUM_RADPS: Final = 0.05
+"""Standard deviation of a delta's rate by the steps of the encoder and of 0.1 mm on the wire."""
+MANY: Final = 3.0
 UNEXPLAINED: Final = 1.2
 """So many times the second order's residuals tell that no motor fits."""
 
@@ -33,6 +36,7 @@ def result_of(found: list[WheelFound], now: Gains) -> Result:
             ("better K_VI", "PWM/count", better.integral, now.integral),
         )
     ]
+    worst = max(float(behaviour(one, better).ms) for one in motors)
     record = {
         "step": {
             "wheels": {wheel.name: _recorded(wheel) for wheel in found},
@@ -46,7 +50,8 @@ def result_of(found: list[WheelFound], now: Gains) -> Result:
     notes = [sentence for wheel in found for sentence in _remarks(wheel)]
     notes += [
         f"With the gains that it has, {_told(behaviour(motor, now))}.",
-        f"With the better ones, {_told(behaviour(motor, better))}.",
+        f"With the better ones, {_told(behaviour(motor, better))} (on the wheel that they suit"
+        f" least, {worst:.2f}).",
         "No message sets them: they are constants of the firmware.",
     ]
     return Result(
@@ -106,6 +111,17 @@ def _remarks(wheel: WheelFound) -> list[str]:
         f" {second.rms_radps:.3f} with the second, {motor.rms_radps:.3f} with a motor in the"
         f" manual's loop; by AIC the {wheel.answer.model.title} tells the answer."
     ]
+    if wheel.left_out:
+        remarks.append(
+            f"Wheel {wheel.name}: {wheel.left_out} of {wheel.left_out + len(wheel.steps)} steps"
+            " were unlike the others and are left out."
+        )
+    if second.rms_radps > MANY * QUANTUM_RADPS:
+        remarks.append(
+            f"Wheel {wheel.name}: it answers differently from step to step, by more than the"
+            f" {QUANTUM_RADPS} rad/s that encoder and wire make. Is something in its way, the"
+            " battery weak, this computer too busy?"
+        )
     if motor.rms_radps > UNEXPLAINED * second.rms_radps:
         remarks.append(
             f"Wheel {wheel.name}: no motor explains this in the manual's loop. Was the firmware"

@@ -139,8 +139,7 @@ class Monitor(App[None]):
             self._show_teleop(self._robot.dead_man, view.steers)
 
     def _show_title(self, view: View) -> None:
-        silent = view.silent_s > text.SILENT_S
-        colour = RED if silent else STATES.get(view.state, RED)
+        colour = RED if view.silent else STATES.get(view.state, RED)
         self._parts["title"].update(Text(text.title(view), f"bold {colour}"))
 
     def _show_path(self, view: View) -> None:

@@ -13,24 +13,21 @@ from typing import Any, Final
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import GetParameters
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
-from rclpy.duration import Duration
 from rclpy.exceptions import InvalidNamespaceException, InvalidTopicNameException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver.core.diagnosis import Status
-from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.messages import UNMEASURED_VARIANCE
 from omnibot_driver.tools.monitor.model import (
@@ -41,14 +38,11 @@ from omnibot_driver.tools.monitor.model import (
     View,
     level,
 )
-from omnibot_driver.tools.monitor.teleop import HALT, DeadMan
+from omnibot_driver.tools.monitor.teleop import DeadMan
+from omnibot_driver.tools.monitor.velocity import ANY, VelocityTopic, body_twist
 from omnibot_driver.tools.needs import ToolError
 
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-ANY: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Hears reliable publishers and others alike."""
-LOOK_EVERY_S: Final = 0.5
-DRIVE_EVERY_S: Final = 0.05
 INSIST_EVERY_S: Final = 0.2
 PARAMETERS: Final = ("port", "max_linear_speed", "max_angular_speed")
 
@@ -82,8 +76,6 @@ class Feed:
             )
             self.driver = self._node.resolve_topic_name(f"{name}/state").removesuffix("/state")
             self._model, self._lock = Model(self.driver, time.monotonic()), threading.Lock()
-            self._cmd_vel: Any = None
-            self._hears: Any = None
             self._port = ""
             self._listen()
             self._offer()
@@ -104,16 +96,14 @@ class Feed:
         self._ending.set()
         self._executor.create_task(lambda: None)
         self._spinner.join(timeout=1.0)
-        if self.dead_man and self.dead_man.has_driven and self._cmd_vel:
-            self._drive(HALT)
-            self._cmd_vel.wait_for_all_acked(Duration(seconds=0.5))
+        self._velocity.close()
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)
 
     def view(self) -> View:
         """What is known now."""
         with self._lock:
-            return self._model.view(time.monotonic())
+            return self._model.view(time.monotonic(), steers=self._velocity.steers)
 
     def drivers(self) -> list[str]:
         """Names of those that are there, wherever they are."""
@@ -168,10 +158,13 @@ class Feed:
         node.create_subscription(Odometry, ODOM_TOPIC, self._on_odom, ANY)
         node.create_subscription(DiagnosticArray, DIAGNOSTICS_TOPIC, self._on_diagnostics, ANY)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(LOOK_EVERY_S, self._look_for_commands, clock=steady)
         node.create_timer(INSIST_EVERY_S, self._insist, clock=steady)
-        if self.dead_man:
-            node.create_timer(DRIVE_EVERY_S, self._tick, clock=steady)
+        self._velocity = VelocityTopic(
+            node,
+            name,
+            self.dead_man,
+            lambda twist: self._know(lambda model, now_s: model.commanded(twist, now_s)),
+        )
 
     def _on_state(self, message: String) -> None:
         self._know(lambda model, now_s: model.state(message.data, now_s))
@@ -199,7 +192,7 @@ class Feed:
     def _on_odom(self, message: Odometry) -> None:
         at, turn = message.pose.pose.position, message.pose.pose.orientation
         pose = Pose(at.x, at.y, 2.0 * math.atan2(turn.z, turn.w))
-        twist = _body_twist(message.twist.twist)
+        twist = body_twist(message.twist.twist)
         known = message.twist.covariance[0] < UNMEASURED_VARIANCE
         self._know(lambda model, now_s: model.odom(pose, twist if known else None, now_s))
 
@@ -217,38 +210,6 @@ class Feed:
         )
         if statuses:
             self._know(lambda model, now_s: model.diagnosed(statuses, now_s))
-
-    def _on_command(self, message: Any) -> None:
-        twist = _body_twist(message.twist if isinstance(message, TwistStamped) else message)
-        self._know(lambda model, now_s: model.commanded(twist, now_s))
-
-    def _look_for_commands(self) -> None:
-        """``cmd_vel`` has the type that the driver, or whoever takes it in its place, subscribes.
-
-        A topic cannot have two types in one process, so everything of ours follows.
-        """
-        topic = self._node.resolve_topic_name("cmd_vel")
-        takers = [
-            info
-            for info in self._node.get_subscriptions_info_by_topic(topic)
-            if info.node_name != self._node.get_name()
-        ]
-        name = self.driver.rpartition("/")[2]
-        takers.sort(key=lambda info: info.node_name != name)
-        heard_by = self._cmd_vel.get_subscription_count() if self._cmd_vel else 0
-        self._model.steers = heard_by > 1  # one of them is ours
-        if not takers:
-            return
-        kind = TwistStamped if takers[0].topic_type.endswith("/TwistStamped") else Twist
-        if self._hears and self._hears.msg_type is kind:
-            return
-        if self._hears:
-            self._node.destroy_subscription(self._hears)
-        if self._cmd_vel:
-            self._node.destroy_publisher(self._cmd_vel)
-        self._hears = self._node.create_subscription(kind, "cmd_vel", self._on_command, ANY)
-        if self.dead_man:
-            self._cmd_vel = self._node.create_publisher(kind, "cmd_vel", 1)
 
     # To ROS
 
@@ -268,23 +229,6 @@ class Feed:
             self._estop_topic.publish(Bool(data=True))
         finally:
             self._call(self._estop, SetBool.Request(data=True), "e-stop")
-
-    def _tick(self) -> None:
-        assert self.dead_man
-        twist = self.dead_man.command(time.monotonic())
-        if twist and self._cmd_vel:
-            self._drive(twist)
-
-    def _drive(self, twist: BodyTwist) -> None:
-        message = Twist()
-        message.linear.x, message.linear.y = twist.vx_mps, twist.vy_mps
-        message.angular.z = twist.yaw_rate_radps
-        if self._cmd_vel.msg_type is TwistStamped:
-            stamped = TwistStamped(twist=message)
-            stamped.header.stamp = self._node.get_clock().now().to_msg()
-            self._cmd_vel.publish(stamped)
-        else:
-            self._cmd_vel.publish(message)
 
     def _call(self, client: Any, request: Any, what: str) -> None:
         if not client.service_is_ready():
@@ -317,7 +261,3 @@ class Feed:
         except Exception as error:
             self._say(f"the monitor hears nothing any more after a defect of its own: {error!r}")
             raise
-
-
-def _body_twist(twist: Any) -> BodyTwist:
-    return BodyTwist(twist.linear.x, twist.linear.y, twist.angular.z)

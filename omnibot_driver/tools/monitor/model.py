@@ -21,6 +21,8 @@ ODOM_TOPIC: Final = "odom"
 DIAGNOSTICS_TOPIC: Final = "/diagnostics"
 COMMAND_LIVES_S: Final = 0.5
 """As the driver's ``cmd_vel_timeout``: an older one moves nobody."""
+SILENT_S: Final = 3.0
+"""Diagnostics come every second: after three without, they and the driver are history."""
 STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
@@ -39,7 +41,7 @@ class Flow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """All of it at one moment. What is not known is None or empty.
+    """All of it at one moment. What is not known, or no longer, is None or empty.
 
     ``steers`` is whether somebody takes what is commanded here.
     """
@@ -60,6 +62,11 @@ class View:
     path: tuple[tuple[float, float], ...]
     steers: bool
     said: str
+
+    @property
+    def silent(self) -> bool:
+        """Whether the driver is not heard any more."""
+        return self.silent_s > SILENT_S
 
     @property
     def link(self) -> str:
@@ -93,7 +100,8 @@ class View:
                 yield from ((f"{name} x", twist.vx_mps), (f"{name} y", twist.vy_mps))
                 yield f"{name} turn", twist.yaw_rate_radps
         for name, vector in (("acceleration", force), ("angular velocity", rate)):
-            yield from ((f"{name} {axis}", value) for axis, value in zip("xyz", vector or ()))  # noqa: B905
+            for axis, value in zip("xyz", vector or (), strict=False):
+                yield f"{name} {axis}", value
 
 
 class Model:
@@ -102,7 +110,6 @@ class Model:
     def __init__(self, driver: str, now_s: float) -> None:
         self.said = ""
         self.estop_asked = False
-        self.steers = False
         self._driver = driver
         self._state = ""
         self._estop: bool | None = None
@@ -115,6 +122,7 @@ class Model:
         self._force: Vector3 | None = None
         self._rate: Vector3 | None = None
         self._statuses: tuple[Status, ...] = ()
+        self._diagnosed_s = now_s
         self._path: deque[tuple[float, float]] = deque(maxlen=LONGEST_PATH)
 
     def state(self, state: str, now_s: float) -> None:
@@ -142,9 +150,9 @@ class Model:
 
     def diagnosed(self, statuses: tuple[Status, ...], now_s: float) -> None:
         """``/diagnostics`` of this driver."""
-        self._statuses, self._heard_s = statuses, now_s
+        self._statuses, self._diagnosed_s, self._heard_s = statuses, now_s, now_s
 
-    def view(self, now_s: float) -> View:
+    def view(self, now_s: float, *, steers: bool = False) -> View:
         """All that is known now."""
         moves = self._commanded and now_s - self._commanded[1] < COMMAND_LIVES_S
         imu, odom = (
@@ -160,13 +168,13 @@ class Model:
             imu=imu,
             odom=odom,
             pose=self._pose,
-            measured=self._measured,
+            measured=self._measured if odom.age_s is not None else None,
             commanded=self._commanded[0] if self._commanded and moves else None,
-            force_mps2=self._force,
-            rate_radps=self._rate,
-            statuses=self._statuses,
+            force_mps2=self._force if imu.age_s is not None else None,
+            rate_radps=self._rate if imu.age_s is not None else None,
+            statuses=self._statuses if now_s - self._diagnosed_s <= SILENT_S else (),
             path=tuple(self._path),
-            steers=self.steers,
+            steers=steers,
             said=self.said,
         )
 

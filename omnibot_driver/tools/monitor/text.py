@@ -22,8 +22,6 @@ COUNTS: Final = (
     ("Link", "Reconnects", "reconnects"),
     ("Commands", "Refused", "refused"),
 )
-SILENT_S: Final = 3.0
-"""Diagnostics come every second."""
 
 
 def clean(text: str) -> str:
@@ -47,7 +45,7 @@ def numbers(values: Iterable[float] | None) -> str:
 
 def title(view: View) -> str:
     """Who, in which mode, over which link."""
-    if view.silent_s > SILENT_S:
+    if view.silent:
         return f"{view.driver}  nothing heard for {view.silent_s:.0f} s (was {view.state})"
     return clean(f"{view.driver}  {view.state}  {view.link}".rstrip())
 
@@ -56,8 +54,8 @@ def estop(view: View) -> str:
     """The latch, in words."""
     if view.estop_asked:
         return "E-STOP ASKED FOR, NOT YET CONFIRMED"
-    if view.estop is None:
-        return "e-stop: not heard"
+    if view.estop is None or (view.silent and not view.estop):
+        return "e-stop: not known"
     return "E-STOP LATCHED" if view.estop else "e-stop not latched"
 
 
