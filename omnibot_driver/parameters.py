@@ -12,7 +12,12 @@ from typing import Any, Final
 from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.errors import ParameterError
-from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, GYRO_COUNTS_PER_DPS, ImuScale
+from omnibot_driver.core.imu import (
+    ACCEL_COUNTS_PER_G,
+    GYRO_COUNTS_PER_DPS,
+    STANDARD_GRAVITY,
+    ImuScale,
+)
 from omnibot_driver.core.inertial import ImuCorrection
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometrySettings
@@ -366,8 +371,8 @@ PARAMETERS: Final = (
         "largest_force_step",
         4.0,
         "m/s²",
-        "A single leap of one axis of the accelerometer that is larger, and back with the next"
-        " reading, is refused; a shock lasts longer, or shows in other axes.",
+        "A single leap of one axis of the accelerometer that is larger, of the size of a changed"
+        " bit, and back with the next reading, is refused.",
         low=0.1,
         high=1000.0,
     ),
@@ -571,6 +576,7 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
             fastest_mps2=values["fastest_linear_acceleration"],
             fastest_radps2=values["fastest_angular_acceleration"],
             force_step_mps2=values["largest_force_step"],
+            full_scale_mps2=values["accel_range"] * STANDARD_GRAVITY,
         ),
         imu=ImuCorrection(
             gyro_bias=_vector(values["gyro_bias"]),
