@@ -252,9 +252,7 @@ class Session:
             if self._closed:
                 return "e-stop latched; the port is not open: the stop is sent as soon as it is"
             if self._board.mode is Mode.UNKNOWN:
-                return (
-                    "e-stop latched; nothing comes from the board: nobody knows if it hears us"
-                )
+                return "e-stop latched; nothing comes from the board: nobody knows if it hears us"
             return "e-stop latched"
         if not self.estop_active:
             return "the e-stop was not latched"
