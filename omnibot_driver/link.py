@@ -16,8 +16,10 @@ from functools import partial
 from typing import Final, TypeVar
 
 from omnibot_driver.core.errors import CommandRefused, LinkError
-from omnibot_driver.core.session import Event, Notice, OnExit, Session
+from omnibot_driver.core.events import Event, Notice
+from omnibot_driver.core.session import Session
 from omnibot_driver.core.snapshot import LinkFigures, SessionFigures
+from omnibot_driver.core.supervisor import OnExit
 from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
 from omnibot_driver.port import Port
 from omnibot_driver.standstill import Standstill
@@ -160,7 +162,7 @@ class Link:
                         comes_back = True
                         raise
                     finally:
-                        self._detach(comes_back=comes_back)
+                        self._detach(port, comes_back=comes_back)
             except LinkError as error:
                 self._trouble = str(error)
                 self._report(self._trouble)
@@ -204,10 +206,13 @@ class Link:
                 events = self._settle()
             self._deliver(events)
 
-    def _detach(self, *, comes_back: bool) -> None:
+    def _detach(self, port: Port, *, comes_back: bool) -> None:
         """Whatever ended the reading, the robot is not left with a command to carry out."""
         with self._changed:
-            self._write(self._session.farewell("stop"))
+            if self._write_error is None:
+                self._write(self._session.farewell("stop"))
+            else:  # Stop, right behind whatever is out of the kernel's reach
+                port.write_if_room(self._session.broken_off())
             comes_back &= not self._closing.is_set()
             stopped = self._write_error is None or comes_back
             keeper, self._port, self._keeper = self._keeper, None, None

@@ -71,9 +71,9 @@ def imu_message(estimate: ImuEstimate, stamp: Time, settings: MessageSettings) -
         header=Header(stamp=stamp, frame_id=settings.imu_frame),
         orientation_covariance=NO_ORIENTATION,
         angular_velocity=Vector3(x=rate[0], y=rate[1], z=rate[2]),
-        angular_velocity_covariance=_isotropic(settings.angular_velocity_stddev),
+        angular_velocity_covariance=isotropic(settings.angular_velocity_stddev),
         linear_acceleration=Vector3(x=force[0], y=force[1], z=force[2]),
-        linear_acceleration_covariance=_isotropic(settings.acceleration_stddev),
+        linear_acceleration_covariance=isotropic(settings.acceleration_stddev),
     )
 
 
@@ -88,7 +88,7 @@ def odometry_message(
     )
     message.pose.pose.position = Point(x=pose.x_m, y=pose.y_m, z=0.0)
     message.pose.pose.orientation = yaw_quaternion(pose.yaw_rad)
-    message.pose.covariance = _planar(
+    message.pose.covariance = planar(
         covariance.xx,
         covariance.xy,
         covariance.x_yaw,
@@ -96,12 +96,13 @@ def odometry_message(
         covariance.y_yaw,
         covariance.yaw_yaw,
     )
-    linear = angular = UNMEASURED_VARIANCE
-    if twist is not None:
-        message.twist.twist.linear = Vector3(x=twist.vx_mps, y=twist.vy_mps, z=0.0)
-        message.twist.twist.angular = Vector3(x=0.0, y=0.0, z=twist.yaw_rate_radps)
-        linear, angular = settings.twist_linear_stddev**2, settings.twist_angular_stddev**2
-    message.twist.covariance = _planar(linear, 0.0, 0.0, linear, 0.0, angular)
+    if twist is None:
+        message.twist.covariance = TWIST_NOT_KNOWN
+        return message
+    message.twist.twist.linear = Vector3(x=twist.vx_mps, y=twist.vy_mps, z=0.0)
+    message.twist.twist.angular = Vector3(x=0.0, y=0.0, z=twist.yaw_rate_radps)
+    linear, angular = settings.twist_linear_stddev**2, settings.twist_angular_stddev**2
+    message.twist.covariance = planar(linear, 0.0, 0.0, linear, 0.0, angular)
     return message
 
 
@@ -120,14 +121,19 @@ def joint_state_message(
     estimate: OdometryEstimate, stamp: Time, settings: MessageSettings
 ) -> JointState:
     """``joint_states``: the wheels' angles, unwrapped, and rates; no rates where none are known."""
-    rolled, rolling = estimate.rolled, estimate.rolling
-    as_twist = BodyTwist(rolled.x_m, rolled.y_m, rolled.yaw_rad)
+    angles, rates = wheels(estimate, settings.wheels)
     return JointState(
-        header=Header(stamp=stamp),
-        name=WHEEL_JOINTS,
-        position=settings.wheels.wheel_rates(as_twist),
-        velocity=settings.wheels.wheel_rates(rolling) if rolling else [],
+        header=Header(stamp=stamp), name=WHEEL_JOINTS, position=angles, velocity=rates
     )
+
+
+def wheels(
+    estimate: OdometryEstimate, kinematics: OmniKinematics
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Angles in rad and rates in rad/s of the wheels; no rates where none are known."""
+    rolled, rolling = estimate.rolled, estimate.rolling
+    angles = kinematics.wheel_rates(BodyTwist(rolled.x_m, rolled.y_m, rolled.yaw_rad))
+    return angles, kinematics.wheel_rates(rolling) if rolling else ()
 
 
 def diagnostic_message(
@@ -238,12 +244,13 @@ def yaw_quaternion(yaw_rad: float) -> Quaternion:
     return Quaternion(x=0.0, y=0.0, z=math.sin(yaw_rad / 2), w=math.cos(yaw_rad / 2))
 
 
-def _isotropic(stddev: float) -> list[float]:
+def isotropic(stddev: float) -> list[float]:
+    """Row-major 3x3 of a vector with the same noise along each axis."""
     variance = stddev * stddev
     return [variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, variance]
 
 
-def _planar(
+def planar(
     xx: float, xy: float, x_yaw: float, yy: float, y_yaw: float, yaw_yaw: float
 ) -> list[float]:
     """Row-major 6x6 of (x, y, z, roll, pitch, yaw)."""
@@ -256,3 +263,8 @@ def _planar(
         *(zero, zero, zero, zero, big, zero),
         *(x_yaw, y_yaw, zero, zero, zero, yaw_yaw),
     ]
+
+
+TWIST_NOT_KNOWN: Final = planar(
+    UNMEASURED_VARIANCE, 0.0, 0.0, UNMEASURED_VARIANCE, 0.0, UNMEASURED_VARIANCE
+)

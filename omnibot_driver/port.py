@@ -25,8 +25,13 @@ READ_TIMEOUT_S: Final = 0.2
 """How soon a port that cannot be interrupted returns to look whether it is still wanted."""
 WRITE_TIMEOUT_S: Final = 0.2
 MOST_AT_ONCE: Final = 4096
-PEER_TIMEOUT_MS: Final = 5000
-"""A network peer that acknowledges nothing for so long is gone."""
+PEER_OPTIONS: Final = {
+    socket.TCP_KEEPIDLE: 1,
+    socket.TCP_KEEPINTVL: 1,
+    socket.TCP_USER_TIMEOUT: 5000,
+}
+"""A network peer that acknowledges nothing for five seconds is gone; one that is sent nothing is
+asked every second."""
 PSEUDO_TERMINALS: Final = range(136, 144)
 """Linux's major device numbers of them."""
 
@@ -44,6 +49,7 @@ class Port:
         self._url = url
         self._is_terminal = False
         self._peer: socket.socket | None = None
+        self._arrivals: select.poll | None = None
         try:
             self._serial = serial.serial_for_url(
                 url,
@@ -83,6 +89,8 @@ class Port:
         """
         data = b""
         try:
+            if self._arrivals is not None:
+                return _read_whole(self._serial, self._arrivals)
             data = self._serial.read(1)
             while data and len(data) < MOST_AT_ONCE and (waiting := self._serial.in_waiting):
                 data += self._serial.read(waiting)
@@ -103,6 +111,12 @@ class Port:
                 self._serial.reset_output_buffer()
             raise LinkError(f"lost {self._url} while writing: {error}") from error
 
+    def write_if_room(self, data: bytes) -> None:
+        """As much of it as is taken at once, be it nothing."""
+        if (descriptor := self.descriptor) is not None:
+            with contextlib.suppress(OSError):
+                os.write(descriptor, data)
+
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, where the port can do so."""
         cancel = getattr(self._serial, "cancel_read", None)
@@ -122,6 +136,10 @@ class Port:
     def _settle_in(self) -> None:
         descriptor = self.descriptor
         self._is_terminal = descriptor is not None and os.isatty(descriptor)
+        if type(self._serial) is serial.Serial:  # what its URLs are made of may look at each read
+            self._arrivals = select.poll()
+            for waited_for in (self._serial.fd, self._serial.pipe_abort_read_r):
+                self._arrivals.register(waited_for, select.POLLIN)
         if descriptor is not None and self._is_terminal:
             attributes = termios.tcgetattr(descriptor)
             attributes[2] &= ~termios.HUPCL
@@ -132,7 +150,23 @@ class Port:
         peer = getattr(self._serial, "_socket", None)  # pyserial has no public name for it
         if isinstance(peer, socket.socket):
             self._peer = peer
-            peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, PEER_TIMEOUT_MS)
+            peer.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+            for option, value in PEER_OPTIONS.items():
+                peer.setsockopt(socket.IPPROTO_TCP, option, value)
+
+
+def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
+    """All there is, in two system calls where pyserial needs five."""
+    for ready, _ in arrivals.poll(1e3 * READ_TIMEOUT_S):
+        if ready != port.fd:
+            os.read(ready, 1000)  # pyserial's ``cancel_read``
+            return b""
+        with contextlib.suppress(BlockingIOError):
+            data = os.read(ready, MOST_AT_ONCE)
+            if not data:
+                raise OSError("the device hung up")
+            return data
+    return b""
 
 
 def _write_whole(descriptor: int, data: bytes) -> None:

@@ -13,7 +13,9 @@ from functools import partial
 from typing import Final, TypeVar
 
 from omnibot_driver.core.errors import LinkError
-from omnibot_driver.core.session import Event, Notice, OnExit, Session
+from omnibot_driver.core.events import Event, Notice
+from omnibot_driver.core.session import Session
+from omnibot_driver.core.supervisor import OnExit
 from omnibot_driver.recording import Recording
 
 JOIN_TIMEOUT_S: Final = 1.0

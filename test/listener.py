@@ -4,10 +4,12 @@ import threading
 from collections.abc import Callable, Sequence
 
 from omnibot_driver.core.commands import CommandSettings
+from omnibot_driver.core.events import Event
+from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
-from omnibot_driver.core.session import Event, ImuEstimate, Session, SessionSettings
+from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link
 
 PATIENCE_S = 20.0

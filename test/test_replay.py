@@ -11,9 +11,10 @@ import pytest
 from listener import Listener, driver_threads, link_to, session
 
 from omnibot_driver.core.errors import LinkError, RequestRefused
+from omnibot_driver.core.events import Event, Notice, StateChanged
+from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.odometry import OdometryEstimate
-from omnibot_driver.core.session import Event, ImuEstimate, Notice, StateChanged
 from omnibot_driver.core.supervisor import Request
 from omnibot_driver.replay import Replay
 from omnibot_driver.simulator import BoardSettings, FaultyLine, LineFaults, SimulatedBoard

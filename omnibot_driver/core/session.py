@@ -6,9 +6,9 @@ not log: whatever a user should hear of is an event.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, Literal
+from typing import Final
 
 from omnibot_driver.core.board import (
     Board,
@@ -19,44 +19,28 @@ from omnibot_driver.core.board import (
     Reading,
     Vector3,
 )
-from omnibot_driver.core.commands import PACE_S, CommandSettings, CommandStream
+from omnibot_driver.core.commands import CommandSettings
+from omnibot_driver.core.driving import Driving, Wish
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.helm import ControlMethod, Helm
-from omnibot_driver.core.inertial import ImuCorrection, ImuEstimate
+from omnibot_driver.core.events import Event, Notice, StateChanged
+from omnibot_driver.core.helm import ControlMethod
+from omnibot_driver.core.inertial import ImuCorrection
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.limits import SpeedLimits, require_timely
-from omnibot_driver.core.measuring import Estimate, Measured, Measuring
-from omnibot_driver.core.motion import GoalMotion, Motion
+from omnibot_driver.core.limits import SpeedLimits
+from omnibot_driver.core.measuring import Measured, Measuring
 from omnibot_driver.core.news import HEADING_ASSUMED, Bulletin, why_silent
-from omnibot_driver.core.odometry import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry import OdometrySettings
+from omnibot_driver.core.permission import why_not_calibrate, why_not_drive
 from omnibot_driver.core.plausibility import MotionLimits, Refused
 from omnibot_driver.core.se2 import Pose, Signs
-from omnibot_driver.core.snapshot import CommandFigures, SessionFigures
-from omnibot_driver.core.supervisor import Phase, Request, RequestDone, Supervisor
-from omnibot_driver.core.watch import Finding, Watch
+from omnibot_driver.core.snapshot import SessionFigures
+from omnibot_driver.core.supervisor import OnExit, Phase, Request, Supervisor
 
 SILENCE_S: Final = 1.5
 """The board says something at least once a second; after this it is not known to be there."""
 UNHEARD_S: Final = 0.3
 """A robot that is not heard for so long is driven no further: it may be restarting."""
 DISCONNECTED: Final = "disconnected"
-
-OnExit = Literal["stop", "pause", "reset"]
-
-
-@dataclass(frozen=True, slots=True)
-class StateChanged:
-    """``Session.state`` or ``Session.estop_active`` is another than before."""
-
-
-@dataclass(frozen=True, slots=True)
-class Notice:
-    """Something a user should be told, in a sentence."""
-
-    text: str
-
-
-Event = ImuEstimate | OdometryEstimate | StateChanged | RequestDone | Notice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,19 +72,23 @@ class Session:
         obeys: bool = True,
     ) -> None:
         self._board = board
-        self._obeys = obeys
         self._supervisor = Supervisor(board, run=run)
-        self._commands = CommandStream(
-            settings.commands, stop=board.stop(), emergency_stop=board.emergency_stop()
-        )
         self._measuring = Measuring(
             board, settings.odometry, settings.motion, settings.imu, axis_signs
         )
         self._odometry, self._inertial = self._measuring.odometry, self._measuring.inertial
-        self._helm = Helm(board, self._odometry, settings.limits, axis_signs, control)
-        self._heard_at = self._came_at = self._commanded_at = -math.inf
+        self._driving = Driving(
+            board,
+            self._odometry,
+            settings.limits,
+            settings.commands,
+            axis_signs,
+            control,
+            obeys=obeys,
+        )
+        self._commands = self._driving.stream
+        self._heard_at = self._came_at = -math.inf
         self._silent = False
-        self._watch = Watch()
         self._bulletin = Bulletin()
         self._events: list[Event] = []
         self._shown = (self.state, self.estop_active)
@@ -132,19 +120,13 @@ class Session:
 
     def figures(self, now: float) -> SessionFigures:
         """All that is counted and measured."""
-        current = self._commands.current
         return SessionFigures(
             state=self.state,
             tally=replace(self._measuring.tally),
             board=self._board.figures,
             refused=self.refused,
             skew_ppm=self._measuring.skew_ppm,
-            commands=CommandFigures(
-                source=current.authority.value if current else None,
-                age_s=now - self._commanded_at,
-                limited=self._helm.limited,
-                estop=self.estop_active,
-            ),
+            commands=self._driving.figures(now),
             imu=self._inertial.figures,
         )
 
@@ -172,15 +154,13 @@ class Session:
 
     def configure(self, settings: SessionSettings) -> None:
         """New settings, from the next command and frame on."""
-        self._helm.limits = settings.limits
-        self._commands.settings = settings.commands
+        self._driving.configure(settings.limits, settings.commands)
         self._measuring.configure(settings.odometry, settings.motion, settings.imu)
 
     def opened(self, now: float) -> None:
         """The port is open."""
         self._board.connect()
-        self._commands.discard()
-        self._watch.begin()
+        self._driving.begin()
         self._measuring.restart()
         self._silent, self._heard_at, self._came_at = False, now, -math.inf
         self._supervisor.opened(now)
@@ -212,7 +192,7 @@ class Session:
         if not self._silent and now - self._heard_at >= SILENCE_S:
             self._silent = True
             self._react(self._measuring.release(), now)
-            self._notify(why_silent(SILENCE_S, bytes_came=self._came_at > self._heard_at))
+            self._notify([why_silent(SILENCE_S, bytes_came=self._came_at > self._heard_at)])
             if self._board.mode is not Mode.UNKNOWN:
                 self._board.silence()
                 self._measuring.restart()
@@ -226,11 +206,11 @@ class Session:
         if not self._closed:
             self._heard_at = now  # the silence was ours
             self._commands.halt(now)
-            self._events.append(
-                Notice(
+            self._notify(
+                [
                     f"the driver stood still for {seconds:.1f} s: the robot is stopped"
                     " until a new command comes"
-                )
+                ]
             )
 
     # What is wanted
@@ -240,19 +220,15 @@ class Session:
 
         ``age_s``: how long ago it was sent, by the sender's stamp.
         """
-        timeout_s = self._commands.settings.timeout_s
-        require_timely("cmd_vel", age_s, timeout_s)
-        motion = self._helm.base(twist, before=self._commands.current, since=now - PACE_S)
-        self._command(motion, now, expires_at=now - max(0.0, age_s) + timeout_s)
+        self._command(self._driving.twist(twist, now, age_s=age_s), now)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
         """Turn wheels A, B, C. Raises CommandRefused, and then nothing changes."""
-        motion = self._helm.wheels(rates_radps)
-        self._command(motion, now, expires_at=now + self._commands.settings.timeout_s)
+        self._command(self._driving.wheels(rates_radps, now), now)
 
     def command_pose(self, goal: Pose, now: float) -> None:
         """Drive to a pose in the odometry frame. Raises CommandRefused; then nothing changes."""
-        self._command(self._helm.pose(goal), now, expires_at=math.inf)
+        self._command(self._driving.pose(goal), now)
 
     def request(self, request: Request, token: object, now: float) -> None:
         """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""
@@ -262,49 +238,41 @@ class Session:
 
     def calibrate_gyro(self, token: object, now: float) -> None:
         """Find the gyro's bias; answered by a RequestDone. Raises RequestRefused at once."""
-        current = self._commands.current
-        if self._closed:
-            reason = "the port is not open; connect the board, then call again"
-        elif not self._board.mode.running:
-            reason = f"the board is {self._board.mode.value}; call ~/start, then call again"
-        elif self._inertial.calibration.measuring:
-            reason = "a calibration is under way; wait for its answer, then call again"
-        elif current is not None and not current.stands:
-            reason = f"the robot is commanded by {current.authority.value}; cease, then call again"
-        else:
-            self._inertial.calibration.measure(token, now)
-            return
-        raise RequestRefused(reason)
+        calibration, phase = self._inertial.calibration, self._supervisor.phase
+        if reason := why_not_calibrate(
+            phase, self._board.mode, self._commands.current, measuring=calibration.measuring
+        ):
+            raise RequestRefused(reason)
+        calibration.measure(token, now)
 
     def estop(self, active: bool, now: float) -> str:
         """Latch or release the e-stop; returns what is so now, in a sentence."""
         if active:
             self._commands.latch(now)
-            later = "; the port is not open: the stop is sent as soon as it is"
-            return "e-stop latched" + (later if self._closed else "")
+            if self._closed:
+                return "e-stop latched; the port is not open: the stop is sent as soon as it is"
+            if self._board.mode is Mode.UNKNOWN:
+                return "e-stop latched; nothing comes from the board: nobody knows if it hears us"
+            return "e-stop latched"
         if not self.estop_active:
             return "the e-stop was not latched"
-        self._commands.release(now)
-        self._watch.release()
+        self._driving.release(now)
         return "e-stop released; the robot stands still until a new command comes"
 
     def reset_odometry(self, now: float) -> None:
         """The odometry frame begins where the robot stands; a goal in the old one is dropped."""
         self._odometry.reset()
-        self._check_goal([], now)
+        self._notify(self._driving.check_goal([], now))
 
     def farewell(self, on_exit: OnExit) -> bytes:
         """The last bytes to write before the port is closed."""
-        data = self._board.stop()
-        settled = self._supervisor.phase is Phase.SETTLED
-        if on_exit == "reset":
-            data = self._board.reset()
-        elif on_exit == "pause" and settled and self._board.mode.running:
-            data = self._board.pause()
-        elif on_exit == "pause" and not (settled and self._board.mode is Mode.PAUSED):
-            data = self._board.force_pause()
+        data = self._supervisor.farewell(on_exit)
         self._commands.discard()
         return data + (self._board.emergency_stop() if self.estop_active else b"")
+
+    def broken_off(self) -> bytes:
+        """What is to follow a write that failed half-way, before the port is closed."""
+        return self._board.wake() + (self._board.emergency_stop() if self.estop_active else b"")
 
     # What comes of it
 
@@ -348,76 +316,37 @@ class Session:
             self._events += estimates
             match reading:
                 case DisplacementReading(restarted=restarted):
-                    self._look(reading, now)
-                    self._check_goal(estimates, now)
+                    self._notify(self._driving.look(reading, estimates, now))
                     if restarted:
                         self._commands.halt(now)
                 case PoseReading(restarted=True):
                     self._commands.halt(now)
                 case PausedReading(continues):
-                    self._commands.discard()
-                    self._watch.begin()
+                    self._driving.begin()
                     self._supervisor.heard_paused(now, continues=continues)
-        self._check_goal([], now)
-
-    def _look(self, reading: DisplacementReading, now: float) -> None:
-        if not self._obeys:
-            return
-        finding = self._watch.look(reading, self._commands.current)
-        if finding is Finding.ASTRAY:
-            self._commands.halt(now)
-        if finding and self._watch.is_news(finding):
-            self._notify(finding.value)
-
-    def _check_goal(self, estimates: Sequence[Estimate], now: float) -> None:
-        """Drop a goal that is another place by now, or that the robot drives away from."""
-        goal = self._commands.current
-        if not isinstance(goal, GoalMotion):
-            return
-        if goal.alignment != self._odometry.alignments:
-            why = "odom begins anew"
-        elif any(
-            goal.is_left_by(estimate.pose)
-            for estimate in estimates
-            if isinstance(estimate, OdometryEstimate)
-        ):
-            why = "the robot drives away from it: does the board's switch stand on position?"
-        else:
-            return
-        self._commands.halt(now)
-        self._notify(f"the goal of cmd_pose is discarded: {why}")
+        self._notify(self._driving.check_goal([], now))
 
     def _tell(self, now: float) -> None:
         bulletin, board, odometry = self._bulletin, self._board, self._odometry
         once = [board.advice] if board.advice is not None else []
         once += [HEADING_ASSUMED] if odometry.heading_assumed else []
-        for sentence in (
-            *bulletin.counted(self.lost, self.refused, now),
-            *bulletin.standing(self._inertial.advice),
-            *bulletin.once(once),
+        self._notify(bulletin.counted(self.lost, self.refused, now))
+        self._notify(bulletin.standing(self._inertial.advice))
+        self._notify(bulletin.once(once))
+
+    def _notify(self, sentences: Iterable[str]) -> None:
+        self._events += map(Notice, sentences)
+
+    def _command(self, wish: Wish, now: float) -> None:
+        motion, _ = wish
+        unheard = now - self._heard_at >= UNHEARD_S and not motion.stands
+        if reason := why_not_drive(
+            self._supervisor.phase,
+            self._board.mode,
+            latched=self.estop_active,
+            unheard_s=UNHEARD_S if unheard else 0.0,
         ):
-            self._notify(sentence)
-
-    def _notify(self, text: str) -> None:
-        self._events.append(Notice(text))
-
-    def _command(self, motion: Motion, now: float, *, expires_at: float) -> None:
-        phase, mode = self._supervisor.phase, self._board.mode
-        if self.estop_active:
-            reason = "the e-stop is latched; release it with the service ~/estop (data: false)"
-        elif phase is not Phase.SETTLED:
-            hint = "; the service ~/start makes it run" if phase is Phase.PAUSING else ""
-            reason = f"the board is {phase.value}{hint}"
-        elif not mode.running:
-            reason = f"the board is {mode.value}; the service ~/start makes it run"
-        elif now - self._heard_at >= UNHEARD_S and not motion.stands:
-            reason = f"nothing was heard from the board for {UNHEARD_S:g} s"
-        else:
-            self._commands.command(motion, now, expires_at=expires_at)
-            self._commanded_at = now
-            if not motion.stands:
-                self._inertial.calibration.give_up(
-                    "a motion command came in; cease, then call again"
-                )
-            return
-        raise CommandRefused(f"motion command refused: {reason}")
+            raise CommandRefused(f"motion command refused: {reason}")
+        self._driving.command(wish, now)
+        if not motion.stands:
+            self._inertial.calibration.give_up("a motion command came in; cease, then call again")

@@ -9,7 +9,7 @@ module knows no bytes and reads no clock.
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Final
+from typing import Final, Literal
 
 from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.errors import RequestRefused
@@ -25,6 +25,8 @@ IN_FLIGHT_S: Final = 0.1
 one that is followed by data within this time does not show that the board is paused."""
 ANSWER_WITHIN_S: Final = 4.5
 RESET_WITHIN_S: Final = 9.5
+
+OnExit = Literal["stop", "pause", "reset"]
 
 
 class Request(Enum):
@@ -73,7 +75,7 @@ class Supervisor:
         self._output = bytearray()
         self._said_at = self._data_at = -math.inf
         self._flowed_s = 0.0
-        self._paused_with_p = False
+        self._paused_with_p = self._was_running = False
         self._shown_at = math.inf
         self._request: Request | None = None
         self._token: object = None
@@ -128,7 +130,8 @@ class Supervisor:
             self._begin_pausing(now, with_p=False)
             self._output += self._board.stop()
         else:
-            if self._wanted is Wanted.ANY and self._board.mode.running:
+            self._was_running = self._board.mode.running
+            if self._wanted is Wanted.ANY and self._was_running:
                 self._wanted = Wanted.RUNNING
             self.phase = Phase.RESETTING
             self._deadline = now + RESET_WITHIN_S
@@ -143,8 +146,10 @@ class Supervisor:
         elif self.phase is Phase.RESETTING and continues and not in_flight:
             self._say(self._board.reset(), now)
         elif self.phase is Phase.RESETTING and not in_flight:
+            if self._was_running:  # also against a pause that failed
+                self._wanted = Wanted.RUNNING
             self._begin(now)
-            if not running_wanted:
+            if self._wanted is not Wanted.RUNNING:
                 self._settle("the board has restarted and is paused, as it was before")
         elif self.phase is Phase.STARTING or (self.phase is Phase.SETTLED and running_wanted):
             self._begin(now)  # it has restarted, and may have slept through what was said so far
@@ -179,6 +184,17 @@ class Supervisor:
             self._give_up(now)
         elif self.phase is Phase.STARTING and now - self._said_at >= START_RETRY_S:
             self._say(self._board.start(), now)
+
+    def farewell(self, on_exit: OnExit) -> bytes:
+        """The last bytes to the board: it is stopped in any case, and left so."""
+        settled = self.phase is Phase.SETTLED
+        if on_exit == "reset":
+            return self._board.reset()
+        if on_exit == "pause" and settled and self._board.mode.running:
+            return self._board.pause()
+        if on_exit == "pause" and not (settled and self._board.mode is Mode.PAUSED):
+            return self._board.force_pause()
+        return self._board.stop()
 
     def _begin(self, now: float) -> None:
         """The opening sequence; a board that is not wanted running gets no S."""
@@ -217,7 +233,9 @@ class Supervisor:
             reason = "the board goes on sending data: does the cable carry our bytes to it?"
         if self.phase is Phase.RESETTING:
             self.phase = Phase.SETTLED
-            if self._wanted is Wanted.RUNNING and not mode.running:
+            if self._wanted is Wanted.PAUSED:
+                self._begin_pausing(now, with_p=True)
+            elif self._wanted is Wanted.RUNNING and not mode.running:
                 self._begin(now)
         if self.phase is Phase.STARTING:
             reason += " (S is repeated until data flows)"

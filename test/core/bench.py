@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from omnibot_driver.core.commands import CommandSettings
+from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.helm import ControlMethod
 from omnibot_driver.core.inertial import ImuCorrection
 from omnibot_driver.core.kinematics import BodyTwist
@@ -10,7 +11,7 @@ from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.se2 import Pose
-from omnibot_driver.core.session import Event, Notice, Session, SessionSettings
+from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 

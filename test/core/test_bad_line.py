@@ -8,9 +8,9 @@ import pytest
 from bench import TICK_S, Bench
 
 from omnibot_driver.core.imu import ImuScale
+from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.odometry import OdometryEstimate
 from omnibot_driver.core.se2 import Pose
-from omnibot_driver.core.session import ImuEstimate
 from omnibot_driver.simulator import BoardPose, BoardSettings, FaultyLine, LineFaults
 
 

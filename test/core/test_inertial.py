@@ -6,9 +6,9 @@ import pytest
 from bench import Bench
 
 from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.events import Notice
 from omnibot_driver.core.inertial import ImuCorrection, ImuEstimate
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.session import Notice
 from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.simulator import BoardSettings
 

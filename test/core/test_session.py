@@ -7,7 +7,8 @@ import pytest
 from bench import EMERGENCY_STOP, OPENING, STOP, Bench
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.session import ImuEstimate, StateChanged
+from omnibot_driver.core.events import StateChanged
+from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.simulator import BoardMode, BoardPose, BoardSettings
 

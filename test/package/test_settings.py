@@ -38,10 +38,11 @@ def parameters(name: str, node: str) -> dict[str, Any]:
 
 
 def driver_names() -> set[str]:
-    """The driver's topics and services, relative to its namespace, as its node creates them."""
+    """The driver's topics and services, relative to its namespace, as it creates them."""
     calls = [
         node
-        for node in ast.walk(ast.parse((ROOT / NODE / "node.py").read_text()))
+        for source in (ROOT / NODE).glob("*.py")
+        for node in ast.walk(ast.parse(source.read_text()))
         if isinstance(node, ast.Call)
         and isinstance(node.func, ast.Attribute)
         and node.func.attr in ("create_publisher", "create_subscription", "create_service")

@@ -1,0 +1,154 @@
+"""Measurements as the bytes that rclpy would make of their messages, without making messages.
+
+CDR, as DDS serialises, aligns every number to its own size, as a C struct does on a 64-bit machine:
+so Python's ``struct`` with native alignment writes it. Strings are a length and bytes with a NUL,
+sequences a length and elements. Whether that is so here is not taken for granted: ``difference``
+compares with rclpy's own.
+"""
+
+import itertools
+import math
+import struct
+from typing import Final
+
+from nav_msgs.msg import Odometry
+from rclpy._rclpy_pybind11 import RMWError
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import Imu, JointState
+
+from omnibot_driver import messages
+from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.uncertainty import Covariance
+from omnibot_driver.messages import MessageSettings
+
+LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
+"""The encapsulation header; alignment counts from behind it."""
+STAMP: Final = "iI"
+NO_TURN: Final = (0.0, 0.0, 0.0, 1.0)
+AT_REST: Final = (0.0,) * 6
+
+
+class Serializer:
+    """``imu``, ``odometry`` and ``joint_state`` of one MessageSettings; stamps in ns."""
+
+    def __init__(self, settings: MessageSettings) -> None:
+        self._settings = settings
+        frame, values = _text(settings.imu_frame)
+        self._imu = struct.Struct(f"@{STAMP}{frame}37d")
+        self._imu_head = (*values, *NO_TURN, *messages.NO_ORIENTATION)
+        self._rate_noise = messages.isotropic(settings.angular_velocity_stddev)
+        self._force_noise = messages.isotropic(settings.acceleration_stddev)
+
+        odom_frame, odom_values = _text(settings.odom_frame)
+        base_frame, base_values = _text(settings.base_frame)
+        self._odometry = struct.Struct(f"@{STAMP}{odom_frame}{base_frame}85d")
+        self._odometry_head = (*odom_values, *base_values)
+        linear, angular = settings.twist_linear_stddev**2, settings.twist_angular_stddev**2
+        self._twist_noise = messages.planar(linear, 0.0, 0.0, linear, 0.0, angular)
+
+        names, name_values = zip(*map(_text, messages.WHEEL_JOINTS), strict=True)
+        no_frame, no_values = _text("")
+        joints = f"@{STAMP}{no_frame}I{''.join(names)}I3d"
+        self._joints = struct.Struct(f"{joints}I3dI0d")
+        self._joints_at_odds = struct.Struct(f"{joints}I0dI0d")  # an empty one is aligned as well
+        self._joints_head = (*no_values, 3, *itertools.chain(*name_values), 3)
+
+    def imu(self, estimate: ImuEstimate, stamp_ns: int) -> bytes:
+        """``messages.imu_message``."""
+        return LITTLE_ENDIAN + self._imu.pack(
+            *divmod(stamp_ns, 10**9),
+            *self._imu_head,
+            *estimate.angular_velocity,
+            *self._rate_noise,
+            *estimate.specific_force,
+            *self._force_noise,
+        )
+
+    def odometry(self, estimate: OdometryEstimate, stamp_ns: int) -> bytes:
+        """``messages.odometry_message``."""
+        pose, twist, noise = estimate.pose, estimate.twist, estimate.covariance
+        half_rad = pose.yaw_rad / 2
+        moving, twist_noise = AT_REST, messages.TWIST_NOT_KNOWN
+        if twist is not None:
+            moving = (twist.vx_mps, twist.vy_mps, 0.0, 0.0, 0.0, twist.yaw_rate_radps)
+            twist_noise = self._twist_noise
+        return LITTLE_ENDIAN + self._odometry.pack(
+            *divmod(stamp_ns, 10**9),
+            *self._odometry_head,
+            *(pose.x_m, pose.y_m, 0.0),
+            *(0.0, 0.0, math.sin(half_rad), math.cos(half_rad)),
+            *messages.planar(noise.xx, noise.xy, noise.x_yaw, noise.yy, noise.y_yaw, noise.yaw_yaw),
+            *moving,
+            *twist_noise,
+        )
+
+    def joint_state(self, estimate: OdometryEstimate, stamp_ns: int) -> bytes:
+        """``messages.joint_state_message``."""
+        angles, rates = messages.wheels(estimate, self._settings.wheels)
+        head = (*divmod(stamp_ns, 10**9), *self._joints_head, *angles)
+        if rates:
+            return LITTLE_ENDIAN + self._joints.pack(*head, 3, *rates, 0)
+        return LITTLE_ENDIAN + self._joints_at_odds.pack(*head, 0, 0)
+
+
+class Messages:
+    """What a Serializer makes, as messages: for a machine on which the bytes are others."""
+
+    def __init__(self, settings: MessageSettings) -> None:
+        self._settings = settings
+
+    def imu(self, estimate: ImuEstimate, stamp_ns: int) -> Imu:
+        """``imu/data_raw``."""
+        return messages.imu_message(estimate, messages.time_message(stamp_ns), self._settings)
+
+    def odometry(self, estimate: OdometryEstimate, stamp_ns: int) -> Odometry:
+        """``odom``."""
+        return messages.odometry_message(estimate, messages.time_message(stamp_ns), self._settings)
+
+    def joint_state(self, estimate: OdometryEstimate, stamp_ns: int) -> JointState:
+        """``joint_states``."""
+        stamp = messages.time_message(stamp_ns)
+        return messages.joint_state_message(estimate, stamp, self._settings)
+
+
+def difference(settings: MessageSettings) -> str:
+    """The type of a message that rclpy serialises otherwise; empty if there is none."""
+    reading = ImuEstimate(0.0, (1.1, -2.2, 3.3), (-4.4, 5.5, -6.6))
+    noise = Covariance(1.2, 2.3, 3.4, 4.5, 5.6, 6.7)
+    tangent, twist = Pose(7.7, -8.8, 9.9), BodyTwist(0.1, -0.2, 0.3)
+    known = OdometryEstimate(0.0, tangent, twist, noise, tangent, twist)
+    unknown = OdometryEstimate(0.0, tangent, None, noise, tangent, None)
+    stamp_ns = 1_234_567_890_987_654_321
+    pairs = zip(
+        *(
+            [
+                make.imu(reading, stamp_ns),
+                *(make.odometry(estimate, stamp_ns) for estimate in (known, unknown)),
+                *(make.joint_state(estimate, stamp_ns) for estimate in (known, unknown)),
+            ]
+            for make in (Messages(settings), Serializer(settings))
+        ),
+        strict=True,
+    )
+    for message, ours in pairs:
+        if not _same(ours, serialize_message(message), type(message)):
+            return type(message).__name__
+    return ""
+
+
+def _same(ours: bytes, theirs: bytes, kind: type) -> bool:
+    """Padding does not count: rclpy leaves in it what was there before."""
+    try:
+        alike = deserialize_message(ours, kind) == deserialize_message(theirs, kind)
+    except RMWError:
+        return False
+    return alike and len(ours) == len(theirs)
+
+
+def _text(text: str) -> tuple[str, tuple[int, bytes]]:
+    """Form and values of a string."""
+    data = text.encode() + b"\0"
+    return f"I{len(data)}s", (len(data), data)

@@ -1,0 +1,124 @@
+"""Motion commands, from a wish to what comes of it: when each expires, and whether the robot obeys.
+
+Composes the helm, the command stream and the watch. Knows no modes and no requests: whether a robot
+may be driven now is decided elsewhere.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from omnibot_driver.core.board import Board, DisplacementReading
+from omnibot_driver.core.commands import PACE_S, CommandSettings, CommandStream
+from omnibot_driver.core.helm import ControlMethod, Helm
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.limits import SpeedLimits, require_timely
+from omnibot_driver.core.measuring import Estimate
+from omnibot_driver.core.motion import GoalMotion, Motion
+from omnibot_driver.core.odometry import Odometry, OdometryEstimate
+from omnibot_driver.core.se2 import Pose, Signs
+from omnibot_driver.core.snapshot import CommandFigures
+from omnibot_driver.core.watch import Finding, Watch
+
+Wish = tuple[Motion, float]
+"""A motion that may be commanded, and when it expires."""
+NEVER: Final = math.inf
+
+
+class Driving:
+    """``stream`` is what goes out; ``obeys``: whether the robot can be expected to do it."""
+
+    def __init__(
+        self,
+        board: Board,
+        odometry: Odometry,
+        limits: SpeedLimits,
+        commands: CommandSettings,
+        axis_signs: Signs,
+        control: ControlMethod,
+        *,
+        obeys: bool,
+    ) -> None:
+        self.stream = CommandStream(
+            commands, stop=board.stop(), emergency_stop=board.emergency_stop()
+        )
+        self._odometry = odometry
+        self._helm = Helm(board, odometry, limits, axis_signs, control)
+        self._watch = Watch()
+        self._obeys = obeys
+        self._commanded_at = -math.inf
+
+    def configure(self, limits: SpeedLimits, commands: CommandSettings) -> None:
+        """New settings, from the next command and frame on."""
+        self._helm.limits, self.stream.settings = limits, commands
+
+    def figures(self, now: float) -> CommandFigures:
+        """Who commands, and how."""
+        current = self.stream.current
+        return CommandFigures(
+            source=current.authority.value if current else None,
+            age_s=now - self._commanded_at,
+            limited=self._helm.limited,
+            estop=self.stream.latched,
+        )
+
+    def begin(self) -> None:
+        """What was commanded and seen has nothing to do with what comes."""
+        self.stream.discard()
+        self._watch.begin()
+
+    def release(self, now: float) -> None:
+        """End the e-stop."""
+        self.stream.release(now)
+        self._watch.release()
+
+    def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Wish:
+        """Drive the body. Raises CommandRefused, as all wishes do."""
+        timeout_s = self.stream.settings.timeout_s
+        require_timely("cmd_vel", age_s, timeout_s)
+        motion = self._helm.base(twist, before=self.stream.current, since=now - PACE_S)
+        return motion, now - max(0.0, age_s) + timeout_s
+
+    def wheels(self, rates_radps: Sequence[float], now: float) -> Wish:
+        """Turn wheels A, B, C."""
+        return self._helm.wheels(rates_radps), now + self.stream.settings.timeout_s
+
+    def pose(self, goal: Pose) -> Wish:
+        """Drive to a pose in the odometry frame."""
+        return self._helm.pose(goal), NEVER
+
+    def command(self, wish: Wish, now: float) -> None:
+        """It is granted."""
+        motion, expires_at = wish
+        self.stream.command(motion, now, expires_at=expires_at)
+        self._commanded_at = now
+
+    def look(
+        self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
+    ) -> Iterator[str]:
+        """Hold what the robot did against what it was told; sentences for the user."""
+        if self._obeys:
+            finding = self._watch.look(reading, self.stream.current)
+            if finding is Finding.ASTRAY:
+                self.stream.halt(now)
+            if finding and self._watch.is_news(finding):
+                yield finding.value
+        yield from self.check_goal(estimates, now)
+
+    def check_goal(self, estimates: Sequence[Estimate], now: float) -> Iterator[str]:
+        """Drop a goal that is another place by now, or that the robot drives away from."""
+        goal = self.stream.current
+        if not isinstance(goal, GoalMotion):
+            return
+        if goal.alignment != self._odometry.alignments:
+            why = "odom begins anew"
+        elif any(
+            goal.is_left_by(estimate.pose)
+            for estimate in estimates
+            if isinstance(estimate, OdometryEstimate)
+        ):
+            why = "the robot drives away from it: does the board's switch stand on position?"
+        else:
+            return
+        self.stream.halt(now)
+        yield f"the goal of cmd_pose is discarded: {why}"

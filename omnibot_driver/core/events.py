@@ -1,0 +1,22 @@
+"""What a session tells whoever listens: values only."""
+
+from dataclasses import dataclass
+
+from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.supervisor import RequestDone
+
+
+@dataclass(frozen=True, slots=True)
+class StateChanged:
+    """``Session.state`` or ``Session.estop_active`` is another than before."""
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something a user should be told, in a sentence."""
+
+    text: str
+
+
+Event = ImuEstimate | OdometryEstimate | StateChanged | RequestDone | Notice

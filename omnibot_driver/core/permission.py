@@ -1,0 +1,33 @@
+"""Whether the robot may be driven, or its gyro calibrated, now: if not, why, and what to do.
+
+Each answer is a sentence, empty when nothing is in the way. Knows modes and phases.
+"""
+
+from omnibot_driver.core.board import Mode
+from omnibot_driver.core.motion import Motion
+from omnibot_driver.core.supervisor import Phase
+
+
+def why_not_drive(phase: Phase, mode: Mode, *, latched: bool, unheard_s: float) -> str:
+    """``unheard_s``: for so long nothing was heard from the board; 0 where that does not matter."""
+    if latched:
+        return "the e-stop is latched; release it with the service ~/estop (data: false)"
+    if phase is not Phase.SETTLED:
+        hint = "; the service ~/start makes it run" if phase is Phase.PAUSING else ""
+        return f"the board is {phase.value}{hint}"
+    if not mode.running:
+        return f"the board is {mode.value}; the service ~/start makes it run"
+    return f"nothing was heard from the board for {unheard_s:g} s" if unheard_s else ""
+
+
+def why_not_calibrate(phase: Phase, mode: Mode, current: Motion | None, *, measuring: bool) -> str:
+    """``current``: what is commanded; ``measuring``: a calibration is under way."""
+    if phase is Phase.CLOSED:
+        return "the port is not open; connect the board, then call again"
+    if not mode.running:
+        return f"the board is {mode.value}; call ~/start, then call again"
+    if measuring:
+        return "a calibration is under way; wait for its answer, then call again"
+    if current is not None and not current.stands:
+        return f"the robot is commanded by {current.authority.value}; cease, then call again"
+    return ""

@@ -1,0 +1,76 @@
+"""The table of parameters, declared on a node: given at start, described, checked when set."""
+
+import re
+from pathlib import Path
+from typing import Any, Final
+
+import rclpy
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.node import Node
+
+from omnibot_driver import calibration, parameters
+from omnibot_driver.core.errors import ParameterError
+
+NOT_OURS: Final = re.compile(
+    r"use_sim_time|start_type_description_service|(qos_overrides|diagnostic_updater)\..+"
+)
+"""Parameters that rclpy itself, or diagnostic_updater, declares for every node."""
+
+
+def declare(node: Node) -> dict[str, Any]:
+    """Every parameter's value at start. Raises ParameterError for what cannot be."""
+    given = {
+        name: override.value
+        for name, override in node._parameter_overrides.items()
+        if not NOT_OURS.fullmatch(name)
+    }
+    values = parameters.check_all(given)
+    if file := values["calibration_file"]:
+        found = calibration.load(Path(str(file)).expanduser())
+        values = parameters.check_all({**given, **found})
+    for parameter in parameters.PARAMETERS:
+        node.declare_parameter(
+            parameter.name, values[parameter.name], _descriptor(parameter), ignore_override=True
+        )
+    node.add_on_set_parameters_callback(_check)
+    return values
+
+
+def ours(changed: list[rclpy.Parameter]) -> dict[str, Any]:
+    """The values among these that are the driver's own."""
+    return {item.name: item.value for item in changed if item.name in parameters.BY_NAME}
+
+
+def _check(changed: list[rclpy.Parameter]) -> SetParametersResult:
+    try:
+        for name, value in ours(changed).items():
+            parameters.BY_NAME[name].check(value)
+    except ParameterError as error:
+        return SetParametersResult(successful=False, reason=str(error))
+    return SetParametersResult(successful=True)
+
+
+def _descriptor(parameter: parameters.Parameter) -> ParameterDescriptor:
+    descriptor = ParameterDescriptor(
+        description=f"{parameter.description} [{parameter.unit}]"
+        if parameter.unit
+        else parameter.description,
+        additional_constraints=parameter.allowed,
+        read_only=parameter.fixed,
+        dynamic_typing=True,
+    )
+    if parameter.low is not None and parameter.high is not None:
+        if isinstance(parameter.default, int):
+            whole = IntegerRange(
+                from_value=int(parameter.low), to_value=int(parameter.high), step=1
+            )
+            descriptor.integer_range = [whole]
+        else:
+            span = FloatingPointRange(from_value=parameter.low, to_value=parameter.high)
+            descriptor.floating_point_range = [span]
+    return descriptor

@@ -1,0 +1,167 @@
+"""What the driver says: what the session tells, on topics; news, in the log.
+
+Whichever thread an event came up on publishes it: measurements come from the link's reader.
+"""
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
+
+from nav_msgs.msg import Odometry
+from rclpy._rclpy_pybind11 import RCLError
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Bool, String, UInt8MultiArray
+
+from omnibot_driver import messages, selfcheck
+from omnibot_driver.cdr import Messages, Serializer, difference
+from omnibot_driver.core.events import Event, Notice, StateChanged
+from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.session import Session
+from omnibot_driver.core.supervisor import RequestDone
+from omnibot_driver.transforms import transform_publisher
+
+LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+RAW_DEPTH: Final = 1000
+"""A recorder that is kept waiting for seconds still gets every byte."""
+UNHEARD: Final = ("disconnected", "connecting")
+
+
+class Publishing:
+    """``settings`` may be replaced at any time."""
+
+    def __init__(
+        self,
+        node: Node,
+        session: Session,
+        values: Mapping[str, Any],
+        settings: messages.MessageSettings,
+    ) -> None:
+        self._node, self._session = node, session
+        self._maker: type[Serializer | Messages] = Serializer
+        if strange := difference(settings):
+            self._maker = Messages
+            node.get_logger().warning(
+                f"rclpy serialises {strange} in a way of its own here: messages are published as"
+                " ordinary ones, which takes the processor a little more time"
+            )
+        self.settings = settings
+        self._port = values["port"]
+        self._imu = node.create_publisher(Imu, "imu/data_raw", 10)
+        self._odometry = node.create_publisher(Odometry, "odom", 10)
+        self._joints = node.create_publisher(JointState, "joint_states", 10)
+        self._send_transform = transform_publisher(node) if values["publish_tf"] else None
+        self._state = node.create_publisher(String, "~/state", LATCHED)
+        self._estop_active = node.create_publisher(Bool, "~/estop_active", LATCHED)
+        self._published: tuple[str, bool] | None = None
+        self._state_lock = threading.Lock()
+        self._told: set[str] = set()
+        self._clock_offset_ns = 0
+        self._handlers: dict[type, Callable[[Any, int], None]] = {
+            ImuEstimate: self._publish_imu,
+            OdometryEstimate: self._publish_odometry,
+            RequestDone: self._answer,
+            Notice: self._warn,
+            StateChanged: lambda _event, _clock_offset_ns: self.publish_state(),
+        }
+
+    @property
+    def settings(self) -> messages.MessageSettings:
+        """Frames and covariances."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: messages.MessageSettings) -> None:
+        self._settings, self._make = settings, self._maker(settings)
+
+    def taps(self) -> dict[str, Callable[[bytes], None]]:
+        """What a link is to say of the wire itself."""
+        return {
+            "on_read": self._raw_publisher("~/raw_rx"),
+            "on_write": self._raw_publisher("~/raw_tx"),
+        }
+
+    def deliver(self, events: Sequence[Event]) -> None:
+        """Publish events whose stamps are of the steady clock, now."""
+        if not events or not self._node.context.ok():
+            return
+        before_ns = time.monotonic_ns()
+        wall_ns = self._node.get_clock().now().nanoseconds
+        self._clock_offset_ns = messages.clock_offset(
+            self._clock_offset_ns, before_ns, wall_ns, time.monotonic_ns()
+        )
+        self.publish(events, self._clock_offset_ns)
+
+    def publish(self, events: Sequence[Event], clock_offset_ns: int) -> None:
+        """Publish events whose stamps are so far behind ROS time."""
+        if not self._node.context.ok():
+            return
+        for event in events:
+            self._handlers[type(event)](event, clock_offset_ns)
+
+    def publish_state(self) -> None:
+        """Latched topics show what is so now, whichever thread says so last."""
+        with self._state_lock:
+            now = (self._session.state, self._session.estop_active)
+            before = self._published or (None, None)
+            self._published = now
+            if now[0] != before[0]:
+                if now[0] not in UNHEARD:
+                    self._told = set()
+                if self._is_news(state := f"state: {now[0]}"):
+                    self._node.get_logger().info(state)
+                self._state.publish(String(data=now[0]))
+            if now[1] != before[1]:
+                self._estop_active.publish(Bool(data=now[1]))
+
+    def report_port(self, trouble: str | None) -> None:
+        """The port is open, or cannot be had, or was lost."""
+        if trouble is None:
+            if self._is_news(text := f"port {self._port} is open"):
+                self._node.get_logger().info(text)
+            advice = selfcheck.latency_advice(self._port)
+            if advice and self._is_news(advice):
+                self._node.get_logger().warning(advice)
+        elif self._is_news(trouble):
+            self._node.get_logger().error(f"{trouble} (retrying)")
+
+    def _raw_publisher(self, topic: str) -> Callable[[bytes], None]:
+        publisher = self._node.create_publisher(UInt8MultiArray, topic, RAW_DEPTH)
+
+        def publish(data: bytes) -> None:
+            with contextlib.suppress(RCLError):  # the last words outlive ROS
+                publisher.publish(messages.raw_message(data))
+
+        return publish
+
+    def _publish_imu(self, estimate: ImuEstimate, clock_offset_ns: int) -> None:
+        stamp_ns = round(estimate.stamp_s * 1e9) + clock_offset_ns
+        self._imu.publish(self._make.imu(estimate, stamp_ns))
+
+    def _publish_odometry(self, estimate: OdometryEstimate, clock_offset_ns: int) -> None:
+        stamp_ns = round(estimate.stamp_s * 1e9) + clock_offset_ns
+        self._odometry.publish(self._make.odometry(estimate, stamp_ns))
+        if self._send_transform is not None:
+            stamp = messages.time_message(stamp_ns)
+            odometry = messages.odometry_message(estimate, stamp, self._settings)
+            self._send_transform(messages.transform_message(odometry))
+        self._joints.publish(self._make.joint_state(estimate, stamp_ns))
+
+    def _answer(self, done: RequestDone, _clock_offset_ns: int) -> None:
+        assert isinstance(done.token, Future)
+        done.token.set_result(done)
+        if self._node.executor is not None:
+            self._node.executor.wake()
+
+    def _warn(self, notice: Notice, _clock_offset_ns: int) -> None:
+        self._node.get_logger().warning(notice.text)
+
+    def _is_news(self, text: str) -> bool:
+        """Each thing once until the board is understood again: a port that flaps is no news."""
+        told, self._told = self._told, self._told | {text}
+        return text not in told

@@ -1,0 +1,115 @@
+"""The services under the node's name. Those that wait for the board block nobody else."""
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.task import Future
+from std_srvs.srv import SetBool, Trigger
+
+from omnibot_driver import calibration
+from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.session import Session
+from omnibot_driver.core.supervisor import Request, RequestDone
+from omnibot_driver.link import Link
+from omnibot_driver.replay import Replay
+
+
+class Services:
+    """``calibration_file``: where a measured bias is kept; nowhere if empty."""
+
+    def __init__(self, node: Node, link: Link | Replay, calibration_file: str) -> None:
+        self._node, self._link = node, link
+        self._calibration_file = calibration_file
+        node.create_service(SetBool, "~/estop", self._on_estop)
+        node.create_service(Trigger, "~/reset_odometry", self._on_reset_odometry)
+        waiting = ReentrantCallbackGroup()
+        node.create_service(Trigger, "~/start", self._on_start, callback_group=waiting)
+        node.create_service(SetBool, "~/pause", self._on_pause, callback_group=waiting)
+        node.create_service(Trigger, "~/reset", self._on_reset, callback_group=waiting)
+        node.create_service(
+            Trigger, "~/calibrate_gyro", self._on_calibrate_gyro, callback_group=waiting
+        )
+
+    def _on_estop(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        active = bool(request.data)
+        response.message = self._link.call(lambda session, now: session.estop(active, now))
+        if active and self._link.blocked:
+            response.message += "; the port takes nothing: the stop follows when it is open again"
+        response.success = True
+        return response
+
+    def _on_reset_odometry(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        self._link.call(lambda session, now: session.reset_odometry(now))
+        response.success = True
+        response.message = "the odometry begins here"
+        return response
+
+    async def _on_start(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        return await self._request(Request.START, response)
+
+    async def _on_pause(
+        self, request: SetBool.Request, response: SetBool.Response
+    ) -> SetBool.Response:
+        return await self._request(Request.PAUSE if request.data else Request.START, response)
+
+    async def _on_reset(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        return await self._request(Request.RESET, response)
+
+    async def _on_calibrate_gyro(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        await self._ask(Session.calibrate_gyro, response)
+        if response.success:
+            bias = list(self._link.call(lambda session, _now: session.gyro_bias))
+            self._node.set_parameters([rclpy.Parameter("gyro_bias", value=bias)])
+            if self._calibration_file:
+                await self._save(Path(self._calibration_file).expanduser(), bias, response)
+        return response
+
+    async def _save(self, file: Path, bias: list[float], response: Trigger.Response) -> None:
+        """On a thread of its own: a disk may take its time, and nobody else is to wait for it."""
+        answer = Future()
+
+        def save() -> None:
+            try:
+                calibration.save(file, {"gyro_bias": bias})
+                answer.set_result("")
+            except Exception as error:  # whoever asked is owed an answer
+                answer.set_result(str(error))
+            if self._node.executor is not None:
+                self._node.executor.wake()
+
+        threading.Thread(target=save, name="omnibot-save", daemon=True).start()
+        trouble = await answer
+        if trouble:
+            response.success = False
+            response.message += f"; it is applied, but not saved: {trouble}"
+        else:
+            response.message += f"; saved to {file}"
+
+    async def _request(self, request: Request, response: Any) -> Any:
+        return await self._ask(
+            lambda session, answer, now: session.request(request, answer, now), response
+        )
+
+    async def _ask(self, question: Callable[[Session, Future, float], None], response: Any) -> Any:
+        answer = Future()
+        try:
+            self._link.call(lambda session, now: question(session, answer, now))
+        except RequestRefused as error:
+            response.success, response.message = False, str(error)
+            return response
+        done: RequestDone = await answer
+        response.success, response.message = done.success, done.message
+        return response

@@ -1,0 +1,48 @@
+"""Another process's callback: notes when which Imu came, until its standard input ends.
+
+Arguments: namespaces. Prints one JSON array per namespace: pairs of the steady clock's time in s and
+the acceleration along x; and how many odometries came.
+"""
+
+import json
+import sys
+import threading
+import time
+from functools import partial
+
+import rclpy
+from nav_msgs.msg import Odometry
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from sensor_msgs.msg import Imu, JointState
+
+
+def main() -> None:
+    """Listen to everything of every namespace."""
+    namespaces = sys.argv[1:]
+    rclpy.init()
+    node = Node("ear", start_parameter_services=False, enable_rosout=False)
+    heard: list[list[tuple[float, float]]] = [[] for _ in namespaces]
+    odometries = [0] * len(namespaces)
+
+    def hear(number: int, imu: Imu) -> None:
+        heard[number].append((time.monotonic(), imu.linear_acceleration.x))
+
+    def count(number: int, _odometry: Odometry) -> None:
+        odometries[number] += 1
+
+    for number, namespace in enumerate(namespaces):
+        node.create_subscription(Imu, f"{namespace}/imu/data_raw", partial(hear, number), 100)
+        node.create_subscription(Odometry, f"{namespace}/odom", partial(count, number), 100)
+        node.create_subscription(JointState, f"{namespace}/joint_states", lambda _joints: None, 100)
+    threading.Thread(target=lambda: (sys.stdin.read(), rclpy.shutdown()), daemon=True).start()
+    print("listening", flush=True)
+    try:
+        rclpy.spin(node)
+    except ExternalShutdownException:
+        pass
+    print(json.dumps({"heard": heard, "odometries": odometries}), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""The floor: the smallest program that does the same without looking at what it does.
+
+``measurements PORT NAMESPACE`` publishes an Imu for every IMU frame, an Odometry and a JointState for
+every delta, trusting the first byte it reads to begin a frame; ``commands PORT NAMESPACE`` writes a frame for
+every cmd_vel. Each fills in one number, by which a message is known again.
+"""
+
+import os
+import struct
+import sys
+import termios
+
+import rclpy
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from sensor_msgs.msg import Imu, JointState
+
+IMU, DELTA, POSE = 0xFA, 0xFB, 0xFC
+LENGTHS = {IMU: 14, DELTA: 9, POSE: 15}
+
+
+def measurements(port: int, node: Node) -> None:
+    """A blocking read, one prefilled Imu, publish."""
+    imus = node.create_publisher(Imu, "imu/data_raw", 10)
+    odometries = node.create_publisher(Odometry, "odom", 10)
+    joints = node.create_publisher(JointState, "joint_states", 10)
+    imu, odometry = Imu(), Odometry(child_frame_id="base_link")
+    imu.header.frame_id, odometry.header.frame_id = "imu_link", "odom"
+    names = ["wheel_a_joint", "wheel_b_joint", "wheel_c_joint"]
+    joint = JointState(name=names, position=[0.0] * 3, velocity=[0.0] * 3)
+    number = struct.Struct(">h").unpack_from
+    termios.tcflush(port, termios.TCIFLUSH)
+    while data := os.read(port, 4096):
+        at = 0
+        while at < len(data):
+            kind = data[at + 1]
+            if kind == IMU:
+                imu.linear_acceleration.x = float(number(data, at + 2)[0])
+                imus.publish(imu)
+            elif kind == DELTA:
+                odometries.publish(odometry)
+                joints.publish(joint)
+            at += LENGTHS[kind]
+
+
+def commands(port: int, node: Node) -> None:
+    """A callback, one frame, written."""
+    pack = struct.Struct(">BBBhhh").pack
+
+    def drive(twist: Twist) -> None:
+        os.write(port, pack(0xFF, 0xFE, 1, round(70.0 * twist.linear.x), 0, 0))
+
+    node.create_subscription(Twist, "cmd_vel", drive, 1)
+    rclpy.spin(node)
+
+
+def main() -> None:
+    """Until the line hangs up, or it is killed."""
+    what, path, namespace = sys.argv[1:]
+    port = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    rclpy.init()
+    node = Node("floor", namespace=namespace, start_parameter_services=False, enable_rosout=False)
+    {"measurements": measurements, "commands": commands}[what](port, node)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,45 @@
+"""Commands two robots in turn, 40 times a second each, for so many seconds.
+
+Arguments: seconds, namespaces. Prints one JSON array per namespace: pairs of the steady clock's time
+in s at which a command was published, and its forward speed in the board's units.
+"""
+
+import json
+import sys
+import time
+
+import rclpy
+from geometry_msgs.msg import Twist
+from rclpy.node import Node
+
+PERIOD_S = 0.025
+FASTEST = 30
+LSB_PER_MPS = 70.0
+
+
+def main() -> None:
+    """Alternate: at any moment each has waited as long as the other."""
+    seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
+    rclpy.init()
+    node = Node("hand", start_parameter_services=False, enable_rosout=False)
+    publishers = [node.create_publisher(Twist, f"{name}/cmd_vel", 1) for name in namespaces]
+    while any(publisher.get_subscription_count() == 0 for publisher in publishers):
+        time.sleep(0.01)
+    time.sleep(1.0)
+    sent: list[list[tuple[float, int]]] = [[] for _ in namespaces]
+    at = begun = time.monotonic()
+    speed = 0
+    while at < begun + seconds:
+        speed = speed % FASTEST + 1
+        twist = Twist()
+        twist.linear.x = speed / LSB_PER_MPS
+        for number, publisher in enumerate(publishers):
+            at += PERIOD_S / len(publishers)
+            time.sleep(max(0.0, at - time.monotonic()))
+            sent[number].append((time.monotonic(), speed))
+            publisher.publish(twist)
+    print(json.dumps(sent), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,94 @@
+"""Processes that are measured, and what /proc tells of them."""
+
+import json
+import os
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Self
+
+HERE = Path(__file__).parent
+PATIENCE_S = 5.0
+
+
+class Program:
+    """A program of this directory, or a module, until the end of the ``with``."""
+
+    def __init__(self, *arguments: str, environment: dict[str, str] | None = None) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            env={**os.environ, **(environment or {})},
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.terminate()
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(PATIENCE_S)
+        self.process.kill()
+        self.process.wait()
+        for pipe in (self.process.stdin, self.process.stdout):
+            assert pipe is not None
+            with suppress(OSError):
+                pipe.close()
+
+    def line(self) -> str:
+        """The next line it prints."""
+        assert self.process.stdout is not None
+        return self.process.stdout.readline()
+
+    def result(self) -> Any:
+        """End its input; what it prints then."""
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        return json.loads(self.line())
+
+    @property
+    def busy_s(self) -> float:
+        """Processor time so far, of its threads and its children."""
+        return _busy_s(self.process.pid)
+
+    @property
+    def resident_mb(self) -> float:
+        """Resident memory of the process itself."""
+        pages = int(Path(f"/proc/{self.process.pid}/statm").read_text().split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def driver(path: str, namespace: str, before: str = "", **environment: str) -> Program:
+    """The driver as users start it, on this port; ``before`` is Python to be run in it first."""
+    program = ["-m", "omnibot_driver.driver"]
+    if before:
+        main = "import sys, omnibot_driver.driver as driver; sys.exit(driver.main())"
+        program = ["-c", f"{before}\n{main}"]
+    arguments = ["--ros-args", "-r", f"__ns:=/{namespace}", "-p", f"port:={path}"]
+    return Program(*program, *arguments, environment=environment)
+
+
+def floor(what: str, path: str, namespace: str) -> Program:
+    """The smallest relay on this port."""
+    return Program(str(HERE / "floor.py"), what, path, namespace)
+
+
+def ear(*namespaces: str) -> Program:
+    """Somebody who listens, once this returns."""
+    program = Program(str(HERE / "ear.py"), *namespaces)
+    program.line()
+    return program
+
+
+def _busy_s(pid: int) -> float:
+    busy_s = 0.0
+    with suppress(FileNotFoundError, ProcessLookupError):  # threads and children may end meanwhile
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            busy_s += int((task / "schedstat").read_text().split()[0]) / 1e9
+            for child in (task / "children").read_text().split():
+                busy_s += _busy_s(int(child))
+    return busy_s

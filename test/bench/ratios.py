@@ -1,0 +1,68 @@
+"""Figures against a floor: the median of alternating pairs, and how far they scatter."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from statistics import median, quantiles
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """``ours[n]`` and ``floor[n]`` were measured one right after the other; ``goal``: of the ratio."""
+
+    name: str
+    unit: str
+    ours: Sequence[float]
+    floor: Sequence[float]
+    goal: float | None = None
+
+    @property
+    def ratio(self) -> float:
+        """Median of the pairs' ratios."""
+        return median(self._ratios)
+
+    @property
+    def _ratios(self) -> list[float]:
+        return [ours / floor for ours, floor in zip(self.ours, self.floor, strict=True)]
+
+    @property
+    def row(self) -> str:
+        """As a row of the table."""
+        low, high = min(self._ratios), max(self._ratios)
+        if len(self._ratios) > 3:
+            low, _, high = quantiles(self._ratios, n=4, method="inclusive")
+        goal = "—"
+        if self.goal is not None:
+            goal = f"≤ {self.goal:.2f}, {'met' if self.ratio <= self.goal else '**missed**'}"
+        return (
+            f"| {self.name} | {short(median(self.ours))} {self.unit} "
+            f"| {short(median(self.floor))} {self.unit} | {self.ratio:.2f} "
+            f"| {low:.2f}–{high:.2f} of {len(self._ratios)} | {goal} |"
+        )
+
+
+def table(figures: Sequence[Figure]) -> list[str]:
+    """All of them."""
+    return [
+        "| figure | ours | floor | ratio (median) | quartiles | goal |",
+        "|---" * 6 + "|",
+        *(figure.row for figure in figures),
+    ]
+
+
+def alternate(
+    name: str,
+    unit: str,
+    ours: Callable[[], float],
+    floor: Callable[[], float],
+    *,
+    times: int,
+    goal: float | None = None,
+) -> Figure:
+    """Measure one after the other, again and again."""
+    pairs = [(ours(), floor()) for _ in range(times)]
+    return Figure(name, unit, [pair[0] for pair in pairs], [pair[1] for pair in pairs], goal)
+
+
+def short(value: float) -> str:
+    """Three digits, or all of a large number."""
+    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"

@@ -1,0 +1,159 @@
+"""The driver as a process on a pseudo-terminal, beside the floor: latency, processor time, scale."""
+
+import bisect
+import math
+import struct
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from statistics import median, quantiles
+
+from processes import HERE, Program, driver, ear, floor
+from ratios import Figure
+from stage import Stage, number_of
+
+WINDOW_S = 10.0
+SETTLING_S = 5.0
+MPS2_PER_COUNT = 9.80665 / 16384
+
+
+def measurements(windows: int) -> tuple[list[Figure], str]:
+    """Wire to callback, processor time, and the driver's memory meanwhile."""
+    with Stage(2) as stage, ExitStack() as stack:
+        listener = stack.enter_context(ear("ours", "floor"))
+        programs = [
+            stack.enter_context(driver(stage.paths[0], "ours")),
+            stack.enter_context(floor("measurements", stage.paths[1], "floor")),
+        ]
+        time.sleep(2 * SETTLING_S)
+        marks = [time.monotonic()]
+        busy = [[program.busy_s for program in programs]]
+        resident_mb = [programs[0].resident_mb]
+        for _ in range(windows):
+            time.sleep(WINDOW_S)
+            marks.append(time.monotonic())
+            busy.append([program.busy_s for program in programs])
+            resident_mb.append(programs[0].resident_mb)
+        heard = listener.result()["heard"]
+    units = (MPS2_PER_COUNT, 1.0)
+    late = [_latencies(*each) for each in zip(stage.said, heard, units, strict=True)]
+    windowed = [
+        [[us for at, us in each if start <= at < end] for each in late]
+        for start, end in zip(marks, marks[1:], strict=False)
+    ]
+    figures = [
+        Figure(f"IMU frame to callback, {name}", "µs", *zip(*values, strict=True), goal=goal)
+        for name, goal, of in (("median", 1.10, median), ("99th percentile", 1.25, _p99))
+        if (values := [[of(each) for each in window] for window in windowed])
+    ]
+    spent = [
+        [1e3 * (after - before) / (end - start) for before, after in zip(*pair, strict=True)]
+        for *pair, start, end in zip(busy, busy[1:], marks, marks[1:], strict=False)
+    ]
+    name = "processor time per second of stream"
+    figures.append(Figure(name, "ms", *zip(*spent, strict=True), goal=1.5))
+    delivered = [sum(map(len, column)) for column in zip(*windowed, strict=True)]
+    minutes = (marks[-1] - marks[0]) / 60
+    memory = (
+        f"Node: resident {resident_mb[0]:.1f} MB, {resident_mb[-1]:.1f} MB after {minutes:.1f} minutes"
+        f" of stream. IMU frames that came through: {delivered[0]:,} (floor {delivered[1]:,}) of"
+        f" {100 * (marks[-1] - marks[0]):,.0f}."
+    )
+    return figures, memory
+
+
+def commands(windows: int) -> Figure:
+    """cmd_vel published to bytes on the board's side."""
+    with Stage(2) as stage, ExitStack() as stack:
+        stack.enter_context(driver(stage.paths[0], "ours"))
+        stack.enter_context(floor("commands", stage.paths[1], "floor"))
+        time.sleep(SETTLING_S)
+        seconds = str(windows * WINDOW_S / 2)
+        hand = stack.enter_context(Program(str(HERE / "hand.py"), seconds, "ours", "floor"))
+        sent = hand.result()
+    late = [_command_latencies(*each) for each in zip(sent, stage.heard, strict=True)]
+    size = min(map(len, late)) // windows
+    parts = [[median(each[n * size : (n + 1) * size]) for n in range(windows)] for each in late]
+    return Figure("cmd_vel to the board's side, median", "µs", *parts, goal=1.10)
+
+
+def starts(times: int) -> Figure:
+    """Command to first Imu in another process."""
+    taken: list[list[float]] = [[], []]
+    for _ in range(times):
+        for number, name in enumerate(("ours", "floor")):
+            with Stage(1) as stage, ear(name) as listener:
+                begun = time.monotonic()
+                path = stage.paths[0]
+                ours = number == 0
+                with driver(path, name) if ours else floor("measurements", path, name):
+                    time.sleep(SETTLING_S)
+                    taken[number].append(listener.result()["heard"][0][0][0] - begun)
+    return Figure("command to first Imu", "s", *taken)
+
+
+def scale(counts: Sequence[int], seconds: float) -> list[str]:
+    """Many drivers, each with a board of its own; rows of a table."""
+    rows = [
+        "| drivers | ms per robot and second | IMU Hz, least | odom Hz, least |",
+        "|---" * 4 + "|",
+    ]
+    for count in counts:
+        names = [f"robot{number}" for number in range(count)]
+        with Stage(count) as stage, ExitStack() as stack:
+            listener = stack.enter_context(ear(*names))
+            drivers = [
+                stack.enter_context(driver(path, name))
+                for path, name in zip(stage.paths, names, strict=True)
+            ]
+            time.sleep(SETTLING_S + 2.0 * count)
+            before, start = [each.busy_s for each in drivers], time.monotonic()
+            time.sleep(seconds)
+            after, end = [each.busy_s for each in drivers], time.monotonic()
+            result = listener.result()
+        spent = sum(after) - sum(before)
+        imu = min(sum(start <= at < end for at, _ in each) for each in result["heard"])
+        rows.append(
+            f"| {count} | {1e3 * spent / count / (end - start):.1f} "
+            f"| {imu / (end - start):.1f} | {min(result['odometries'])} |"
+        )
+    return rows
+
+
+def _latencies(
+    said: Sequence[float], heard: Sequence[tuple[float, float]], unit: float
+) -> list[tuple[float, float]]:
+    """For each message: when its frame was written, and how many µs later it was heard."""
+    found = []
+    for at, value in heard:
+        number = round(value / unit)
+        tick = bisect.bisect_right(said, at) - 1
+        for earlier in range(tick, max(-1, tick - 200), -1):
+            if number_of(earlier) == number:
+                found.append((said[earlier], 1e6 * (at - said[earlier])))
+                break
+    return found
+
+
+def _command_latencies(
+    sent: Sequence[tuple[float, int]], heard: Sequence[tuple[float, bytes]]
+) -> list[float]:
+    """µs from each command to the first read that brought its frame."""
+    found = []
+    frames = [
+        (at, struct.unpack_from(">h", data, begin + 3)[0])
+        for at, data in heard
+        for begin in range(0, len(data) - 8)
+        if data[begin : begin + 3] == b"\xff\xfe\x01"
+    ]
+    times = [at for at, _ in frames]
+    for at, speed in sent:
+        for arrived, number in frames[bisect.bisect_left(times, at) :][:10]:
+            if number == speed:
+                found.append(1e6 * (arrived - at))
+                break
+    return found
+
+
+def _p99(values: Sequence[float]) -> float:
+    return quantiles(values, n=100)[98] if len(values) > 1 else math.nan

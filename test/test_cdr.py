@@ -1,0 +1,99 @@
+"""Serialised measurements are what rclpy makes of the same measurements."""
+
+import struct
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Quaternion
+from hypothesis import given
+from hypothesis import strategies as st
+from rclpy.serialization import deserialize_message, serialize_message
+
+from omnibot_driver import cdr, parameters
+from omnibot_driver.cdr import Messages, Serializer, difference
+from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.uncertainty import Covariance
+from omnibot_driver.messages import MessageSettings
+
+numbers = st.floats(allow_nan=False, allow_infinity=False, width=32)
+vectors = st.tuples(numbers, numbers, numbers)
+poses = st.builds(Pose, *[numbers] * 3)
+twists = st.none() | st.builds(BodyTwist, *[numbers] * 3)
+stamps_ns = st.integers(0, 2**31 * 10**9 - 1)
+frames = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=20)
+imus = st.builds(ImuEstimate, numbers, vectors, vectors)
+odometries = st.builds(
+    OdometryEstimate, numbers, poses, twists, st.builds(Covariance, *[numbers] * 6), poses, twists
+)
+
+
+@st.composite
+def settings(draw: st.DrawFn) -> MessageSettings:
+    """Frames of any length, so that every alignment occurs, and any noise."""
+    values: dict[str, Any] = parameters.check_all({})
+    values |= {name: draw(frames) for name in ("odom_frame", "base_frame", "imu_frame")}
+    values |= {name: draw(st.floats(1e-6, 10.0)) for name in values if name.endswith("stddev")}
+    return MessageSettings.from_parameters(values)
+
+
+def padded(data: bytes, like: bytes) -> bytes:
+    """The same bytes with padding as in ``like``: what rclpy leaves there is no part of a message.
+
+    Padding are the zeros behind a string's NUL up to the next multiple of eight.
+    """
+    assert len(data) == len(like)
+    same = bytearray(data)
+    for at, (ours, theirs) in enumerate(zip(data, like, strict=True)):
+        if ours == 0 and theirs != 0 and 0 in data[max(0, at - 7) : at]:
+            same[at] = theirs
+    return bytes(same)
+
+
+@given(settings(), imus, odometries, stamps_ns)
+def test_the_bytes_are_rclpys_for_any_values_and_frames(
+    chosen: MessageSettings, imu: ImuEstimate, odometry: OdometryEstimate, stamp_ns: int
+) -> None:
+    """Byte for byte but for padding, and every field after reading them again."""
+    serializer, messages = Serializer(chosen), Messages(chosen)
+    for ours, message in (
+        (serializer.imu(imu, stamp_ns), messages.imu(imu, stamp_ns)),
+        (serializer.odometry(odometry, stamp_ns), messages.odometry(odometry, stamp_ns)),
+        (serializer.joint_state(odometry, stamp_ns), messages.joint_state(odometry, stamp_ns)),
+    ):
+        theirs = serialize_message(message)
+        assert padded(ours, theirs) == theirs
+        kind = type(message)
+        assert deserialize_message(ours, kind) == deserialize_message(theirs, kind)
+
+
+@pytest.mark.parametrize("length", range(21))
+def test_no_frame_length_is_refused_at_start(length: int) -> None:
+    """So each alignment is fast."""
+    values = parameters.check_all({"imu_frame": "i" * length or "x", "odom_frame": "o" * 7})
+    assert difference(MessageSettings.from_parameters(values)) == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "strange"),
+    [
+        ("NO_TURN", (0.0, 0.0, 1.0, 0.0), "Imu"),
+        ("AT_REST", (0.0,) * 5 + (1e-9,), "Odometry"),
+        ("LITTLE_ENDIAN", struct.pack(">I", 0), "Imu"),
+    ],
+)
+def test_a_difference_is_found_at_start(
+    monkeypatch: pytest.MonkeyPatch, name: str, wrong: object, strange: str
+) -> None:
+    """In any constant part; values that vary are compared in the test above."""
+    monkeypatch.setattr(cdr, name, wrong)
+    chosen = MessageSettings.from_parameters(parameters.check_all({}))
+    assert difference(chosen) == strange
+
+
+def test_the_orientation_that_is_none_is_the_messages_default() -> None:
+    """A quaternion that nobody fills in is no turn, in rclpy too."""
+    nothing = Quaternion()
+    assert (nothing.x, nothing.y, nothing.z, nothing.w) == cdr.NO_TURN
