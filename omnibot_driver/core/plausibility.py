@@ -34,8 +34,7 @@ OUT_OF_PROPORTION: Final = 3.0
 CALMING: Final = 0.95
 """What a reading leaves of the largest step before it: after 20 of them a third."""
 STILL: Final = 0.08
-"""Part of a leap by which the sensor's other words may move, and all of them when it is over. A
-knock, however short, moves more."""
+"""Part of a leap by which the sensor's other words may move, and all of them when it is over."""
 END_OF_SCALE: Final = 0.99996
 """Part of full scale, just below the largest positive word."""
 BACK: Final = 0.25
@@ -237,7 +236,7 @@ class _Leaps:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """As far as can be told from values that move by themselves. What ends at the end of the
         scale was knocked."""
-        slack = 1.5 * self._restless
+        slack = OUT_OF_PROPORTION * self._restless
         bit = topmost if value < END_OF_SCALE * topmost else 0.0
         while bit > step + slack:
             bit /= 2

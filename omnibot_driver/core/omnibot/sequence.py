@@ -18,8 +18,8 @@ LATE_S: Final = 0.5
 buffer of the host's (4096 bytes, 2.4 s) that lacks one byte in ten is told 0.24 s wrong; this is
 twice as much."""
 EARLY_S: Final = 0.2
-"""A count from zero may be by so much ahead of the time since the last delta: that one was told late
-by a full buffer. A restart alone takes longer."""
+"""A count from zero may be so much ahead of the time since the last delta, which was told as
+late. To restart takes longer."""
 
 
 @dataclass(frozen=True, slots=True)
