@@ -100,7 +100,7 @@ def _run(ending: Ending) -> None:
     driver.close()
     stopping.set()
     executor.create_task(lambda: None)  # wake-ups alone do not end spin_once
-    spinner.join(timeout=1.0)
+    spinner.join(timeout=0.5)
     driver.destroy_node()
 
 

@@ -249,8 +249,11 @@ class Session:
         """Latch or release the e-stop; returns what is so now, in a sentence."""
         if active:
             self._commands.latch(now)
-            later = "; the port is not open: the stop is sent as soon as it is"
-            return "e-stop latched" + (later if self._closed else "")
+            if self._closed:
+                return "e-stop latched; the port is not open: the stop is sent as soon as it is"
+            if self._board.mode is Mode.UNKNOWN:
+                return "e-stop latched; nothing comes from the board: nobody knows if it hears us"
+            return "e-stop latched"
         if not self.estop_active:
             return "the e-stop was not latched"
         self._driving.release(now)

@@ -164,6 +164,16 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> No
     assert len(bench.notices) == 1
 
 
+def test_an_estop_that_nobody_may_have_heard_says_so(bench: Bench) -> None:
+    """It is latched and sent, but not a byte has come from the board for a while."""
+    assert estop(bench, True) == "e-stop latched"
+    bench.speaks = False
+    bench.run(2.0)
+    assert "nobody knows" in estop(bench, True)
+    bench.close()
+    assert "not open" in estop(bench, True)
+
+
 def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
     """Speeding up takes its time, and that is all."""
     for _ in range(3):

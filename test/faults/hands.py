@@ -66,6 +66,7 @@ class Navigator:
 
     def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
         """A goal in this direction."""
+        self._probe.wait_for(lambda: self._odom)
         here = self._odom[-1].pose.pose
         yaw = 2 * math.atan2(here.orientation.z, here.orientation.w) + yaw_rate
         goal = PoseStamped()

@@ -294,7 +294,6 @@ class GoalRig(Rig):
 
     def drive(self, vx: float = 0.3, vy: float = 0.0, yaw_rate: float = 0.2) -> None:
         """A goal, sent until it is taken; then it is pursued without anybody's help."""
-        self.probe.wait_for(lambda: self.odom)
         for _ in range(50):
             self.hand.hold(vx, vy, yaw_rate)
             if self.wait_for_board(lambda line: line.board.driven, 0.2):
