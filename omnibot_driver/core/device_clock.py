@@ -94,18 +94,18 @@ class DeviceClock:
         short = 0
         if newest is not None:
             ahead, missing_s = newest
-            came = ahead + sum(isinstance(reading, ImuReading) for reading in readings)
+            kinds = [type(reading) for reading in readings]
+            came = ahead + kinds.count(ImuReading)
             if came:
                 point = (self._tick + ahead, now + missing_s, missing_s > 0.0)
-                counted = any(isinstance(reading, DisplacementReading) for reading in readings)
-                short = self._compare(point, alone=came == 1, counted=counted)
+                short = self._compare(point, alone=came == 1, counted=DisplacementReading in kinds)
         # Where a counter took ticks back, the order of the readings must still find room.
-        least_s = 0.0 if ticks == sorted(ticks) else SMALLEST_STEP_S
+        least_s = 0.0 if len(ticks) < 2 or ticks == sorted(ticks) else SMALLEST_STEP_S
         stamps = []
         for left, tick, reading in zip(range(len(ticks), 0, -1), ticks, readings, strict=True):
             is_new = tick + short != self._stamped_tick
-            is_displacement = isinstance(reading, DisplacementReading)
-            if isinstance(reading, ImuReading) or (is_displacement and is_new):
+            kind = type(reading)
+            if kind is ImuReading or (kind is DisplacementReading and is_new):
                 later_s = max((ticks[-1] - tick) * self._period_s, left * least_s)
                 self._stamp(tick + short, now - later_s, (now - self._stamp_s) / (left + 1))
             stamps.append(self._stamp_s)

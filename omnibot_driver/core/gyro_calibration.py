@@ -40,18 +40,19 @@ class Moments:
     def __init__(self) -> None:
         self.count = 0
         self._first: Vector3 = (0.0, 0.0, 0.0)
-        self._sum = [0.0, 0.0, 0.0]
-        self._squares = [0.0, 0.0, 0.0]
+        self._sum: Vector3 = (0.0, 0.0, 0.0)
+        self._squares: Vector3 = (0.0, 0.0, 0.0)
 
     def add(self, vector: Vector3) -> None:
         """One more."""
         if not self.count:
             self._first = vector
         self.count += 1
-        for axis in range(3):
-            part = vector[axis] - self._first[axis]
-            self._sum[axis] += part
-            self._squares[axis] += part * part
+        (x, y, z), (first_x, first_y, first_z) = vector, self._first
+        (sum_x, sum_y, sum_z), (xx, yy, zz) = self._sum, self._squares
+        x, y, z = x - first_x, y - first_y, z - first_z
+        self._sum = sum_x + x, sum_y + y, sum_z + z
+        self._squares = xx + x * x, yy + y * y, zz + z * z
 
     @property
     def mean(self) -> Vector3:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from omnibot_driver.core.board import Board, DisplacementReading, ImuReading, Vector3
 from omnibot_driver.core.gyro_calibration import GyroCalibration
 from omnibot_driver.core.snapshot import ImuFigures
+from omnibot_driver.core.values import value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,7 +17,7 @@ class ImuCorrection:
     auto_gyro_bias: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class ImuEstimate:
     """At ``stamp_s``: specific force in m/s², angular velocity in rad/s, in the sensor's axes."""
 

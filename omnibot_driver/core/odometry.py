@@ -16,6 +16,7 @@ from omnibot_driver.core.follower import Follower
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose, Signs, roll, unroll
 from omnibot_driver.core.uncertainty import NOTHING, Covariance, OdometryNoise, Uncertainty
+from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0
 """Board time without any pose after which heading 0 is assumed."""
@@ -43,7 +44,7 @@ class OdometrySettings:
     fastest_radps: float = 8.0
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class OdometryEstimate:
     """At ``stamp_s``: pose and covariance in the odometry frame, twist in the body's.
 
@@ -258,7 +259,8 @@ class Odometry:
             seconds = max(0.0, stamp_s - (stamp_s if last_stamp_s is None else last_stamp_s))
         elif reading.lost:
             self._miss((reading.lost + 1) * seconds)
-        self._bridge(bridge, reading.lost * seconds)
+        if reading.lost:
+            self._bridge(bridge, reading.lost * seconds)
         if self._board is not None:
             self._board = advanced(self._board, reading)
         self._move(tangent, seconds)

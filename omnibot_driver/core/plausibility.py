@@ -21,6 +21,7 @@ from omnibot_driver.core.board import (
     PoseReading,
     Reading,
 )
+from omnibot_driver.core.values import value
 
 Stamped = tuple[Reading, float]
 """A reading and its time in s."""
@@ -51,7 +52,7 @@ class MotionLimits:
     force_step_mps2: float = 4.0
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Refused:
     """How many readings that cannot be true were not believed since the driver began."""
 
@@ -100,9 +101,10 @@ class Plausibility:
         return released
 
     def _admit_imu(self, reading: ImuReading, stamp_s: float) -> list[Stamped]:
+        force = self.limits.force_step_mps2
         turn = self.limits.fastest_radps2 * self._tick_s
-        values = [value / self.limits.force_step_mps2 for value in reading.specific_force]
-        values += [value / turn for value in reading.angular_velocity]
+        (x, y, z), (u, v, w) = reading.specific_force, reading.angular_velocity
+        values = (x / force, y / force, z / force, u / turn, v / turn, w / turn)
         was_flip, leaps = self._imu_leaps.judge(values)
         held, self._held_imu = self._held_imu, []
         if was_flip:
@@ -210,11 +212,12 @@ class _Leaps:
             return False, False
         steps = _steps(self._sure, values)
         least = max(periods, OUT_OF_PROPORTION * self._restless)
-        *others, largest = sorted(steps)
-        alone = others[-1] <= self._left * largest
-        if max(steps[self._knocked :]) > least or (alone and largest > least):
-            self._leaping = values
-            return was_single, True
+        largest = max(steps)
+        if largest > least:
+            alone = sorted(steps)[-2] <= self._left * largest
+            if alone or max(steps[self._knocked :]) > least:
+                self._leaping = values
+                return was_single, True
         self._restless = max(CALMING * self._restless, largest)
         self._sure = values
         return was_single, False

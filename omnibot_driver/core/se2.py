@@ -1,14 +1,14 @@
 """The plane: poses, and the way from one to another. Knows geometry, nothing that moves in it."""
 
 import math
-from dataclasses import dataclass
 
 from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.values import value
 
 Signs = tuple[int, int, int]
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Pose:
     """Position in m and unwrapped yaw in rad; also a displacement, or a tangent (twist x time)."""
 

@@ -40,6 +40,8 @@ SILENCE_S: Final = 1.5
 """The board says something at least once a second; after this it is not known to be there."""
 UNHEARD_S: Final = 0.3
 """A robot that is not heard for so long is driven no further: it may be restarting."""
+TELL_EVERY_S: Final = 0.1
+"""News need not be looked for with every read."""
 DISCONNECTED: Final = "disconnected"
 
 
@@ -89,6 +91,7 @@ class Session:
         self._commands = self._driving.stream
         self._heard_at = self._came_at = -math.inf
         self._silent = False
+        self._tell_at = -math.inf
         self._bulletin = Bulletin()
         self._events: list[Event] = []
         self._shown = (self.state, self.estop_active)
@@ -317,9 +320,13 @@ class Session:
                 case PausedReading(continues):
                     self._driving.begin()
                     self._supervisor.heard_paused(now, continues=continues)
-        self._notify(self._driving.check_goal([], now))
+        if self._commands.current is not None:
+            self._notify(self._driving.check_goal([], now))
 
     def _tell(self, now: float) -> None:
+        if now < self._tell_at:
+            return
+        self._tell_at = now + TELL_EVERY_S
         bulletin, board, odometry = self._bulletin, self._board, self._odometry
         once = [board.advice] if board.advice is not None else []
         once += [HEADING_ASSUMED] if odometry.heading_assumed else []

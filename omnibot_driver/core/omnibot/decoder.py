@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.omnibot import evidence
+from omnibot_driver.core.omnibot.calm import LENT, Step, take_calm
 from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Context, Expectation
 from omnibot_driver.core.omnibot.frames import (
     INCOMPLETE,
@@ -59,8 +60,6 @@ PAUSES_TO_TRUST: Final = 16
 
 IMUS_ONLY: Final = 8
 """So many IMU frames without a delta, and none is expected."""
-
-LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
 
 
 @dataclass(slots=True)
@@ -175,9 +174,13 @@ class FrameDecoder:
         held, weigh, order = self._held, self._expectation.weigh, self._pose_byte_order
         context = self._context
         at, size = 0, len(held)
-        steps: list[tuple[int, Frame, Context]] = []
+        steps: list[Step] = []
         idle = self._gaps[0][0] if self._gaps else size + 1
         while at < size:
+            if not self._gaps or self._gaps[-1][0] <= at:  # no pause within what follows
+                at, context = take_calm(held, at, context, self._expectation, steps)
+                if at == size:
+                    continue
             length = measure(held, at)
             end = at + length
             if idle < size and self._idle_within(at, end if length > 0 else size):
@@ -221,9 +224,7 @@ class FrameDecoder:
         at += length
         return at == len(held) or measure(held, at) != NO_FRAME
 
-    def _take(
-        self, steps: list[tuple[int, Frame, Context]], after: Context, found: list[Frame]
-    ) -> None:
+    def _take(self, steps: list[Step], after: Context, found: list[Frame]) -> None:
         """Believe these frames, which stand in a row from the first byte held."""
         if not steps:
             return

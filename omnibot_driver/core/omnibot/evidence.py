@@ -112,6 +112,13 @@ class Expectation:
         self._accel_limit = 2400.0
         self._gyro_limit = 800.0
 
+    @property
+    def calm(self) -> tuple[float, float, float, float]:
+        """Between the first two the squared norm of an acceleration costs nothing; nor does a step
+        of less than the third in one of its words, or than the fourth in one of the gyro's.
+        """
+        return self._lightest, self._heaviest, self._accel_limit, self._gyro_limit
+
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
         """The cost of a whole frame's content, and what is known after it."""
         if type(frame) is ImuFrame:
