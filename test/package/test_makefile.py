@@ -48,5 +48,5 @@ def test_without_wheels_one_sentence_points_to_jazzy(
 def test_make_alone_lists_every_target() -> None:
     """The default target explains the others in a line each."""
     listed = {line.split()[1] for line in make().stdout.splitlines()}
-    targets = {"demo", "test", "integrity", "faults", "soak", "lint", "format", "clean"}
+    targets = {"demo", "test", "integrity", "bench", "faults", "soak", "lint", "format", "clean"}
     assert listed == {"help", *targets}
