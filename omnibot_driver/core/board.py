@@ -24,10 +24,12 @@ class Mode(Enum):
     NOMINAL = "nominal"
     IMU_ONLY = "imu_only"
 
-    @property
-    def running(self) -> bool:
-        """True in the modes in which the board sends data and obeys motion commands."""
-        return self in (Mode.NOMINAL, Mode.IMU_ONLY)
+    _value_: str
+    running: bool
+    """True in the modes in which the board sends data and obeys motion commands."""
+
+    def __init__(self, name: str) -> None:
+        self.running = name in ("nominal", "imu_only")
 
 
 @value(frozen=True, slots=True)

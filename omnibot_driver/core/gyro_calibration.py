@@ -98,11 +98,6 @@ class Look:
         self._yaw_rad += dyaw_rad
 
     @property
-    def length_s(self) -> float:
-        """From the first reading to the last."""
-        return self.last_s - self.began_s if self.rate.count else 0.0
-
-    @property
     def rolled(self) -> bool:
         """Whether the wheels tell of motion."""
         return math.hypot(self._x_m, self._y_m) > STILL_M or abs(self._yaw_rad) > STILL_RAD
@@ -164,10 +159,13 @@ class GyroCalibration:
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
         """A reading of the IMU, as the sensor gave it, but for the accelerometer's bias."""
-        if stamp_s - self._look.last_s > GAP_S:
-            self._look = Look()
-        self._look.hear(rate, force, stamp_s)
-        if self._look.length_s >= (MEASURE_S if self.measuring else BLOCK_S):
+        look = self._look
+        if stamp_s - look.last_s > GAP_S:
+            look = self._look = Look()
+        look.hear(rate, force, stamp_s)
+        if stamp_s - look.began_s >= BLOCK_S and (
+            not self.measuring or stamp_s - look.began_s >= MEASURE_S
+        ):
             self._conclude()
 
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:

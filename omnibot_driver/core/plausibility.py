@@ -12,6 +12,7 @@ robot's limits; it knows no bytes and no clock.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import hypot
+from operator import sub
 from typing import Final
 
 from omnibot_driver.core.board import (
@@ -225,4 +226,4 @@ class _Leaps:
 
 def _steps(before: Sequence[float], after: Sequence[float]) -> list[float]:
     """How far each value moved."""
-    return [abs(new - old) for old, new in zip(before, after, strict=True)]
+    return list(map(abs, map(sub, after, before)))

@@ -95,6 +95,8 @@ class Session:
         self._bulletin = Bulletin()
         self._events: list[Event] = []
         self._shown = (self.state, self.estop_active)
+        self._beneath: tuple[Phase, Mode, bool] | None = None
+        """What that is made of, which is quicker to look at."""
 
     # What is so
 
@@ -141,7 +143,7 @@ class Session:
     @property
     def wake_at(self) -> float:
         """When ``tick`` must be called at the latest; infinity when nothing is due."""
-        if self._closed:
+        if self._supervisor.phase is Phase.CLOSED:
             return math.inf
         silent_at = math.inf if self._silent else self._heard_at + SILENCE_S
         unheard_at = self._heard_at + UNHEARD_S if self._commands.current else math.inf
@@ -274,7 +276,7 @@ class Session:
 
     def take_output(self, now: float) -> bytes:
         """The bytes to write now; they count as written."""
-        if self._closed:
+        if self._supervisor.phase is Phase.CLOSED:
             return b""
         data = self._supervisor.take_output()
         if data:
@@ -286,10 +288,13 @@ class Session:
         for answers in (self._supervisor.answers, self._inertial.calibration.answers):
             self._events += answers
             answers.clear()
-        shown = (self.state, self.estop_active)
-        if shown != self._shown:
-            self._shown = shown
-            self._events.append(StateChanged())
+        beneath = (self._supervisor.phase, self._board.mode, self._commands.latched)
+        if beneath != self._beneath:
+            self._beneath = beneath
+            shown = (self.state, self.estop_active)
+            if shown != self._shown:
+                self._shown = shown
+                self._events.append(StateChanged())
         events, self._events = self._events, []
         return events
 

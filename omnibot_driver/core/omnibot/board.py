@@ -217,8 +217,10 @@ class OmniBot:
         return frames.encode(CommandFrame(mode, (a, b, c))) if (a, b, c) != (0, 0, 0) else STOP
 
     def _read_all(self, found: list[Frame], now: float) -> list[Reading]:
-        skipped = self._decoder.skipped
-        return [self._read(frame, now, n) for frame, n in zip(found, skipped, strict=True)]
+        readings = []
+        for frame, skipped in zip(found, self._decoder.skipped, strict=True):
+            readings.append(self._read(frame, now, skipped))
+        return readings
 
     def _read(self, frame: Frame, now: float, skipped: int = 0) -> Reading:
         self._modes.hear(frame)

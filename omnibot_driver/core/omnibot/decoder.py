@@ -232,7 +232,8 @@ class FrameDecoder:
         for _, frame, before in steps[::8]:
             if type(frame) is ImuFrame and before.imu is not None and not before.imus & 3:
                 self._expectation.learn(frame, before.imu)
-        found += [frame for _, frame, _ in steps]
+        for _, frame, _ in steps:
+            found.append(frame)
         self.skipped += [self._dropped] + [0] * (len(steps) - 1)
         self._dropped = 0
         self._context = after
@@ -303,7 +304,9 @@ class FrameDecoder:
     def _forget(self, count: int) -> None:
         del self._held[:count]
         self._wait_for = 0
-        if self._gaps:
+        if self._gaps and self._gaps[-1][0] < count:
+            self._gaps = []
+        elif self._gaps:
             self._gaps = [(a - count, b - count, p) for a, b, p in self._gaps if a >= count]
 
     def _idle_within(self, start: int, end: int) -> bool:
