@@ -24,7 +24,6 @@ class Mode(Enum):
     NOMINAL = "nominal"
     IMU_ONLY = "imu_only"
 
-    _value_: str
     running: bool
     """True in the modes in which the board sends data and obeys motion commands."""
 

@@ -305,6 +305,10 @@ class Odometry:
         if reading.duration_s is None:
             self._last = None
             return Pose(), self._tangent(reading, 0.0)
+        if not reading.lost:
+            tangent = self._tangent(reading, 0.0)
+            self._last = (tangent, reading.duration_s)
+            return Pose(), tangent
         half = min(reading.lost, LONGEST_BRIDGE) / 2
         last_turn_rad = self._last[0].yaw_rad if self._last else reading.dyaw_rad
         tangent = self._tangent(reading, half * (last_turn_rad + reading.dyaw_rad))
@@ -321,7 +325,7 @@ class Odometry:
         self._uncertainty.miss(duration_s, self._settings.fastest_mps, self._settings.fastest_radps)
 
     def _signed(self, tangent: Pose) -> Pose:
-        return tangent.times(*self._axis_signs)
+        return tangent if self._axis_signs == (1, 1, 1) else tangent.times(*self._axis_signs)
 
 
 def _size(way: Pose) -> float:

@@ -106,7 +106,7 @@ class Session:
         if self._closed:
             return DISCONNECTED
         resetting = self._supervisor.phase is Phase.RESETTING
-        return (Mode.UNKNOWN if resetting else self._board.mode).value
+        return str((Mode.UNKNOWN if resetting else self._board.mode).value)
 
     @property
     def estop_active(self) -> bool:
