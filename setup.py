@@ -17,22 +17,27 @@ setup(
     install_requires=["pyserial", "PyYAML"],
     extras_require={
         "replay": ["rosbags"],
+        "test": ["pytest"],  # without it `colcon test` passes, and has run nothing
         "tools": ["matplotlib", "numpy", "rich", "rosbags", "scipy", "textual"],
     },
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={NAME: ["py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
-        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}", ["package.xml", "LICENSE", *glob("*.md"), *glob("*.rst")]),
+        (f"share/{NAME}/docs", glob("docs/*.md")),
         *(
             (f"share/{NAME}/{folder}", glob(f"{folder}/*.*"))
-            for folder in ("config", "docs", "launch", "rviz", "systemd", "udev", "urdf")
+            for folder in ("config", "docs/pictures", "launch", "rviz", "systemd", "udev", "urdf")
         ),
     ],
     entry_points={
         "console_scripts": [
+            f"calibrate = {NAME}.tools.calibrate.__main__:main",
             f"demo = {NAME}.demo.__main__:main",
             f"driver = {NAME}.driver:main",
+            f"monitor = {NAME}.tools.monitor.__main__:main",
+            f"report = {NAME}.tools.report.__main__:main",
             f"simulator = {NAME}.simulator.__main__:main",
         ],
     },

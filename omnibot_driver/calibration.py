@@ -1,4 +1,5 @@
-"""The calibration file: biases in YAML, read at the start, written whole or not at all.
+"""The calibration file: what was measured of this robot, in YAML, read at the start, written whole
+or not at all.
 
 It may hold other names as well, which are left as they are.
 """
@@ -15,7 +16,21 @@ import yaml
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.parameters import BY_NAME, Value
 
-NAMES: Final = ("gyro_bias", "accel_bias")
+NAMES: Final = (
+    "gyro_bias",
+    "accel_bias",
+    "angular_velocity_stddev",
+    "linear_acceleration_stddev",
+    "linear_scale",
+    "angular_scale",
+    "wheel_radius",
+    "base_radius",
+    "odom_linear_scale",
+    "odom_angular_scale",
+    "axis_signs",
+    "delta_frame",
+    "control_method",
+)
 """What is taken from the file; each is a parameter."""
 
 
@@ -31,7 +46,7 @@ def load(path: Path) -> dict[str, Value]:
         raise _bad(path, f"is wrong ({error})") from error
 
 
-def save(path: Path, values: Mapping[str, Value]) -> None:
+def save(path: Path, values: Mapping[str, Any]) -> None:
     """Put these values into the file and leave the others. Raises ParameterError or OSError.
 
     Whoever reads it meanwhile, or loses power, has the old file or the new one.

@@ -16,8 +16,10 @@ from rclpy.node import Node
 from omnibot_driver import calibration, parameters
 from omnibot_driver.core.errors import ParameterError
 
-NOT_OURS: Final = re.compile(r"use_sim_time|start_type_description_service|qos_overrides\..+")
-"""Parameters that rclpy itself declares for every node."""
+NOT_OURS: Final = re.compile(
+    r"use_sim_time|start_type_description_service|(qos_overrides|diagnostic_updater)\..+"
+)
+"""Parameters that rclpy itself, or diagnostic_updater, declares for every node."""
 
 
 def declare(node: Node) -> dict[str, Any]:
@@ -29,7 +31,8 @@ def declare(node: Node) -> dict[str, Any]:
     }
     values = parameters.check_all(given)
     if file := values["calibration_file"]:
-        values |= calibration.load(Path(str(file)).expanduser())
+        found = calibration.load(Path(str(file)).expanduser())
+        values = parameters.check_all({**given, **found})
     for parameter in parameters.PARAMETERS:
         node.declare_parameter(
             parameter.name, values[parameter.name], _descriptor(parameter), ignore_override=True

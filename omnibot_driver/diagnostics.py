@@ -1,23 +1,23 @@
 """``/diagnostics`` once a second: the link's figures, judged, as a message.
 
-The message is published as diagnostic_updater would (topic, period, names, hardware id), with or
-without that library: one way is enough, and needs nothing that may be missing. The timer runs on
-the steady clock, so simulated time does not stop it.
+By diagnostic_updater where it is installed; else the same message without it: topic, names, levels,
+hardware id, period. The timer runs on the steady clock, so simulated time does not stop it.
 """
 
 import time
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Sequence
+from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from omnibot_driver import messages
-from omnibot_driver.core.diagnosis import Diagnosis, Refusals
+from omnibot_driver.core.diagnosis import Diagnosis, Refusals, Status
 from omnibot_driver.link import Link
 
 PERIOD_S: Final = 1.0
+Publish = Callable[[Sequence[Status]], None]
 
 
 class Diagnostics:
@@ -26,18 +26,55 @@ class Diagnostics:
     def __init__(
         self, node: Node, link: Link, refusals: Callable[[], Refusals], hardware_id: str
     ) -> None:
-        self._node, self._link, self._refusals = node, link, refusals
-        self._hardware_id = hardware_id
+        self._link, self._refusals = link, refusals
         self._diagnosis = Diagnosis()
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(PERIOD_S, self._publish, clock=steady)
-
-    def _publish(self) -> None:
-        link, session = self._link.figures()
-        statuses = self._diagnosis.judge(link, session, self._refusals(), time.monotonic())
-        stamp = self._node.get_clock().now().to_msg()
-        name = self._node.get_name()
-        self._publisher.publish(
-            messages.diagnostic_message(statuses, stamp, name, self._hardware_id)
+        self._publish, period_s = _through_updater(node, hardware_id) or (
+            _alone(node, hardware_id),
+            PERIOD_S,
         )
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(period_s, self._report, clock=steady)
+
+    def _report(self) -> None:
+        link, session = self._link.figures()
+        self._publish(self._diagnosis.judge(link, session, self._refusals(), time.monotonic()))
+
+
+def _alone(node: Node, hardware_id: str) -> Publish:
+    publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+
+    def publish(statuses: Sequence[Status]) -> None:
+        stamp = node.get_clock().now().to_msg()
+        publisher.publish(
+            messages.diagnostic_message(statuses, stamp, node.get_name(), hardware_id)
+        )
+
+    return publish
+
+
+def _through_updater(node: Node, hardware_id: str) -> tuple[Publish, float] | None:
+    """With the library's period, which is a parameter of its own; None where it is missing."""
+    try:
+        from diagnostic_updater import Updater
+    except ImportError:
+        return None
+    updater = Updater(node, PERIOD_S)
+    updater.timer.cancel()  # it keeps ROS time
+    updater.setHardwareID(hardware_id)
+    judged: dict[str, Status] = {}
+
+    def publish(statuses: Sequence[Status]) -> None:
+        new = [status.name for status in statuses if status.name not in judged]
+        judged.update({status.name: status for status in statuses})
+        for name in new:
+            updater.add(name, lambda wrapper, name=name: _fill(wrapper, judged[name]))
+        updater.force_update()
+
+    return publish, updater.period
+
+
+def _fill(wrapper: Any, status: Status) -> Any:
+    wrapper.summary(bytes([status.level]), status.message)
+    for key, value in status.values.items():
+        wrapper.add(key, value)
+    return wrapper

@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from typing import Final
 
 import rclpy
@@ -17,7 +18,8 @@ from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.node import OmniBotDriver
 from omnibot_driver.output import UnblockedOutput
 
-STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+LONGEST_END_S: Final = 4.0
 USAGE: Final = "parameters are given like this: --ros-args -p port:=/dev/ttyUSB0"
 
 
@@ -88,17 +90,31 @@ def _run(ending: Ending) -> None:
                 executor.spin_once()
         except ExternalShutdownException:
             ending.begin()
-        except Exception as error:
+        except BaseException as error:  # SystemExit as well: else nobody would be served any more
             driver.report_defect(error)
 
     spinner = threading.Thread(target=spin, name="omnibot-executor", daemon=True)
     spinner.start()
     ending.wait()
+    _set_deadline()
     driver.close()
     stopping.set()
     executor.create_task(lambda: None)  # wake-ups alone do not end spin_once
-    spinner.join(timeout=1.0)
+    spinner.join(timeout=0.5)
     driver.destroy_node()
+
+
+def _set_deadline() -> None:
+    """Nothing that hangs may hold the end up; without the process the guard stops the robot."""
+
+    def give_up() -> None:
+        print("omnibot_driver hangs while it ends: it is cut short", file=sys.stderr, flush=True)
+        time.sleep(0.1)  # until that is copied
+        os._exit(1)
+
+    deadline = threading.Timer(LONGEST_END_S, give_up)
+    deadline.daemon = True
+    deadline.start()
 
 
 if __name__ == "__main__":

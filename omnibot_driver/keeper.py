@@ -63,7 +63,9 @@ class Keeper:
             self._dismiss(b"", SPEAKS_WITHIN_S)
 
     def _start(self) -> None:
-        command = [sys.executable, "-I", "-S", guard.__file__]
+        # By its bare name: whoever kills all that is called omnibot_driver does not hit the guard.
+        folder, name = os.path.split(guard.__file__)
+        command = [sys.executable, "-I", "-S", name]
         try:
             self._process = subprocess.Popen(
                 [*command, str(self._descriptor), self._last_words.hex()],
@@ -72,6 +74,7 @@ class Keeper:
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 pass_fds=(self._descriptor,),
+                cwd=folder,
                 start_new_session=True,  # ctrl-C is for the driver alone
             )
         except OSError as error:

@@ -163,7 +163,7 @@ class Link:
                         comes_back = True
                         raise
                     finally:
-                        self._detach(comes_back=comes_back)
+                        self._detach(port, comes_back=comes_back)
             except LinkError as error:
                 self._trouble = str(error)
                 self._report(self._trouble)
@@ -207,10 +207,13 @@ class Link:
                 events = self._settle()
             self._deliver(events)
 
-    def _detach(self, *, comes_back: bool) -> None:
+    def _detach(self, port: Port, *, comes_back: bool) -> None:
         """Whatever ended the reading, the robot is not left with a command to carry out."""
         with self._changed:
-            self._write(self._session.farewell("stop"))
+            if self._write_error is None:
+                self._write(self._session.farewell("stop"))
+            else:  # Stop, right behind whatever is out of the kernel's reach
+                port.write_if_room(self._session.broken_off())
             comes_back &= not self._closing.is_set()
             stopped = self._write_error is None or comes_back
             keeper, self._port, self._keeper = self._keeper, None, None

@@ -25,8 +25,13 @@ READ_TIMEOUT_S: Final = 0.2
 """How soon a port that cannot be interrupted returns to look whether it is still wanted."""
 WRITE_TIMEOUT_S: Final = 0.2
 MOST_AT_ONCE: Final = 4096
-PEER_TIMEOUT_MS: Final = 5000
-"""A network peer that acknowledges nothing for so long is gone."""
+PEER_OPTIONS: Final = {
+    socket.TCP_KEEPIDLE: 1,
+    socket.TCP_KEEPINTVL: 1,
+    socket.TCP_USER_TIMEOUT: 5000,
+}
+"""A network peer that acknowledges nothing for five seconds is gone; one that is sent nothing is
+asked every second."""
 PSEUDO_TERMINALS: Final = range(136, 144)
 """Linux's major device numbers of them."""
 
@@ -106,6 +111,12 @@ class Port:
                 self._serial.reset_output_buffer()
             raise LinkError(f"lost {self._url} while writing: {error}") from error
 
+    def write_if_room(self, data: bytes) -> None:
+        """As much of it as is taken at once, be it nothing."""
+        if (descriptor := self.descriptor) is not None:
+            with contextlib.suppress(OSError):
+                os.write(descriptor, data)
+
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, where the port can do so."""
         cancel = getattr(self._serial, "cancel_read", None)
@@ -139,7 +150,9 @@ class Port:
         peer = getattr(self._serial, "_socket", None)  # pyserial has no public name for it
         if isinstance(peer, socket.socket):
             self._peer = peer
-            peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, PEER_TIMEOUT_MS)
+            peer.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+            for option, value in PEER_OPTIONS.items():
+                peer.setsockopt(socket.IPPROTO_TCP, option, value)
 
 
 def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:

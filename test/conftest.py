@@ -1,7 +1,12 @@
-"""Keeps the tests' ROS traffic to this machine and to this run of them."""
+"""Keeps the tests' ROS traffic to this machine and to this run of them, and none of them timed."""
 
 import os
+
+from hypothesis import HealthCheck, settings
 
 # Domains 0 to 101 are safe on every platform; 0 is everybody's default.
 os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("untimed")

@@ -205,6 +205,18 @@ def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
     line.hear(LAST_WORDS)
 
 
+def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(line: Line) -> None:
+    """``pkill -9 -f omnibot_driver``, in a hurry, while the robot drives."""
+    keeper = Keeper(line.near, LAST_WORDS)
+    (pid,) = line.children()
+    started(pid)
+    _interpreter, *arguments = Path(f"/proc/{pid}/cmdline").read_text().split("\0")
+    name = Path(f"/proc/{pid}/comm").read_text()
+    keeper.end(stopped=True)
+    assert "guard.py" in arguments
+    assert "omnibot" not in " ".join([name, *arguments])
+
+
 def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
     """None of the driver's sockets and files; no module but a few of Python's own."""
     keeper = Keeper(line.near, LAST_WORDS)

@@ -27,7 +27,7 @@ from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.session import Session
-from omnibot_driver.port import Port
+from omnibot_driver.port import PEER_OPTIONS, Port
 from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
 from omnibot_driver.standstill import SETTLE_S
 
@@ -227,7 +227,10 @@ def terminal() -> Iterator[Terminal]:
 def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     terminal: Terminal,
 ) -> None:
-    """A board that hung may hold half a command; S, which found no room, is not what it needs."""
+    """A board that hung may hold half a command; S, which found no room, is not what it needs.
+
+    The first Stop is there before the port is opened anew: it may resume sooner.
+    """
     listener = Listener()
     link = link_to(terminal.path, listener, session())
     link.start()
@@ -235,7 +238,7 @@ def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     terminal.fill()
     listener.wait_for(lambda: any("while writing" in str(text) for text in listener.reports))
     heard = terminal.read_until(STOP + b"S")
-    assert heard.lstrip(b"x").startswith(bytes(8) + STOP + b"S")
+    assert heard.lstrip(b"x").startswith(2 * (bytes(8) + STOP) + b"S")
     link.close("stop")
 
 
@@ -442,14 +445,18 @@ def connected(server: socket.socket) -> tuple[Port, socket.socket]:
     return port, server.accept()[0]
 
 
-def test_a_peer_that_vanished_without_a_word_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("said", [STOP, b""], ids=["spoken to", "not spoken to"])
+def test_a_peer_that_vanished_without_a_word_is_given_up(
+    monkeypatch: pytest.MonkeyPatch, said: bytes
+) -> None:
     """A half-open connection: nothing is acknowledged, nothing is refused."""
-    monkeypatch.setattr("omnibot_driver.port.PEER_TIMEOUT_MS", 300)
+    options = {**PEER_OPTIONS, socket.TCP_USER_TIMEOUT: 300}
+    monkeypatch.setattr("omnibot_driver.port.PEER_OPTIONS", options)
     with socket.create_server(("127.0.0.1", 0)) as server:
         port, far = connected(server)
         with far, closing(port):
             drop_everything(far)
-            port.write(STOP)
+            port.write(said)
             with pytest.raises(LinkError, match="lost"):
                 go_on(port.read)
 

@@ -103,6 +103,22 @@ class BoardFigures:
     saturated: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """Where a read ended among the samples.
+
+    The beginning of one tells when it was taken better than an end that is delivered late, and what
+    was not there yet tells too. ``ahead``: how many samples after the last ImuReading were in hand
+    (0, 1), the last of them whole or ``cut``. It was to be whole ``latest_s`` after the read, or
+    before; the next one, or the one that was cut, not before ``earliest_s`` after it.
+    """
+
+    ahead: int
+    latest_s: float
+    earliest_s: float
+    cut: bool = False
+
+
 class Board(Protocol):
     """One kind of board. Request methods raise RequestRefused where the mode forbids them."""
 
@@ -115,13 +131,8 @@ class Board(Protocol):
         """The nominal time from one ImuReading to the next."""
 
     @property
-    def newest(self) -> tuple[int, float] | None:
-        """The newest sample of which bytes are in hand, and when it will all have come.
-
-        How many samples after the last ImuReading (0, 1), and how many seconds the line still needs
-        for its rest: the beginning of a sample tells when it was taken better than an end that is
-        delivered late. None while the framing is in doubt, or the last read told nothing new.
-        """
+    def edge(self) -> Edge | None:
+        """Where the last read ended. None while the framing is in doubt, or it told nothing new."""
 
     @property
     def figures(self) -> BoardFigures:

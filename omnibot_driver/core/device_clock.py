@@ -8,13 +8,8 @@ told of is told exactly by the counter that displacements carry; until the next 
 any, by arrival: a read takes all that has come, so the newest tick in it is hardly older than one
 period, and never from the future.
 
-*When was it?* Drawn over their ticks, arrivals lie on or above a straight line whose slope is the
-true period. The least delayed arrival of every second is kept, and the line is laid under those of
-the last while as close as it goes: it is an edge of their lower convex hull. An arrival below the
-line moves it at once. Bursts, stalls and losses only make points above the line. What stays in the
-stamps is the least delay that ever happens: one constant. A sample that was cut by its read has not
-waited at all, so if there are such points the line is laid under them alone: what waits for a
-timer may for seconds keep that timer's pace.
+*When was it?* ``TickLine`` lays a line under the arrivals. What stays in the stamps is the least
+delay that ever happens: one constant.
 
 This module knows readings and times. It reads no clock and knows no board's bytes.
 """
@@ -22,20 +17,11 @@ This module knows readings and times. It reads no clock and knows no board's byt
 import math
 from collections import deque
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Final
 
-from omnibot_driver.core.board import DisplacementReading, ImuReading, PoseReading, Reading
+from omnibot_driver.core.board import DisplacementReading, Edge, ImuReading, PoseReading, Reading
+from omnibot_driver.core.tick_line import TickLine
 
-BLOCK_TICKS: Final = 100
-"""The least delayed arrival of so many ticks is kept: of one second."""
-BLOCKS_KEPT: Final = 75
-"""An adapter's timer and the board's tick beat against each other, within 100 ppm, every 20 s."""
-LARGEST_SKEW: Final = 1.2e-4
-"""Of the board's crystal against the host's: 100 ppm, and a little."""
-SUPPORT: Final = 0.75
-"""The line touches the points on both sides of this part of their span: late enough to follow what
-has lately been found out, early enough not to follow the last second's jitter."""
 LARGEST_LOSS_TICKS: Final = 25
 """If more are missing that no counter has told, then nothing that was known holds any more."""
 BEAT_READS: Final = 12
@@ -45,8 +31,8 @@ LARGEST_RISE: Final = 0.02
 SMALLEST_STEP_S: Final = 1e-6
 """Between two stamps for which even their arrivals leave no room."""
 
-Point = tuple[int, float, bool]
-"""A tick, the time of its arrival, and whether a read cut it: the rest had not arrived yet."""
+WHOLE: Final = Edge(ahead=0, latest_s=0.0, earliest_s=0.0)
+"""A read that ended with a whole sample."""
 
 
 class DeviceClock:
@@ -66,39 +52,36 @@ class DeviceClock:
         self._stamped_tick: int | None = None
         self._displaced_tick: int | None = None
         self._displacement_ticks = 0
-        self._anchor: Point | None = None
-        self._slope_s = self._period_s
-        self._points: deque[Point] = deque(maxlen=BLOCKS_KEPT)
-        self._best: Point | None = None
-        self._block_from = self._tick
+        self._line: TickLine | None = None
         self._seen_tick: int | None = None
         self._settled = False
+        self._single_reads = 0
+        """The last so many brought one sample each, so none waited for another."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
 
     @property
     def skew_ppm(self) -> float:
         """By how much the board's clock is faster than ours, by what has been seen so far."""
-        return 1e6 * (self._period_s / self._slope_s - 1.0)
+        line = self._line
+        return 0.0 if line is None else 1e6 * (self._period_s / line.slope_s - 1.0)
 
     def stamps(
-        self, readings: Sequence[Reading], now: float, newest: tuple[int, float] | None = (0, 0.0)
+        self, readings: Sequence[Reading], now: float, edge: Edge | None = WHOLE
     ) -> list[float]:
         """When each of these readings, all that one read at ``now`` completed, was sampled.
 
-        ``newest``: see ``Board``. From tick to tick stamps increase, and none is later than
+        ``edge``: where the read ended. From tick to tick stamps increase, and none is later than
         ``now``; a displacement has the stamp of its tick's ImuReading.
         """
         ticks = self._count(readings)
-        if self._anchor is None:
-            self._anchor = (self._tick, now, False)
+        line = self._line = self._line or TickLine(self._period_s, (self._tick, now))
         short = 0
-        if newest is not None:
-            ahead, missing_s = newest
+        if edge is not None:
             kinds = [type(reading) for reading in readings]
-            came = ahead + kinds.count(ImuReading)
+            came = edge.ahead + kinds.count(ImuReading)
             if came:
-                point = (self._tick + ahead, now + missing_s, missing_s > 0.0)
-                short = self._compare(point, alone=came == 1, counted=DisplacementReading in kinds)
+                self._single_reads = self._single_reads + 1 if came == 1 else 0
+                short = self._compare(line, edge, now, counted=DisplacementReading in kinds)
         # Where a counter took ticks back, the order of the readings must still find room.
         least_s = 0.0 if len(ticks) < 2 or ticks == sorted(ticks) else SMALLEST_STEP_S
         stamps = []
@@ -133,90 +116,52 @@ class DeviceClock:
         passed = self._displacement_ticks * (reading.lost + 1)
         return self._displaced_tick + passed - self._tick
 
-    def _compare(self, point: Point, *, alone: bool, counted: bool) -> int:
+    def _compare(self, line: TickLine, edge: Edge, now: float, *, counted: bool) -> int:
         """Hold the newest tick against its arrival; by how many the count was found to be short.
 
-        ``alone``: the read brought no other sample, so it was not late; ``counted``: a counter told
-        this tick.
+        ``counted``: a counter told this tick.
         """
-        tick, arrival, cut = point
+        tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
             return 0  # its beginning has been seen before, and told more
-        lag_s = arrival - self._line(tick)
+        lag_s = arrival - line.at(tick)
         period_s, lags_s = self._period_s, self._lags_s
         short = 0
         if self._settled and lag_s < -period_s / 2:
             short = round(lag_s / period_s)
         elif len(lags_s) == BEAT_READS:
             self._settled = True
-            if alone and lag_s > min(max(lags_s), period_s / 2) + 0.95 * period_s:
+            if self._single_reads > BEAT_READS and lag_s > max(lags_s) + 0.95 * period_s:
                 short = max(1, math.floor(lag_s / period_s))
             elif min(lags_s) > period_s / 2:
                 short, counted = round(min(lags_s) / period_s), True
                 lags_s.clear()
         if short > LARGEST_LOSS_TICKS:
             self.restart()
-            self._anchor = point
-            return self._compare(point, alone=alone, counted=counted)
-        if short:
+            line = self._line = TickLine(period_s, (tick, arrival))
+            short, lag_s = 0, 0.0
+        elif short:
             self._tick += short
-            if counted and self._displaced_tick is not None:
-                self._displaced_tick += short
+            if self._displaced_tick is not None:
+                self._displaced_tick = min(self._displaced_tick + short * counted, self._tick)
             tick += short
-            lag_s -= short * self._slope_s
+            lag_s -= short * line.slope_s
         lags_s.append(lag_s)
-        self._learn((tick, arrival, cut), lag_s)
         self._seen_tick = tick
+        missing = tick if edge.cut else tick + 1
+        line.see((tick, arrival), (missing, now + edge.earliest_s), cut=edge.cut)
         return short
-
-    def _learn(self, point: Point, lag_s: float) -> None:
-        """Keep the least delayed arrival of each block."""
-        tick, arrival, _ = point
-        if lag_s < 0.0:
-            self._anchor = point
-        best = self._best
-        if best is None or arrival < best[1] + self._slope_s * (tick - best[0]):
-            self._best = point
-        if tick - self._block_from >= BLOCK_TICKS:
-            assert self._best is not None
-            if not self._points or self._points[-1][0] < self._best[0]:
-                self._points.append(self._best)
-            self._lay_line()
-            self._best, self._block_from = None, tick
-
-    def _line(self, tick: int) -> float:
-        assert self._anchor is not None
-        return self._anchor[1] + self._slope_s * (tick - self._anchor[0])
-
-    def _lay_line(self) -> None:
-        """Under all points, as high as it goes over their middle, within the crystals' skew."""
-        hull: list[Point] = []
-        for point in [point for point in self._points if point[2]] or self._points:
-            while len(hull) > 1 and _slope(hull[-2], point) <= _slope(hull[-2], hull[-1]):
-                hull.pop()
-            hull.append(point)
-        middle = hull[0][0] + SUPPORT * (hull[-1][0] - hull[0][0])
-        for before, after in pairwise(hull):
-            if after[0] >= middle:
-                skew = _slope(before, after) / self._period_s - 1.0
-                skew = min(max(skew, -LARGEST_SKEW), LARGEST_SKEW)
-                self._slope_s = self._period_s * (1.0 + skew)
-                break
-        self._anchor = min(hull, key=lambda point: point[1] - self._slope_s * point[0])
 
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """The line's time, but no jump backwards, and forwards only little by little.
 
         ``room_s``: by so much it may go forward and leave as much to each that comes after it.
         """
-        stamp_s = min(self._line(tick), latest_s)
+        assert self._line is not None
+        stamp_s = min(self._line.at(tick), latest_s)
         if self._stamped_tick is not None:
             passed = max(1, tick - self._stamped_tick)
             stamp_s = min(stamp_s, self._stamp_s + passed * self._period_s * (1 + LARGEST_RISE))
         step_s = max(SMALLEST_STEP_S, min(self._period_s / 2, room_s))
         self._stamp_s = max(stamp_s, self._stamp_s + step_s)
         self._stamped_tick = tick
-
-
-def _slope(before: Point, after: Point) -> float:
-    return (after[1] - before[1]) / (after[0] - before[0])

@@ -98,6 +98,11 @@ class Look:
         self._yaw_rad += dyaw_rad
 
     @property
+    def length_s(self) -> float:
+        """From the first reading to the last."""
+        return self.last_s - self.began_s if self.rate.count else 0.0
+
+    @property
     def rolled(self) -> bool:
         """Whether the wheels tell of motion."""
         return math.hypot(self._x_m, self._y_m) > STILL_M or abs(self._yaw_rad) > STILL_RAD

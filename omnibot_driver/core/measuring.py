@@ -70,7 +70,7 @@ class Measuring:
 
     def take_in(self, readings: Sequence[Reading], now: float) -> list[Measured]:
         """What is sure of these, which came in at ``now``, and of those before that waited."""
-        stamps_s = self._clock.stamps(readings, now, self._board.newest)
+        stamps_s = self._clock.stamps(readings, now, self._board.edge)
         if readings:
             self.tally.read(now - stamps_s[-1])
         measured: list[Measured] = []

@@ -35,13 +35,16 @@ class OdometrySettings:
     """``fastest_mps``, ``fastest_radps``: what the robot can never exceed, pushed by hand too.
 
     Without ``use_board_pose`` a pose tells nothing but the heading to begin with, which earth
-    displacements mean nothing without.
+    displacements mean nothing without. ``linear_scale``, ``angular_scale``: true way and turn over
+    those that the board tells, which knows its wheels by their nominal sizes.
     """
 
     noise: OdometryNoise = field(default_factory=OdometryNoise)
     use_board_pose: bool = True
     fastest_mps: float = 2.0
     fastest_radps: float = 8.0
+    linear_scale: float = 1.0
+    angular_scale: float = 1.0
 
 
 @value(frozen=True, slots=True)
@@ -156,7 +159,9 @@ class Odometry:
         if self._board is None or self._restarted is not None or not self._settles:
             return None
         way = self._follower.target.way_to(place)
-        return self._board.moved(roll(self._signed(unroll(way))))
+        linear, angular = self._settings.linear_scale, self._settings.angular_scale
+        tangent = unroll(way).times(1 / linear, 1 / linear, 1 / angular).times(*self._axis_signs)
+        return self._board.moved(roll(tangent))
 
     @property
     def _settles(self) -> bool:
@@ -198,7 +203,7 @@ class Odometry:
         seconds = self._backlog.unheard_s(self._last_stamp_s)
         way = unroll(self._board.way_to(self._backlog.before(told)))
         self._board = self._board.moved(roll(way))
-        self._rolled += way
+        self._rolled += self._scaled(way)
         self._uncertainty.move(self._follower.target.yaw_rad, self._signed(way))
         self._follower.correct(roll(self._signed(way)), 0.0)
         self._move(Pose(), seconds)
@@ -231,7 +236,7 @@ class Odometry:
             return
         if reachable:
             if self._uncertainty.gap != NOTHING:  # more than rounding
-                self._rolled += unroll(way)
+                self._rolled += self._scaled(unroll(way))
             self._follower.correct(roll(self._signed(unroll(way))))
             self._uncertainty.settle()
         else:
@@ -267,7 +272,8 @@ class Odometry:
         self._follower.follow((reading.lost + 1) * seconds)
         twist = rolling = None
         if reading.duration_s:
-            twist, rolling = self._signed(tangent).over(seconds), tangent.over(seconds)
+            twist = self._signed(tangent).over(seconds)
+            rolling = self._scaled(tangent).over(seconds)
         covariance = self._uncertainty.total(self._follower.wrong)
         return OdometryEstimate(
             stamp_s, self._follower.pose, twist, covariance, self._rolled, rolling
@@ -289,7 +295,7 @@ class Odometry:
 
     def _move(self, tangent: Pose, seconds: float) -> None:
         """Along a tangent in the board's body axes."""
-        self._rolled += tangent
+        self._rolled += self._scaled(tangent)
         part = self._signed(tangent)
         self._uncertainty.move(self._follower.target.yaw_rad, part)
         self._follower.move(
@@ -325,7 +331,11 @@ class Odometry:
         self._uncertainty.miss(duration_s, self._settings.fastest_mps, self._settings.fastest_radps)
 
     def _signed(self, tangent: Pose) -> Pose:
-        return tangent if self._axis_signs == (1, 1, 1) else tangent.times(*self._axis_signs)
+        return self._scaled(tangent).times(*self._axis_signs)
+
+    def _scaled(self, tangent: Pose) -> Pose:
+        linear, angular = self._settings.linear_scale, self._settings.angular_scale
+        return tangent.times(linear, linear, angular)
 
 
 def _size(way: Pose) -> float:

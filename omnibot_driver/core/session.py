@@ -254,8 +254,11 @@ class Session:
         """Latch or release the e-stop; returns what is so now, in a sentence."""
         if active:
             self._commands.latch(now)
-            later = "; the port is not open: the stop is sent as soon as it is"
-            return "e-stop latched" + (later if self._closed else "")
+            if self._closed:
+                return "e-stop latched; the port is not open: the stop is sent as soon as it is"
+            if self._board.mode is Mode.UNKNOWN:
+                return "e-stop latched; nothing comes from the board: nobody knows if it hears us"
+            return "e-stop latched"
         if not self.estop_active:
             return "the e-stop was not latched"
         self._driving.release(now)
@@ -271,6 +274,10 @@ class Session:
         data = self._supervisor.farewell(on_exit)
         self._commands.discard()
         return data + (self._board.emergency_stop() if self.estop_active else b"")
+
+    def broken_off(self) -> bytes:
+        """What is to follow a write that failed half-way, before the port is closed."""
+        return self._board.wake() + (self._board.emergency_stop() if self.estop_active else b"")
 
     # What comes of it
 

@@ -75,7 +75,7 @@ class Supervisor:
         self._output = bytearray()
         self._said_at = self._data_at = -math.inf
         self._flowed_s = 0.0
-        self._paused_with_p = False
+        self._paused_with_p = self._was_running = False
         self._shown_at = math.inf
         self._request: Request | None = None
         self._token: object = None
@@ -130,7 +130,8 @@ class Supervisor:
             self._begin_pausing(now, with_p=False)
             self._output += self._board.stop()
         else:
-            if self._wanted is Wanted.ANY and self._board.mode.running:
+            self._was_running = self._board.mode.running
+            if self._wanted is Wanted.ANY and self._was_running:
                 self._wanted = Wanted.RUNNING
             self.phase = Phase.RESETTING
             self._deadline = now + RESET_WITHIN_S
@@ -145,8 +146,10 @@ class Supervisor:
         elif self.phase is Phase.RESETTING and continues and not in_flight:
             self._say(self._board.reset(), now)
         elif self.phase is Phase.RESETTING and not in_flight:
+            if self._was_running:  # also against a pause that failed
+                self._wanted = Wanted.RUNNING
             self._begin(now)
-            if not running_wanted:
+            if self._wanted is not Wanted.RUNNING:
                 self._settle("the board has restarted and is paused, as it was before")
         elif self.phase is Phase.STARTING or (self.phase is Phase.SETTLED and running_wanted):
             self._begin(now)  # it has restarted, and may have slept through what was said so far
@@ -230,7 +233,9 @@ class Supervisor:
             reason = "the board goes on sending data: does the cable carry our bytes to it?"
         if self.phase is Phase.RESETTING:
             self.phase = Phase.SETTLED
-            if self._wanted is Wanted.RUNNING and not mode.running:
+            if self._wanted is Wanted.PAUSED:
+                self._begin_pausing(now, with_p=True)
+            elif self._wanted is Wanted.RUNNING and not mode.running:
                 self._begin(now)
         if self.phase is Phase.STARTING:
             reason += " (S is repeated until data flows)"

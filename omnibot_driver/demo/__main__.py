@@ -12,12 +12,14 @@ from contextlib import ExitStack
 from typing import Final
 
 from omnibot_driver.core.se2 import Pose
-from omnibot_driver.demo.display import Drive, introduce, report, show
+from omnibot_driver.demo.dashboard import Dashboard
+from omnibot_driver.demo.display import HEADING, Drive, introduce, report
 from omnibot_driver.demo.program import PATIENCE_S, DemoFailed, Program
 
 ENVIRONMENT: Final = {"ROS_DOMAIN_ID": "97", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 """Unless the user says otherwise: away from domain 0, where somebody's robot may be."""
 STOPPING_S: Final = 3.0
+ROW_EVERY_S: Final = 1.0
 
 
 def run(seconds: float, asked_to_end: Callable[[], bool]) -> None:
@@ -37,6 +39,13 @@ def run(seconds: float, asked_to_end: Callable[[], bool]) -> None:
         stack.callback(robot.close)
         exports = " ".join(f"{name}={os.environ[name]}" for name in ENVIRONMENT)
         introduce(port, namespace, exports, seconds)
+        dashboard = Dashboard(namespace)
+        stack.callback(dashboard.close)
+        if not dashboard.possible:
+            print(HEADING)
+
+        def done_with() -> bool:
+            return asked_to_end() or dashboard.quitted
 
         def go_on_until(done: Callable[[], bool], longest_s: float) -> bool:
             nonlocal show_at_s
@@ -45,19 +54,21 @@ def run(seconds: float, asked_to_end: Callable[[], bool]) -> None:
                 board.check()
                 driver.check()
                 robot.spin_once()
-                if now_s >= show_at_s:
-                    show_at_s = now_s + show(robot.row())
+                if now_s >= show_at_s and not dashboard.possible:
+                    show_at_s = now_s + ROW_EVERY_S
+                    print(robot.row(), flush=True)
             return done()
 
-        if not go_on_until(lambda: asked_to_end() or not robot.missing(), PATIENCE_S):
+        if not go_on_until(lambda: done_with() or not robot.missing(), PATIENCE_S):
             missing = ", ".join(robot.missing())
             raise driver.failure(f"after {PATIENCE_S:g} s still missing: {missing}")
-        if asked_to_end():
-            print()
+        if dashboard.possible:
+            go_on_until(lambda: done_with() or robot.watched(), PATIENCE_S)
+        if done_with():
             return
         started_s, counts = time.monotonic(), (robot.imu.count, robot.odom.count)
         robot.driving = True
-        go_on_until(asked_to_end, seconds)
+        go_on_until(done_with, seconds)
         driven_s = time.monotonic() - started_s
         rates_hz = [
             (rate.count - before) / driven_s
@@ -65,7 +76,9 @@ def run(seconds: float, asked_to_end: Callable[[], bool]) -> None:
         ]
         robot.driving = False
         go_on_until(robot.stands, STOPPING_S)
-        show(robot.row())
+        dashboard.close()
+        if not dashboard.possible:
+            print(robot.row())
         truth = json.loads(board.ask("truth\n"))
         report(
             Drive(

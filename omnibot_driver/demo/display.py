@@ -1,7 +1,6 @@
 """What the demo shows: rows, a picture, words. Knows terminals; must not know ROS or processes."""
 
 import math
-import shutil
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,7 +9,7 @@ from typing import Final
 
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose
-from omnibot_driver.demo.square import SIDE_M
+from omnibot_driver.tools.monitor.plot import draw_path
 
 HEADING: Final = """\
              rates Hz        pose by odom       commanded          measured
@@ -35,31 +34,8 @@ def status_row(
     return f"{state:<12}{rates_hz[0]:4d}{rates_hz[1]:5d}{leg // 4 + 1:4d}" + "".join(columns)
 
 
-def picture(points: Iterable[tuple[float, float]]) -> list[str]:
-    """The square from above in Braille, 24 x 12 characters: x to the right, y up."""
-    columns, rows, margin = 24, 12, 2.5
-    dots_per_m = (2 * columns - 2 * margin) / SIDE_M
-    cells = [[0x2800] * columns for _ in range(rows)]
-    bits = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
-    for x_m, y_m in points:
-        right = math.floor(x_m * dots_per_m + margin)
-        down = math.floor((SIDE_M - y_m) * dots_per_m + margin)
-        if 0 <= right < 2 * columns and 0 <= down < 4 * rows:
-            cells[down // 4][right // 2] |= bits[down % 4][right % 2]
-    return ["".join(map(chr, row)) for row in cells]
-
-
 def _degrees(angle_rad: float) -> float:
     return math.degrees(math.remainder(angle_rad, math.tau))
-
-
-def show(row: str) -> float:
-    """Over the last row on a terminal, else below it; returns after how many s the next is due."""
-    if sys.stdout.isatty():
-        print(f"\r{row[: shutil.get_terminal_size().columns - 1]}\033[K", end="", flush=True)
-        return 0.2
-    print(row, flush=True)
-    return 1.0
 
 
 def introduce(port: str, namespace: str, exports: str, seconds: float) -> None:
@@ -79,8 +55,7 @@ Where ROS 2 Jazzy is installed, look on and interfere from another terminal:
   ros2 topic echo {namespace}/odom --field pose.pose
   ros2 service call {namespace}/omnibot_driver/estop \\
     std_srvs/srv/SetBool "data: true"    # then "data: false"
-
-{HEADING}""")
+""")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,6 +88,6 @@ def report(drive: Drive) -> None:
     ]
     print()
     if sys.stdout.isatty():
-        rows = zip_longest(picture(drive.points), ["", "", "", *text], fillvalue="")
+        rows = zip_longest(draw_path(drive.points, 24, 12).rows, ["", "", "", *text], fillvalue="")
         text = ["", *(f"{drawn:28}{line}".rstrip() for drawn, line in rows)]
     print(*text, CLOSING, sep="\n")

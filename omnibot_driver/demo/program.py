@@ -31,7 +31,7 @@ class Program:
             stderr=self._log,
             text=True,
             start_new_session=True,
-            preexec_fn=_end_with_parent,
+            preexec_fn=end_with_parent,
         )
 
     def end(self) -> None:
@@ -68,6 +68,7 @@ class Program:
         return answer.strip()
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
+    """In a new process: let its parent's end be its own."""
     pr_set_pdeathsig = 1
     ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGTERM)

@@ -17,24 +17,10 @@ from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.demo.display import status_row
 from omnibot_driver.demo.square import HALT, steer
+from omnibot_driver.tools.monitor.rates import Rate
 
-
-class Rate:
-    """How often something arrives, by the clock of this process."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        self._latest_s: deque[float] = deque(maxlen=500)
-
-    def arrived(self, _message: object) -> None:
-        """Count it."""
-        self.count += 1
-        self._latest_s.append(time.monotonic())
-
-    def last_second(self) -> int:
-        """Arrivals within the last second."""
-        since_s = time.monotonic() - 1.0
-        return sum(arrival_s > since_s for arrival_s in self._latest_s)
+REMEMBERED = 1000
+"""Poses: some laps of them."""
 
 
 class Robot:
@@ -46,8 +32,8 @@ class Robot:
     def __init__(self, namespace: str) -> None:
         self.driving = False
         self.leg, self.driven_m, self.pose = 0, 0.0, Pose()
-        self.points: set[tuple[float, float]] = set()
-        self.imu, self.odom = Rate(), Rate()
+        self.points: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
+        self.imu, self.odom = Rate(time.monotonic()), Rate(time.monotonic())
         self._state, self._estop = "no driver", False
         self._commanded = self._measured = HALT
         self._stood_for = 0
@@ -56,9 +42,9 @@ class Robot:
             signal_handler_options=SignalHandlerOptions.NO,
         )
         self.close = rclpy.try_shutdown
-        node = rclpy.create_node("demo", namespace=namespace)
+        self._node = node = rclpy.create_node("demo", namespace=namespace)
         self._cmd_vel = node.create_publisher(Twist, "cmd_vel", 1)
-        node.create_subscription(Imu, "imu/data_raw", self.imu.arrived, 50)
+        node.create_subscription(Imu, "imu/data_raw", self._on_imu, 50)
         node.create_subscription(Odometry, "odom", self._on_odom, 50)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         node.create_subscription(String, "omnibot_driver/state", self._on_state, latched)
@@ -72,10 +58,15 @@ class Robot:
 
     def missing(self) -> list[str]:
         """What a robot that can drive has and this one has not."""
-        now_hz = {"imu/data_raw": self.imu.last_second(), "odom": self.odom.last_second()}
+        now_s = time.monotonic()
+        now_hz = {"imu/data_raw": self.imu.hz(now_s), "odom": self.odom.hz(now_s)}
         wanted_hz = {"imu/data_raw": 50, "odom": 12}
-        missing = [f"{name} ({hz} Hz)" for name, hz in now_hz.items() if hz < wanted_hz[name]]
+        missing = [f"{name} ({hz:.0f} Hz)" for name, hz in now_hz.items() if hz < wanted_hz[name]]
         return missing if self._state == "nominal" else [*missing, f"nominal state ({self._state})"]
+
+    def watched(self) -> bool:
+        """Whether somebody else listens to the odometry too."""
+        return self._node.count_subscribers("odom") > 1
 
     def stands(self) -> bool:
         """Whether it has been standing still for a while since it was driving."""
@@ -83,7 +74,8 @@ class Robot:
 
     def row(self) -> str:
         """The row that tells how it is."""
-        rates_hz = (self.imu.last_second(), self.odom.last_second())
+        now_s = time.monotonic()
+        rates_hz = (round(self.imu.hz(now_s)), round(self.odom.hz(now_s)))
         state = "e-stop" if self._estop else self._state
         return status_row(state, rates_hz, self.leg, self.pose, self._commanded, self._measured)
 
@@ -93,12 +85,15 @@ class Robot:
     def _on_estop(self, message: Bool) -> None:
         self._estop = message.data
 
+    def _on_imu(self, _message: Imu) -> None:
+        self.imu.arrived(time.monotonic())
+
     def _on_odom(self, message: Odometry) -> None:
-        self.odom.arrived(message)
+        self.odom.arrived(time.monotonic())
         position, turn = message.pose.pose.position, message.pose.pose.orientation
         before, self.pose = self.pose, Pose(position.x, position.y, 2 * math.atan2(turn.z, turn.w))
         self.driven_m += math.dist((before.x_m, before.y_m), (self.pose.x_m, self.pose.y_m))
-        self.points.add((round(200 * position.x) / 200, round(200 * position.y) / 200))
+        self.points.append((position.x, position.y))
         linear, angular = message.twist.twist.linear, message.twist.twist.angular
         self._measured = BodyTwist(linear.x, linear.y, angular.z)
         moves = max(abs(linear.x), abs(linear.y), abs(angular.z)) > 0.002

@@ -36,7 +36,7 @@ from omnibot_driver.simulator.wire import (
     paused_text,
     pose_frame,
 )
-from omnibot_driver.simulator.world import TruePose, World
+from omnibot_driver.simulator.world import Held, TruePose, World
 
 TICKS_PER_DELTA = 4
 TICKS_PER_POSE = 20
@@ -135,6 +135,7 @@ class SimulatedBoard:
         self._pose = PlanarPose(pose.x_mm / 1000, pose.y_mm / 1000, pose.theta_mrad / 1000)
         self._pose_sent = self._pose
         self._body_unsent = (0.0, 0.0, 0.0)
+        self._counts_unsent: Triple = (0, 0, 0)
         self._delta_seq = 0
         self._pose_seq = 0
         self._motors_off()
@@ -153,6 +154,10 @@ class SimulatedBoard:
     def odometry(self) -> BoardPose:
         """The board's own pose, in the units of the 5 Hz frame."""
         return BoardPose(*(1000 * value for value in self._pose))
+
+    def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
+        """Be held by somebody: tilted so much, and turned to the left so fast."""
+        self._world.held = Held(roll_rad, pitch_rad, yaw_rate)
 
     @property
     def driven(self) -> bool:
@@ -224,11 +229,12 @@ class SimulatedBoard:
         """Counts per tick, by the scales of the settings and the kinematics of the manual."""
         linear, angular = self.settings.linear_scale, self.settings.angular_scale
         a, b, c = values
+        x, y, yaw = self.settings.axis_signs
         if kind == "wheels":
             rims_mps = (a / linear, b / linear, c / linear)
         else:
             rims_mps = rims_from_body(
-                a / linear, b / linear, c / angular, self.settings.base_radius_m
+                x * a / linear, y * b / linear, yaw * c / angular, self.settings.base_radius_m
             )
         return self._counts_per_tick(rims_mps)
 
@@ -248,7 +254,8 @@ class SimulatedBoard:
     def _motors_off(self) -> None:
         self._goal = None
         self._targets = _ALL_ZERO
-        self._controllers = (WheelController(), WheelController(), WheelController())
+        gains = self.settings.wheel_gains
+        self._controllers = (WheelController(gains), WheelController(gains), WheelController(gains))
         self._pwm = _ALL_ZERO
 
     # Control and odometry
@@ -260,8 +267,10 @@ class SimulatedBoard:
         self._encoders = encoders
         self._integrate((a, b, c))
         if self._goal is not None:
+            x, y, yaw = self.settings.axis_signs
+            vx, vy, yaw_rate = approach(self._pose, self._goal)
             self._targets = self._counts_per_tick(
-                rims_from_body(*approach(self._pose, self._goal), self.settings.base_radius_m)
+                rims_from_body(x * vx, y * vy, yaw * yaw_rate, self.settings.base_radius_m)
             )
         if self.mode in _RUNNING and not self.estopped:
             pwm_a, pwm_b, pwm_c = (
@@ -274,10 +283,15 @@ class SimulatedBoard:
 
     def _integrate(self, counts: Triple) -> None:
         a_m, b_m, c_m = (n * self._rim_m_per_count for n in counts)
-        dx, dy, dyaw = body_from_rims((a_m, b_m, c_m), self.settings.base_radius_m)
+        moved = body_from_rims((a_m, b_m, c_m), self.settings.base_radius_m)
+        dx, dy, dyaw = (
+            sign * way for sign, way in zip(self.settings.axis_signs, moved, strict=True)
+        )
         self._pose = self._pose.moved(dx, dy, dyaw)
         x, y, yaw = self._body_unsent
         self._body_unsent = (x + dx, y + dy, yaw + dyaw)
+        a, b, c = self._counts_unsent
+        self._counts_unsent = (a + counts[0], b + counts[1], c + counts[2])
 
     # Output
 
@@ -300,18 +314,19 @@ class SimulatedBoard:
         return frames
 
     def _delta(self) -> bytes:
+        words = self._counts_unsent
         if self.settings.frame == "body":
-            moved = self._body_unsent
-        else:
+            words = _tenths(self._body_unsent)
+        elif self.settings.frame == "earth":
             x, y, yaw = self._pose
             sent_x, sent_y, sent_yaw = self._pose_sent
-            moved = (x - sent_x, y - sent_y, yaw - sent_yaw)
+            words = _tenths((x - sent_x, y - sent_y, yaw - sent_yaw))
         self._pose_sent = self._pose
         self._body_unsent = (0.0, 0.0, 0.0)
-        dx, dy, dtheta = (max(-32768, min(32767, round(value * 10_000))) for value in moved)
+        self._counts_unsent = (0, 0, 0)
         seq = self._delta_seq
         self._delta_seq = (seq + 1) % 256
-        return delta_frame((dx, dy, dtheta), seq)
+        return delta_frame(words, seq)
 
     def _absolute(self) -> bytes:
         pose = self.odometry
@@ -319,3 +334,9 @@ class SimulatedBoard:
         self._pose_seq = (seq + 1) % 256
         order = self.settings.pose_byte_order
         return pose_frame(pose.x_mm, pose.y_mm, pose.theta_mrad, seq, order)
+
+
+def _tenths(moved: tuple[float, float, float]) -> Triple:
+    """Tenths of a millimetre and of a milliradian, as far as a word goes."""
+    x, y, yaw = (max(-32768, min(32767, round(value * 10_000))) for value in moved)
+    return x, y, yaw

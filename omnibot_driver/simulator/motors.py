@@ -4,35 +4,57 @@ Knows the 100 Hz tick and the controller gains of the manual. All speeds are enc
 tick, all efforts PWM steps. Must not know commands, geometry or the wire.
 
 The manual says nothing about the motor. The model is of first order with dry friction and a dead
-zone, driven by a 12-bit PWM; a steady speed needs 46 PWM steps per count per tick, so that the
-manual's feed-forward of 40 carries seven eighths of the load and the integrator the rest.
+zone, driven by a 12-bit PWM; by default a steady speed needs 46 PWM steps per count per tick, so
+that the manual's feed-forward of 40 carries seven eighths of the load and the integrator the rest.
 """
 
+from collections import deque
+from dataclasses import dataclass
 from math import copysign, exp, floor, log
 
 TICK_S = 0.01
 
-FEED_FORWARD = 40.0
-PROPORTIONAL = 10.0
-INTEGRAL = 1.5
-
 PWM_LIMIT = 4095.0
 DEAD_ZONE_PWM = 60.0
 """Effort that sets a resting wheel in motion."""
-FRICTION_PWM = 40.0
-"""Effort that dry friction eats while the wheel turns."""
 STICKING_SPEED = 0.3
 """A wheel slower than this is held by the dead zone like a resting one, so it never creeps."""
-PWM_PER_COUNT = 46.0
-TIME_CONSTANT_TICKS = 6.0
 
-_DECAY = exp(-1 / TIME_CONSTANT_TICKS)
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotorConstants:
+    """What one motor is like.
+
+    friction_pwm: effort that dry friction eats while the wheel turns.
+    delay_ticks: ticks between an effort and what it does.
+    """
+
+    pwm_per_count: float = 46.0
+    time_constant_ticks: float = 6.0
+    friction_pwm: float = 40.0
+    delay_ticks: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WheelGains:
+    """Of the wheel's speed controller (manual, Controller parameters)."""
+
+    feed_forward: float = 40.0
+    proportional: float = 10.0
+    integral: float = 1.5
+
+
+USUAL = MotorConstants()
+MANUAL = WheelGains()
 
 
 class Motor:
     """A gear motor with its quadrature encoder, moved one tick at a time."""
 
-    def __init__(self) -> None:
+    def __init__(self, constants: MotorConstants = USUAL) -> None:
+        self._constants = constants
+        self._decay = exp(-1 / constants.time_constant_ticks)
+        self._on_the_way = deque([0.0] * constants.delay_ticks)
         self.speed = 0.0
         self.position = 0.5
         """Counts turned so far with their fraction, from the middle of an encoder step."""
@@ -44,18 +66,20 @@ class Motor:
 
     def advance(self, pwm: float) -> float:
         """Turn for one tick under a constant effort; return the counts turned, with fraction."""
-        start = self.speed
+        constants, start = self._constants, self.speed
+        self._on_the_way.append(pwm)
+        pwm = self._on_the_way.popleft()
         if abs(start) < STICKING_SPEED and abs(pwm) <= DEAD_ZONE_PWM:
             self.speed = 0.0
             return 0.0
         direction = start or pwm
-        settled = (pwm - copysign(FRICTION_PWM, direction)) / PWM_PER_COUNT
-        end = settled + (start - settled) * _DECAY
+        settled = (pwm - copysign(constants.friction_pwm, direction)) / constants.pwm_per_count
+        end = settled + (start - settled) * self._decay
         ticks = 1.0
         if end * direction < 0:  # friction brings it to rest within this tick
-            ticks = TIME_CONSTANT_TICKS * log(1 - start / settled)
+            ticks = constants.time_constant_ticks * log(1 - start / settled)
             end = 0.0
-        turned = settled * ticks + TIME_CONSTANT_TICKS * (start - end)
+        turned = settled * ticks + constants.time_constant_ticks * (start - end)
         self.speed = end
         self.position += turned
         return turned
@@ -69,17 +93,18 @@ class WheelController:
     While u is saturated, the integral term rests if it would drive u further.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, gains: WheelGains = MANUAL) -> None:
+        self._gains = gains
         self._feedback = 0.0
         self._last_error = 0.0
 
     def update(self, target: float, measured: float) -> float:
         """Return the PWM for the coming tick from speeds in counts per tick."""
-        error = target - measured
-        self._feedback += PROPORTIONAL * (error - self._last_error)
+        gains, error = self._gains, target - measured
+        self._feedback += gains.proportional * (error - self._last_error)
         self._last_error = error
-        effort = FEED_FORWARD * target + self._feedback
+        effort = gains.feed_forward * target + self._feedback
         if abs(effort) < PWM_LIMIT or effort * error < 0:
-            self._feedback += INTEGRAL * error
-            effort += INTEGRAL * error
+            self._feedback += gains.integral * error
+            effort += gains.integral * error
         return max(-PWM_LIMIT, min(PWM_LIMIT, effort))

@@ -27,7 +27,7 @@ def add_board_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--imu-only", action="store_true", help="run in IMU only mode")
     parser.add_argument(
         "--frame",
-        choices=("earth", "body"),
+        choices=("earth", "body", "wheel_counts"),
         default="earth",
         help="meaning of the 25 Hz frame (default earth)",
     )

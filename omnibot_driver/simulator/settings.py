@@ -1,11 +1,13 @@
 """What can be chosen about a simulated board and its robot: values only, no behaviour."""
 
 from dataclasses import dataclass
+from math import pi
 from typing import Literal
 
+from omnibot_driver.simulator.motors import MANUAL, USUAL, MotorConstants, WheelGains
 from omnibot_driver.simulator.wire import ByteOrder, Triple
 
-DeltaFrameMeaning = Literal["earth", "body"]
+DeltaFrameMeaning = Literal["earth", "body", "wheel_counts"]
 ControlMethod = Literal["velocity", "position"]
 
 
@@ -24,7 +26,8 @@ class BoardSettings:
 
     seed: of every random number; two boards with equal settings and input send equal bytes.
     frame: meaning of the 25 Hz frame: "earth", the difference of two positions in the board's
-        earth frame, or "body", the sum of each control tick's displacement in the robot's frame.
+        earth frame, "body", the sum of each control tick's displacement in the robot's frame, or
+        "wheel_counts", the encoder counts of wheels A, B, C (manual, Deprecated).
     imu_only: running, the board is in IMU only mode instead of nominal mode.
     linear_scale: LSB per m/s, of Vx and Vy and of the rim speeds in wheel mode.
     angular_scale: LSB per rad/s, of Omega.
@@ -35,13 +38,20 @@ class BoardSettings:
     estop_latches: after an emergency stop frame every motion is refused until a reset;
         otherwise the next motion command moves the robot again.
     pose_byte_order: of the three floats of the 5 Hz frame.
+    axis_signs: of the board's x, y and yaw against the robot's: forward, left, counter-clockwise.
+    wheel_gains: of the firmware's three speed controllers.
+    motors: of wheels A, B, C.
     wheel_radius_m, base_radius_m, counts_per_revolution: as the firmware believes them
         (manual, Vehicle Parameters).
     wheel_radius_scale: true radius of wheels A, B, C over `wheel_radius_m`.
+    base_radius_scale: true distance of the wheels from the centre over `base_radius_m`.
     slip: mean fraction of each wheel's rim motion that is lost on the floor; the momentary fraction
         wanders about it for each wheel by itself.
+    imu_rpy_rad: how the IMU is mounted: the fixed-axis roll, pitch and yaw that turn the body's
+        axes into the sensor's, as in a URDF.
     gyro_bias_dps, gyro_noise_dps: degrees per second in the sensor's axes; noise rms per reading.
-    accel_noise_g: rms per reading.
+    gyro_walk_dps: how far the bias wanders in a second, rms; with the root of time.
+    accel_bias_g, accel_noise_g: in the sensor's axes; noise rms per reading.
     gyro_stuck: raw counts that the gyro reads for ever, whatever the motion.
     boot_time_s: from power-up or reset until the board is paused; dead meanwhile.
     initial_pose: the board's own pose at construction, for a board that has already driven.
@@ -58,13 +68,20 @@ class BoardSettings:
     heading_scale: float = 1000.0
     estop_latches: bool = False
     pose_byte_order: ByteOrder = "big"
+    axis_signs: tuple[int, int, int] = (1, 1, 1)
+    wheel_gains: WheelGains = MANUAL
+    motors: tuple[MotorConstants, MotorConstants, MotorConstants] = (USUAL, USUAL, USUAL)
     wheel_radius_m: float = 0.029
     base_radius_m: float = 0.143
     counts_per_revolution: int = 390 * 4
     wheel_radius_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    base_radius_scale: float = 1.0
     slip: float = 0.0
+    imu_rpy_rad: tuple[float, float, float] = (pi, 0.0, 0.0)
     gyro_bias_dps: tuple[float, float, float] = (-0.046, -0.038, -0.031)
     gyro_noise_dps: float = 0.05
+    gyro_walk_dps: float = 0.0
+    accel_bias_g: tuple[float, float, float] = (0.0, 0.0, 0.0)
     accel_noise_g: float = 0.0028
     gyro_stuck: Triple | None = None
     boot_time_s: float = 0.3

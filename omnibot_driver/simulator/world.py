@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, pi, sqrt
 from random import Random
+from typing import NamedTuple
 
 from omnibot_driver.simulator.chassis import PlanarPose, Wheels, body_from_rims
 from omnibot_driver.simulator.motors import TICK_S, Motor
@@ -32,19 +33,28 @@ class TruePose:
     yaw_rate: float
 
 
+class Held(NamedTuple):
+    """How somebody holds the robot: roll and pitch (REP-103), and the rate it is turned at."""
+
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
+    yaw_rate: float = 0.0
+
+
 class World:
     """Three motors and the floor under them."""
 
     def __init__(self, settings: BoardSettings) -> None:
         self._random = Random(f"slip {settings.seed}")
-        self._motors = (Motor(), Motor(), Motor())
+        self._motors = tuple(Motor(constants) for constants in settings.motors)
         rim_m_per_count = 2 * pi * settings.wheel_radius_m / settings.counts_per_revolution
         self._rim_m_per_count = [rim_m_per_count * scale for scale in settings.wheel_radius_scale]
-        self._base_radius_m = settings.base_radius_m
+        self._base_radius_m = settings.base_radius_m * settings.base_radius_scale
         self._mean_slip = settings.slip
         self._slip = [settings.slip] * 3
         self._pose = PlanarPose(0.0, 0.0, 0.0)
         self._twist = (0.0, 0.0, 0.0)
+        self.held = Held()
         self.acceleration = (0.0, 0.0)
         """Acceleration of the body's origin over the last tick, along body x and y, in m/s²."""
 

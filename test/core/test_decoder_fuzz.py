@@ -162,7 +162,7 @@ def test_work_is_linear_and_memory_bounded(
 
 
 @given(st.binary(min_size=1, max_size=40), st.sampled_from([1, 5, 13, 62, 4096]))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @example(b"\xff\xfb\xff\xfa", 1)
 def test_no_repeated_pattern_costs_much_more_than_another(
     pattern: bytes, chunk_length: int

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from serial_line import Board, Chunker, Read, blocks, bursts, crumbs, ftdi, late, singles
 
-from omnibot_driver.core.board import DisplacementReading, ImuReading
+from omnibot_driver.core.board import DisplacementReading, Edge, ImuReading
 from omnibot_driver.core.device_clock import DeviceClock
 from omnibot_driver.core.imu import STANDARD_GRAVITY
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
@@ -22,6 +22,7 @@ SKEWS = [1e-4, -1e-4]
 JITTER_S = 60e-6
 SETTLED_S = 2.0
 SAMPLE = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+EDGES = [None, Edge(0, 0.0, 0.0011), Edge(1, 0.0, 0.0011), Edge(1, 0.001, 0.0009, cut=True)]
 COUNTS = 16384 / STANDARD_GRAVITY
 
 
@@ -67,7 +68,7 @@ def stamp(clock: DeviceClock, board: Board, reads: Iterable[Read]) -> Stamped:
     last_s = -math.inf
     for now, data in reads:
         readings = omnibot.receive(data, now)
-        stamps_s = clock.stamps(readings, now, omnibot.newest)
+        stamps_s = clock.stamps(readings, now, omnibot.edge)
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
             if isinstance(reading, ImuReading):
                 assert last_s < stamp_s <= now
@@ -235,8 +236,8 @@ def test_whatever_comes_stamps_increase_and_are_not_later_than_arrival() -> None
                 lost = rng.choice([0] * 20 + [1, 255])
                 readings += [SAMPLE] * rng.choice([3, 4, 4, 4, 5])
                 readings.append(DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, lost))
-            newest = rng.choice([None, (0, 0.0), (1, 0.0), (1, 0.001)])
-            for reading, stamp_s in zip(readings, clock.stamps(readings, now, newest), strict=True):
+            edge = rng.choice(EDGES)
+            for reading, stamp_s in zip(readings, clock.stamps(readings, now, edge), strict=True):
                 assert stamp_s <= now
                 assert last_s < stamp_s if reading is SAMPLE else last_s <= stamp_s
                 last_s = stamp_s
@@ -252,20 +253,22 @@ displacements = st.builds(
     st.sampled_from([None, 0.04]),
     st.integers(0, 255),
 )
-newest = st.none() | st.tuples(st.integers(0, 1), st.floats(0.0, 0.0013))
-reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, max_size=30), newest)
+edges = st.none() | st.builds(
+    Edge, st.integers(0, 1), st.floats(0.0, 0.0013), st.floats(0.0, 0.0012), st.booleans()
+)
+reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, max_size=30), edges)
 
 
 @given(st.lists(reads, max_size=60))
 def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
-    reads: list[tuple[float, list[ImuReading | DisplacementReading], tuple[int, float] | None]],
+    reads: list[tuple[float, list[ImuReading | DisplacementReading], Edge | None]],
 ) -> None:
     """Whatever counters and framing say."""
     clock = DeviceClock(0.01)
     now, last_s = 1000.0, -math.inf
-    for passed_s, readings, newest in reads:
+    for passed_s, readings, edge in reads:
         now += passed_s
-        for reading, stamp_s in zip(readings, clock.stamps(readings, now, newest), strict=True):
+        for reading, stamp_s in zip(readings, clock.stamps(readings, now, edge), strict=True):
             assert stamp_s <= now
             assert last_s < stamp_s if isinstance(reading, ImuReading) else last_s <= stamp_s
             last_s = stamp_s

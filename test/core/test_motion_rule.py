@@ -164,6 +164,16 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> No
     assert len(bench.notices) == 1
 
 
+def test_an_estop_that_nobody_may_have_heard_says_so(bench: Bench) -> None:
+    """It is latched and sent, but not a byte has come from the board for a while."""
+    assert estop(bench, True) == "e-stop latched"
+    bench.speaks = False
+    bench.run(2.0)
+    assert "nobody knows" in estop(bench, True)
+    bench.close()
+    assert "not open" in estop(bench, True)
+
+
 def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
     """Speeding up takes its time, and that is all."""
     for _ in range(3):
@@ -286,6 +296,41 @@ def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
     assert bench.board.mode is BoardMode.NOMINAL
     drive_on(bench)
     assert not bench.still()
+
+
+def test_a_reset_after_a_pause_that_failed_starts_the_board_again(bench: Bench) -> None:
+    """It ran before the reset, so it runs after it; the robot stands until a fresh command."""
+    bench.hears = False
+    bench.ask(Request.PAUSE, 5.0)
+    bench.hears = True
+    assert bench.ask(Request.RESET, 10.0).message == "running (nominal)"
+    bench.run(3.0)
+    assert bench.board.mode is BoardMode.NOMINAL
+    assert bench.still()
+    drive_on(bench)
+    assert not bench.still()
+
+
+def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) -> None:
+    """Nothing has restarted, so the pause that somebody wanted is still wanted."""
+    bench.hears = False
+    bench.ask(Request.PAUSE, 5.0)
+    assert not bench.ask(Request.RESET, 10.0).success
+    bench.hears = True
+    with pytest.raises(CommandRefused):
+        bench.drive(0.4)
+    bench.run(3.0)
+    assert bench.board.mode is BoardMode.PAUSED
+
+
+def test_a_reset_of_a_paused_board_leaves_it_paused(bench: Bench) -> None:
+    """And says so."""
+    assert bench.ask(Request.PAUSE, 5.0).success
+    answer = bench.ask(Request.RESET, 10.0)
+    assert answer.success
+    assert "paused, as it was" in answer.message
+    bench.run(3.0)
+    assert bench.board.mode is BoardMode.PAUSED
 
 
 def test_a_paused_board_that_somebody_else_starts_is_paused_again(bench: Bench) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from random import Random
 
 from bench import EMERGENCY_STOP, STOP, TICK_S, Bench
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
@@ -234,7 +234,7 @@ STEPS = st.lists(
     st.booleans(),
     st.sampled_from([0.05, 0.3, 1.0]),
 )
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60)
 def test_whatever_happens_the_robot_obeys_fresh_commands_only_and_ends_in_the_wanted_mode(
     steps: list[tuple[str, float]], seed: int, latency_s: float, run: bool, boot_time_s: float
 ) -> None:

@@ -10,22 +10,26 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from random import Random
-from typing import Final
+from typing import Any, Final
 
 import rclpy
-from cases import COMMANDS, ENDINGS, HOST, LINE, SERVICES, Case, random_lines
+from cases import Case, survivable
+from endings import ENDINGS, terminal_is_closed
 from fuzz import fuzz
-from rig import Rig
+from goals import GOAL_ENDINGS, GOALS
+from rig import GoalRig, NetworkRig, Rig
+from stuck import NETWORK
 from walk import walk
 
 DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "safety.md"
 BEGIN, END = "<!-- campaign: begin -->", "<!-- campaign: end -->"
-ROUNDS: Final = 3
-WALKS, STEPS = 5, 30
+ROUNDS: Final = 2
+WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
 SOAK_STEPS: Final = 30
 
@@ -53,28 +57,28 @@ class Campaign:
         self.published = self.wrong = 0
         self._folder = tempfile.TemporaryDirectory()
 
-    def rig(self) -> Rig:
-        return Rig(Path(tempfile.mkdtemp(dir=self._folder.name)))
+    def rig(self, kind: type[Rig] = Rig, before: str = "") -> Rig:
+        return kind(Path(tempfile.mkdtemp(dir=self._folder.name)), before=before)
 
-    def run(self, row: Row, case: Case, rig: Rig, *, again: bool = True) -> None:
+    def run(self, row: Row, case: Case[Any], rig: Rig, *, again: bool = True) -> None:
         """One try."""
         try:
             case(rig)
+            row.stood_s = max([row.stood_s, *rig.findings.stood_after_s])
             if again:
                 rig.expect_obeys_again()
-        except AssertionError as error:
-            rig.findings.expect(False, f"{row.name}: {error}")
+        except Exception as error:  # whatever it is, the others are tried all the same
+            rig.findings.expect(False, f"{row.name}: {error!r}")
         row.tried += 1
-        row.stood_s = max([row.stood_s, *rig.findings.stood_after_s])
         rig.findings.stood_after_s.clear()
         complaints = [f"{row.name}: {complaint}" for complaint in rig.findings.take()]
         row.complaints += len(complaints)
         self.complaints += complaints
         print(row, *complaints, sep="\n  ", flush=True)
 
-    def judge(self, rig: Rig) -> None:
+    def judge(self, rig: Rig, *, damaged_bytes: bool = True) -> None:
         """What one rig published."""
-        rig.judge_stream(damaged_bytes=True)
+        rig.judge_stream(damaged_bytes)
         self.published += rig.findings.published
         self.wrong += rig.findings.wrong
         self.complaints += rig.findings.take()
@@ -85,22 +89,38 @@ class Campaign:
 
     def scripted(self) -> None:
         """Each fault in each round, in one driver's life; then those that end a driver."""
-        rows = {name: self.row(name) for name in {**COMMANDS, **LINE, **random_lines(0)}}
-        rows |= {name: self.row(name) for name in {**SERVICES, **HOST}}
-        with self.rig() as rig:
-            self.run(Row("warm-up"), lambda _: None, rig)
+        self._one_life(Rig, survivable, damaged_bytes=True)
+        self._one_life(NetworkRig, lambda _: NETWORK, damaged_bytes=False)
+        self._one_life(GoalRig, lambda _: GOALS, damaged_bytes=False)
+        for name, ending in ENDINGS.items():
+            self._ends(f"the driver ends: {name}", ending, before=ending.before)
+        for name, case in GOAL_ENDINGS.items():
+            self._ends(name, case, kind=GoalRig)
+        row = self.row("the driver ends: its terminal is closed")
+        for _ in range(ROUNDS):
+            terminal_is_closed(
+                lambda before: self.rig(before=before),
+                lambda rig, end, row=row: self.run(row, end, rig, again=False),
+            )
+
+    def _one_life(
+        self, kind: type[Rig], cases: Callable[[int], dict[str, Case[Any]]], *, damaged_bytes: bool
+    ) -> None:
+        rows = {name: self.row(name) for name in cases(0)}
+        with self.rig(kind) as rig:
+            self.run(Row("warm-up"), lambda rig: rig.wait_ticks(100), rig)
             descriptors, memory = rig.cost()
             for number in range(ROUNDS):
-                cases = {**COMMANDS, **LINE, **random_lines(number), **SERVICES, **HOST}
-                for name, case in cases.items():
+                for name, case in cases(number).items():
                     self.run(rows[name], case, rig)
-            self.judge(rig)
+            self.judge(rig, damaged_bytes=damaged_bytes)
             self._compare_cost(rig, descriptors, memory)
-        for name, case in ENDINGS.items():
-            row = self.row(f"the driver ends: {name}")
-            for _ in range(ROUNDS):
-                with self.rig() as rig:
-                    self.run(row, case, rig, again=False)
+
+    def _ends(self, name: str, case: Case[Any], kind: type[Rig] = Rig, before: str = "") -> None:
+        row = self.row(name)
+        for _ in range(ROUNDS):
+            with self.rig(kind, before) as rig:
+                self.run(row, case, rig, again=False)
 
     def random_input(self) -> None:
         row = self.row(f"{FUZZ:,} random messages and calls")
@@ -108,10 +128,10 @@ class Campaign:
             self.run(row, lambda rig: fuzz(rig, FUZZ, Random(1)), rig)
             self.judge(rig)
 
-    def walks(self, seeds: range) -> None:
-        row = self.row(f"random walks of {STEPS} faults")
+    def walks(self, name: str, kind: type[Rig], seeds: range) -> None:
+        row = self.row(name)
         for seed in seeds:
-            with self.rig() as rig:
+            with self.rig(kind) as rig:
                 self.run(row, partial(_walk, seed, STEPS), rig)
                 self.judge(rig)
 
@@ -166,7 +186,8 @@ def main() -> int:
     else:
         campaign.scripted()
         campaign.random_input()
-        campaign.walks(range(WALKS))
+        campaign.walks(f"random walks of {STEPS} faults", Rig, range(WALKS))
+        campaign.walks(f"with goals: random walks of {STEPS} faults", GoalRig, range(GOAL_WALKS))
     rclpy.shutdown()
     table = campaign.table()
     print(f"\n{table}\n", *campaign.complaints, sep="\n")

@@ -7,7 +7,7 @@ import signal
 from collections.abc import Callable
 from functools import partial
 from random import Random
-from typing import Final
+from typing import Final, TypeVar
 
 from breakable_line import Damage, cut, gaining, late, losing, losing_bursts, noise
 from driver_process import Driver
@@ -15,8 +15,11 @@ from geometry_msgs.msg import Twist
 from rig import TICK_S, TIMEOUT_S, Rig
 from std_msgs.msg import Bool, Float32MultiArray
 from std_srvs.srv import SetBool, Trigger
+from stuck import TERMINAL
+from unkind import UNKIND
 
-Case = Callable[[Rig], None]
+R = TypeVar("R", bound=Rig, contravariant=True)
+Case = Callable[[R], object]
 
 NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
 HANGS_S: Final = 1.0
@@ -141,6 +144,7 @@ def unplugged(rig: Rig) -> None:
     rig.hand.leave()
     rig.unplug()
     rig.probe.wait_for_state("disconnected")
+    rig.wait_for_diagnosis("does not exist")
     rig.plug()
     mark = len(rig.line.board.received)
     since = rig.line.tick
@@ -211,7 +215,7 @@ def service_discards_the_command(service: str, rig: Rig) -> None:
     rig.probe.wait_for_state("nominal")
 
 
-def random_lines(seed: int) -> dict[str, Case]:
+def random_lines(seed: int) -> dict[str, Case[Rig]]:
     """Damage to bytes; the random numbers are the seed's."""
     random = Random(f"lines {seed}")
     return {
@@ -230,13 +234,13 @@ def random_lines(seed: int) -> dict[str, Case]:
     }
 
 
-COMMANDS: Final[dict[str, Case]] = {
+COMMANDS: Final[dict[str, Case[Rig]]] = {
     "the publisher of cmd_vel ceases": publisher_ceases,
     "cmd_vel is NaN or infinite": publisher_sends_nonsense,
     "wheel_cmd has the wrong size": wheel_commands_of_the_wrong_size,
     "1,000 commands a second": flood_of_commands,
 }
-LINE: Final[dict[str, Case]] = {
+LINE: Final[dict[str, Case[Rig]]] = {
     "the cable is cut, to the board": cut_to_the_board,
     "the cable is cut, from the board": cut_from_the_board,
     "the cable is cut, both ways": cut_both_ways,
@@ -245,7 +249,7 @@ LINE: Final[dict[str, Case]] = {
     "unplugged, plugged in under another name": unplugged,
     "unplugged and plugged in, somebody drives on": unplugged_while_somebody_drives_on,
 }
-SERVICES: Final[dict[str, Case]] = {
+SERVICES: Final[dict[str, Case[Rig]]] = {
     "e-stop through reboot, replug and ~/start": estop,
     "e-stop by topic; false does not release": estop_by_topic,
     "~/pause and un-pause": partial(service_discards_the_command, "pause"),
@@ -280,34 +284,12 @@ def second_driver(rig: Rig) -> None:
         rig.expect_still(rig.line.tick, "with a second driver waiting")
 
 
-def ended_by(numbers: tuple[signal.Signals, ...], rig: Rig) -> None:
-    """The process ends, by asking or by force; nobody commands Stop but what it leaves behind."""
-    rig.drive()
-    since = rig.line.tick
-    rig.driver.end(*numbers)
-    rig.expect_still(since, "the driver ends", 0.5)
-    rig.hand.leave()
-
-
-HOST: Final[dict[str, Case]] = {
+HOST: Final[dict[str, Case[Rig]]] = {
     "the driver hangs and goes on (SIGSTOP, SIGCONT)": driver_hangs,
     "a second driver on the same port": second_driver,
 }
-ENDINGS: Final[dict[str, Case]] = {
-    name: partial(ended_by, numbers)
-    for name, numbers in {
-        "ctrl-C": (signal.SIGINT,),
-        "ctrl-C twice": (signal.SIGINT, signal.SIGINT),
-        "SIGTERM": (signal.SIGTERM,),
-        "SIGHUP": (signal.SIGHUP,),
-        "SIGKILL": (signal.SIGKILL,),
-        "segmentation fault": (signal.SIGSEGV,),
-        "abort": (signal.SIGABRT,),
-    }.items()
-}
-"""The driver does not survive these: each needs a rig of its own."""
 
 
-def survivable(seed: int) -> dict[str, Case]:
+def survivable(seed: int) -> dict[str, Case[Rig]]:
     """All that one driver goes through, one after the other."""
-    return {**COMMANDS, **LINE, **random_lines(seed), **SERVICES, **HOST}
+    return {**COMMANDS, **LINE, **TERMINAL, **random_lines(seed), **SERVICES, **HOST, **UNKIND}

@@ -36,7 +36,7 @@ def walk(rig: Rig, random: Random, steps: int) -> list[str]:
 
 
 def _rest(rig: Rig, what: str) -> None:
-    rig.line.heal()
+    rig.heal()
     rig.hand.leave()
     rig.expect_still(rig.line.tick, what, STANDS_AGAIN_S)
     rig.probe.call(SetBool, "estop", data=False)
@@ -66,7 +66,11 @@ def _from_board(kind: Callable[[Random], Damage]) -> Callable[[Rig, Random], Non
 
 
 def _heal(rig: Rig, _random: Random) -> None:
-    rig.line.heal()
+    rig.heal()
+
+
+def _stick(rig: Rig, _random: Random) -> None:
+    rig.terminal.deaf = True
 
 
 def _reboot(rig: Rig, _random: Random) -> None:
@@ -98,6 +102,7 @@ STEPS: Final[dict[str, Callable[[Rig, Random], None]]] = {
     "bursts lost": _from_board(lambda random: losing_bursts(1e-3, random)),
     "noise": _from_board(noise),
     "a late adapter": _from_board(lambda random: late(random.randrange(2, 60))),
+    "a stuck adapter": _stick,
     "a whole line": _heal,
     "a reboot": _reboot,
     "a replug": _replug,

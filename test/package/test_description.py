@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 import xacro
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from urdf_parser_py.urdf import URDF
 
@@ -83,7 +83,6 @@ def test_the_default_geometry_is_the_drivers() -> None:
         assert collision.geometry.radius == GEOMETRY["wheel_radius"]
 
 
-@settings(deadline=None)
 @given(speeds, speeds, speeds)
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
     """At the rates of a twist each wheel rolls by the body's motion where it stands.

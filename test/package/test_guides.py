@@ -14,25 +14,40 @@ from omnibot_driver.parameters import BY_NAME
 ROOT = Path(__file__).parents[2]
 TROUBLESHOOTING = ROOT / "docs/troubleshooting.md"
 COMMISSIONING = ROOT / "docs/commissioning.md"
+DIAGNOSTICS = ROOT / "docs/diagnostics.md"
+TOUR = ROOT / "docs/tour.md"
 GAP = "…"
 SENSES = {"clockwise": -1, "counter-clockwise": 1, "still": 0}
 
 
+def text_of(node: ast.AST) -> str:
+    """A string in the code, what is filled in shown as a gap; empty if it is none."""
+    if isinstance(node, ast.JoinedStr):
+        parts = [part.value if isinstance(part, ast.Constant) else GAP for part in node.values]
+        return "".join(map(str, parts))
+    return str(node.value) if isinstance(node, ast.Constant) else ""
+
+
 def templates() -> Iterator[str]:
-    """Every string in the driver but docstrings, what is filled in shown as a gap."""
+    """Every string in the driver but docstrings."""
     for file in (ROOT / "omnibot_driver").rglob("*.py"):
         nodes = list(ast.walk(ast.parse(file.read_text())))
         docstrings = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
-        for node in nodes:
-            if isinstance(node, ast.JoinedStr):
-                yield "".join(
-                    str(part.value) if isinstance(part, ast.Constant) else GAP
-                    for part in node.values
-                )
-            elif isinstance(node, ast.Constant) and id(node) not in docstrings:
-                yield str(node.value)
+        yield from (text_of(node) for node in nodes if id(node) not in docstrings)
 
 
+def told() -> Iterator[str]:
+    """What the driver refuses or warns with."""
+    for file in (ROOT / "omnibot_driver").rglob("*.py"):
+        if {"simulator", "demo", "tools"} & set(file.parts):
+            continue
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Call) and ast.unparse(node.func).split(".")[-1] in TELLING:
+                yield from filter(None, map(text_of, node.args))
+
+
+GAPS = re.compile(f"{GAP}|: ")
+TELLING = {"CommandRefused", "LinkError", "Notice", "ParameterError", "RequestRefused"}
 SAID = "\n".join(templates())
 SENTENCES = re.findall(r"^\| `([^`]+)` \| .* \|$", TROUBLESHOOTING.read_text(), re.MULTILINE)
 STATES = {"disconnected", "connecting", "paused", "nominal", "imu_only"}
@@ -41,10 +56,20 @@ STATES = {"disconnected", "connecting", "paused", "nominal", "imu_only"}
 @pytest.mark.parametrize("sentence", sorted(set(SENTENCES) - STATES))
 def test_the_driver_still_says_it(sentence: str) -> None:
     """Each part between gaps and colons is in the code, word for word."""
-    parts = [part.strip() for part in re.split(f"{GAP}|: ", sentence)]
+    parts = [part.strip() for part in GAPS.split(sentence)]
     assert any(len(part) > 8 for part in parts)
     for part in parts:
         assert part in SAID
+
+
+@pytest.mark.parametrize("template", sorted(set(told())))
+def test_what_the_driver_tells_is_explained(template: str) -> None:
+    """By a sentence that is all in it, or that begins with it where the rest is filled in."""
+    begin = next((part for part in template.split(GAP) if len(part) > 9), template)
+    assert any(
+        begin in sentence or all(part.strip() in template for part in GAPS.split(sentence))
+        for sentence in set(SENTENCES) - STATES
+    )
 
 
 def test_every_state_is_explained() -> None:
@@ -53,16 +78,26 @@ def test_every_state_is_explained() -> None:
     assert all(state in SAID for state in STATES)
 
 
-@pytest.mark.parametrize("guide", [TROUBLESHOOTING, COMMISSIONING], ids=lambda path: path.name)
-def test_what_a_guide_refers_to_is_there(guide: Path) -> None:
-    """Links lead to files, and to headings where they name one."""
-    for target in re.findall(r"\]\(([^)]+)\)", guide.read_text()):
-        name, _, anchor = target.partition("#")
-        file = guide.parent / name if name else guide
-        assert file.is_file(), target
-        headings = re.findall(r"^#+ (.+)$", file.read_text(), re.MULTILINE)
-        anchors = {re.sub(r"[^\w -]", "", text).lower().replace(" ", "-") for text in headings}
-        assert not anchor or anchor in anchors, target
+def test_every_status_of_the_diagnostics_has_its_row() -> None:
+    """In the order in which they are published."""
+    code = (ROOT / "omnibot_driver/core/diagnosis.py").read_text()
+    names = dict.fromkeys(re.findall(r'Status\(\s*"([\w-]+)"', code))
+    rows = re.findall(r"^\| ([\w-]+) \|", DIAGNOSTICS.read_text(), re.MULTILINE)
+    assert rows[:1] == ["Status"]
+    assert rows[1 : 1 + len(names)] == list(names)
+
+
+def test_the_tour_shows_what_the_driver_says() -> None:
+    """Its warnings and errors can still be printed, word for word but for what is filled in."""
+    patterns = [
+        re.compile(".*".join(map(re.escape, template.split(GAP))))
+        for template in SAID.splitlines()
+        if len(template) > 20
+    ]
+    lines = re.findall(r"^\[(?:WARN|ERROR)\] \S+ (.+)$", TOUR.read_text(), re.MULTILINE)
+    assert len(lines) > 8
+    for line in lines:
+        assert any(pattern.search(line) for pattern in patterns), line
 
 
 def test_every_assumption_has_its_step_and_what_mends_it() -> None:

@@ -1,6 +1,7 @@
 """What `colcon build` and `pip install` put where, found and started the way `ros2 run` does it."""
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -16,31 +17,13 @@ from ament_index_python.packages import get_package_prefix
 ROOT = Path(__file__).parents[2]
 PACKAGE = "omnibot_driver"
 DEADLINE_S = 60.0
+FOR_USERS = (
+    *("package.xml", "LICENSE", "*.md", "CHANGELOG.rst", "docs/*.md", "docs/pictures/*"),
+    *("config/*", "launch/*", "rviz/*", "systemd/*", "udev/*", "urdf/*"),
+)
 SHARED_FILES = [
     f"ament_index/resource_index/packages/{PACKAGE}",
-    f"{PACKAGE}/package.xml",
-    *(
-        f"{PACKAGE}/{name}"
-        for name in (
-            "config/driver.yaml",
-            "config/ekf.yaml",
-            "config/foxglove.json",
-            "config/nav2_omnibot.yaml",
-            "config/omnibot.policy.xml",
-            "config/twist_mux.yaml",
-            "docs/commissioning.md",
-            "docs/recording.md",
-            "docs/troubleshooting.md",
-            "launch/description.launch.py",
-            "launch/driver.launch.py",
-            "launch/ekf.launch.py",
-            "launch/simulation.launch.py",
-            "rviz/omnibot.rviz",
-            "systemd/omnibot-driver.service",
-            "udev/99-omnibot.rules",
-            "urdf/omnibot.urdf.xacro",
-        )
-    ),
+    *(f"{PACKAGE}/{path.relative_to(ROOT)}" for name in FOR_USERS for path in ROOT.glob(name)),
 ]
 
 
@@ -119,15 +102,26 @@ def prefix(workspace: Path) -> Path:
 
 
 def test_colcon_installs_what_ros2_looks_for(prefix: Path) -> None:
-    """The index entry, the manifest, launch and parameter files are under share."""
+    """The index entry, the manifest and every file for users are under share."""
+    assert len(SHARED_FILES) > len(FOR_USERS)
     for name in SHARED_FILES:
         assert (prefix / "share" / name).is_file(), name
+
+
+def test_the_installed_documents_link_to_installed_files(prefix: Path) -> None:
+    """Whoever has no repository at hand reads them there."""
+    pages = [*(prefix / "share" / PACKAGE).glob("**/*.md")]
+    assert len(pages) > 10
+    for page in pages:
+        for target in re.findall(r"\]\(([^)\s#]+)", page.read_text()):
+            assert target.startswith("http") or (page.parent / target).is_file(), (page, target)
 
 
 def test_colcon_installs_the_executables(prefix: Path) -> None:
     """`ros2 run` offers every executable file in lib/omnibot_driver: these and no more."""
     files = list((prefix / "lib" / PACKAGE).iterdir())
-    assert {file.name for file in files} == {"demo", "driver", "simulator"}
+    executables = {"calibrate", "demo", "driver", "monitor", "report", "simulator"}
+    assert {file.name for file in files} == executables
     assert all(os.access(file, os.X_OK) for file in files)
 
 
@@ -162,6 +156,17 @@ def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, pr
             assert driver_process.returncode == 0, output
 
 
+def test_colcon_test_runs_the_tests(sources: Path, workspace: Path) -> None:
+    """It looks for pytest in setup.py, and without it passes having run nothing."""
+    one = ["test/core/test_modes.py", " --maxfail=1"]
+    colcon = [sys.executable, "-m", "colcon"]
+    run([*colcon, "test", "--base-paths", sources, "--pytest-args", *one], workspace)
+    summary = run([*colcon, "test-result", "--all"], workspace)
+    found = re.search(r"Summary: (\d+) tests, 0 errors, 0 failures", summary)
+    assert found, summary
+    assert int(found[1]) > 1
+
+
 def test_pip_installs_the_same_files(sources: Path, tmp_path: Path) -> None:
     """A plain `pip install` serves people without colcon."""
     copy = tmp_path / "sources"  # pip builds inside the source tree
@@ -170,5 +175,5 @@ def test_pip_installs_the_same_files(sources: Path, tmp_path: Path) -> None:
     run([*pip, "--prefix", tmp_path / "prefix", copy], tmp_path)
     for name in SHARED_FILES:
         assert (tmp_path / "prefix/share" / name).is_file(), name
-    for name in ("driver", "simulator"):
+    for name in ("driver", "monitor", "simulator"):
         assert os.access(tmp_path / "prefix/bin" / name, os.X_OK)

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -45,8 +46,18 @@ def test_without_wheels_one_sentence_points_to_jazzy(
     assert not (tmp_path / "venv").exists()
 
 
+def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
+    """It is somebody else's; creating one would clear it."""
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs/kept").touch()
+    (tmp_path / "venv").symlink_to(tmp_path / "theirs")
+    done = make("demo", f"VENV={tmp_path / 'venv'}", f"PYTHON={sys.executable}")
+    assert done.returncode != 0
+    assert (tmp_path / "theirs/kept").exists()
+
+
 def test_make_alone_lists_every_target() -> None:
     """The default target explains the others in a line each."""
     listed = {line.split()[1] for line in make().stdout.splitlines()}
-    targets = {"demo", "test", "integrity", "bench", "faults", "soak", "lint", "format", "clean"}
-    assert listed == {"help", *targets}
+    targets = {"demo", "test", "docs", "pictures", "integrity", "bench", "faults", "soak"}
+    assert listed == {"help", *targets, "lint", "format", "clean"}

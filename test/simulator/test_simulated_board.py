@@ -386,7 +386,7 @@ command_bytes = st.lists(
 
 
 @given(command_bytes, st.data())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_the_chunking_of_the_input_does_not_matter(stream: bytes, data: st.DataObject) -> None:
     """The same bytes within one tick, however cut, are obeyed alike and answered alike."""
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=10)))

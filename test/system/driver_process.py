@@ -1,5 +1,6 @@
 """The driver as a process of its own, with its output and its end."""
 
+import contextlib
 import itertools
 import os
 import re
@@ -7,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 from typing import Self
 
 PATIENCE_S = 20.0
@@ -60,11 +62,11 @@ class Driver:
     def output(self) -> str:
         return "".join(self.lines)
 
-    def wait_for_line(self, pattern: str) -> str:
-        """The first line of the output in which the pattern is found."""
+    def wait_for_line(self, pattern: str, since: int = 0) -> str:
+        """The first line of the output, from this one on, in which the pattern is found."""
 
         def find() -> str | None:
-            return next((line for line in self.lines if re.search(pattern, line)), None)
+            return next((line for line in self.lines[since:] if re.search(pattern, line)), None)
 
         with self._said:
             if not self._said.wait_for(lambda: find() or self._ended(), PATIENCE_S):
@@ -78,6 +80,17 @@ class Driver:
         for number in signals:
             self.process.send_signal(number)
         return self.process.wait(PATIENCE_S)
+
+    def guards(self) -> list[int]:
+        """The process numbers of its children that guard its port."""
+        found = []
+        for directory in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                parent = int((directory / "stat").read_text().rpartition(")")[2].split()[1])
+                ours = parent == self.process.pid
+                if ours and b"guard.py" in (directory / "cmdline").read_bytes():
+                    found.append(int(directory.name))
+        return found
 
     def _ended(self) -> bool:
         return not self._listener.is_alive()

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pseudo_terminal import PseudoTerminal
 
 import omnibot_driver
 from omnibot_driver.core.kinematics import BodyTwist
@@ -50,7 +51,7 @@ def test_a_corner_turns_the_robot_to_the_next_side(leg: int, before_m: float, ya
     assert abs(math.remainder(heading - direction - math.pi / 2, math.tau)) < 0.15
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(-0.02, 0.02), st.floats(-0.02, 0.02), st.floats(-0.1, 0.1))
 def test_the_square_closes(x_m: float, y_m: float, yaw_rad: float) -> None:
     """A robot that answers after 0.1 s passes all corners and ends a lap where it belongs."""
@@ -90,17 +91,6 @@ def test_a_status_row_stands_under_its_heading(
     twist = BodyTwist(speed, -speed, speed / 10)
     row = display.status_row(state, (100, 25), leg, pose, twist, twist)
     assert len(row) == len(display.HEADING.splitlines()[-1]) < 80
-
-
-def test_the_picture_of_a_square_is_a_square() -> None:
-    """Its outline is drawn, its inside is empty, and points far away do no harm."""
-    side = [i / 200 for i in range(201)]
-    square = [p for t in side for p in ((t, 0.0), (t, 1.0), (0.0, t), (1.0, t))]
-    rows = display.picture([*square, (5.0, 5.0), (-5.0, 0.5)])
-    blank = "\u2800"
-    assert {len(row) for row in rows} == {24}
-    assert [rows[6][i] != blank for i in (1, 12, 22)] == [True, False, True]
-    assert all(char != blank for char in rows[0][1:23] + rows[-1][1:23])
 
 
 @contextmanager
@@ -166,6 +156,17 @@ def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
     assert float(rates[1]) / float(rates[2]) == pytest.approx(4.0, rel=0.1)
     assert float(driven[2]) == pytest.approx(float(driven[1]) / 4, abs=0.5)
     assert "/dev/ttyUSB0" in output
+
+
+def test_on_a_terminal_the_monitor_shows_it() -> None:
+    """The dashboard of the demo's own driver, until q; then the result beside a picture."""
+    with PseudoTerminal([sys.executable, "-m", "omnibot_driver.demo"]) as terminal:
+        terminal.wait_for("ros2 topic hz /demo_")
+        terminal.wait_for("/omnibot_driver  nominal")
+        terminal.wait_for("commanded m/s rad/s")
+        terminal.type("q")
+        terminal.wait_for("pose error")
+        assert terminal.end() == 0
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -1,6 +1,5 @@
 """A host that is lost: the driver is killed, crashes or hangs while the robot moves."""
 
-import contextlib
 import math
 import os
 import signal
@@ -40,17 +39,6 @@ def driving(probe: Probe, board: PtyBoard) -> Any:
 def still(board: SimulatedBoard) -> bool:
     truth = board.truth
     return max(abs(truth.vx_mps), abs(truth.vy_mps), abs(truth.yaw_rate)) < 0.01
-
-
-def guards_of(driver: Driver) -> list[int]:
-    """The processes that share the driver's port and are not the driver."""
-    found = []
-    for directory in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):
-            parent = int((directory / "stat").read_text().rpartition(")")[2].split()[1])
-            if parent == driver.process.pid and b"guard.py" in (directory / "cmdline").read_bytes():
-                found.append(int(directory.name))
-    return found
 
 
 def wait_until(predicate: Callable[[], object]) -> None:
@@ -141,10 +129,10 @@ def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
 ) -> None:
     """The user hears of it once."""
     driving(probe, board)
-    (first,) = guards_of(driver)
+    (first,) = driver.guards()
     os.kill(first, signal.SIGKILL)
     driver.wait_for_line("the guard process died.*another one is started")
-    wait_until(lambda: guards_of(driver) not in ([], [first]))
+    wait_until(lambda: driver.guards() not in ([], [first]))
     driver.end(signal.SIGKILL)
     assert board.wait_for(lambda b: b.estopped, PATIENCE_S)
     assert board.wait_for(still, PATIENCE_S)
@@ -161,14 +149,14 @@ def test_every_connection_has_one_guard_and_no_process_stays_behind(
     for _ in range(5):
         with PtyBoard(SimulatedBoard(), str(link)):
             probe.wait_for_state("nominal")
-            (guard,) = guards_of(driver)
+            (guard,) = driver.guards()
             seen.add(guard)
         probe.wait_for_state("disconnected")
-        wait_until(lambda: not guards_of(driver))
+        wait_until(lambda: not driver.guards())
     assert len(seen) == 5
     start_board(link=str(link))
     probe.wait_for_state("nominal")
-    (guard,) = guards_of(driver)
+    (guard,) = driver.guards()
     assert driver.end(signal.SIGINT) == 0
     assert not Path(f"/proc/{guard}").exists()
 
@@ -186,7 +174,7 @@ def test_the_guard_can_be_done_without(board: PtyBoard, start_driver: Start) -> 
     """``guard: false``, for a debugger's sake."""
     driver: Driver = start_driver(board.path, guard=False)
     driver.wait_for_line("state: nominal")
-    assert guards_of(driver) == []
+    assert driver.guards() == []
     driver.end(signal.SIGKILL)
     with board.lock:
         assert EMERGENCY_STOP not in bytes(board.board.received)

@@ -143,6 +143,16 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
     assert float(rate) == pytest.approx(float(wanted), rel=0.2)
 
 
+def test_the_updater_publishes_where_it_is_installed(robot: Robot) -> None:
+    """By its period, a parameter of its own; names, levels and hardware id are the same."""
+    pytest.importorskip("diagnostic_updater", exc_type=ImportError)
+    period = ["diagnostic_updater.period"]
+    values = robot.probe.call(GetParameters, "get_parameters", names=period).values
+    assert values[0].double_value == 1.0
+    robot.probe.wait_for(lambda: robot.status("Link"))
+    assert robot.status("Link").level == b"\x00"
+
+
 def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> None:
     """And it is no error."""
     odometry = robot.probe.listen(Odometry, "odom")

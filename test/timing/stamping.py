@@ -100,7 +100,7 @@ def stamp(line: str, scenario: str, loss: float, skew: float, seed: int, seconds
         now = max(now, time + random.expovariate(1.0 / JITTER_S))
         readings = bot.receive(received.data[at:end], now)
         at = end
-        stamps_s = clock.stamps(readings, now, bot.newest)
+        stamps_s = clock.stamps(readings, now, bot.edge)
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
             if isinstance(reading, ImuReading):
                 assert last_s < stamp_s <= now

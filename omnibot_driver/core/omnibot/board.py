@@ -13,6 +13,7 @@ from typing import Final, Literal
 from omnibot_driver.core.board import (
     BoardFigures,
     DisplacementReading,
+    Edge,
     ImuReading,
     Mode,
     PausedReading,
@@ -113,14 +114,20 @@ class OmniBot:
         return TICK_S
 
     @property
-    def newest(self) -> tuple[int, float] | None:
-        """By the IMU frame in hand, whole or begun."""
+    def edge(self) -> Edge | None:
+        """By the IMU frame in hand, whole or begun, and the bytes after it."""
         begun = self._decoder.begun
         if begun is None:
             return None
+        byte_s = 10 / self.settings.baudrate
+        ahead, after = 0, len(begun)
         if begun.startswith(frames.IMU_HEADER):
-            return 1, max(0, frames.IMU_LENGTH - len(begun)) * 10 / self.settings.baudrate
-        return (0, 0.0) if self._decoder.fresh else None
+            ahead, after = 1, len(begun) - frames.IMU_LENGTH
+            if after < 0:
+                return Edge(1, -after * byte_s, (-after - 1) * byte_s, cut=True)
+        elif not self._decoder.fresh:
+            return None
+        return Edge(ahead, 0.0, (frames.IMU_LENGTH - 1 - after) * byte_s)
 
     @property
     def figures(self) -> BoardFigures:

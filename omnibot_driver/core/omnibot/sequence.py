@@ -45,8 +45,9 @@ class Sequence:
         self._regular = False
         """Five deltas to a pose were seen; only then is a sixth missed."""
         self._paused = self._reconnected = False
-        self._ahead = False
-        """The last count was ahead of the time, and once the time is believed: a bit flipped."""
+        self._ahead: int | None = None
+        """The last count, if it was ahead of the time. The time is believed until the next one goes
+        on from it: a bit flipped, or the framing was deceived."""
 
     def pause(self) -> None:
         """The board said that it is paused: what comes next takes up the count, or begins anew."""
@@ -75,7 +76,7 @@ class Sequence:
         lost += wraps * WRAP
         late_s = abs((lost + 1) * DELTA_PERIOD_S - elapsed_s)
         from_zero = count * DELTA_PERIOD_S <= elapsed_s + EARLY_S
-        accounted = 2 * imus >= IMUS_PER_DELTA * (lost + 1)
+        accounted = 2 * imus > IMUS_PER_DELTA * (lost + 1)
         anew = reconnected or (from_zero and not accounted)
         if lost and late_s > LATE_S and anew:
             self._pose = None
@@ -84,8 +85,9 @@ class Sequence:
             DELTA_PERIOD_S / 2 if imus == IMUS_PER_DELTA else LATE_S
         )
         ahead = lost > 0 and elapsed_s < latest_s and not accounted
-        self._ahead = ahead and not self._ahead
-        if self._ahead:
+        confirmed = self._ahead is not None and 0 < (count - self._ahead) % WRAP <= DELTAS_PER_POSE
+        self._ahead = count if ahead and not confirmed else None
+        if self._ahead is not None:
             lost = max(0, round(elapsed_s / DELTA_PERIOD_S) - 1)
             self._delta = (before + lost + 1) % WRAP
         lost -= min(lost, told)

@@ -1,0 +1,133 @@
+"""When was tick n? A straight line over the ticks, found from the times between which they came.
+
+A tick's bytes come late, never early: arrivals lie on or above the line, whose slope is the true
+period. And bytes that a read did not bring were sent after it, so the line cannot be much lower
+either. Of every block of ticks two points are kept:
+
+*Latest*, the least delayed arrival. It always holds; bursts, stalls and losses only make it loose.
+*Earliest*, told by what a read did not bring. A read that was late itself says too much, so the
+greatest tenth is left out, and what is far below the arrivals says too little and is not kept.
+
+Where there are earliest points every pair of a latest and an earliest one bounds the slope, and the
+line runs in the middle of all bounds: a timer that keeps the reads from cutting a sample for
+seconds deceives by half of what it hides at the most. Without them, or if they contradict
+(then reads were late), the line is laid under the latest points as close as it goes: an edge of
+their lower convex hull, under those of cut samples alone if there are any, which have not waited.
+
+Knows ticks and times, in s of the host's steady clock; not what is sampled, nor how ticks are told.
+"""
+
+import math
+from collections import deque
+from itertools import pairwise
+from typing import Final
+
+BLOCK_TICKS: Final = 100
+"""One second."""
+BLOCKS_KEPT: Final = 75
+"""An adapter's timer and the board's tick beat against each other, within 100 ppm, every 20 s."""
+LARGEST_SKEW: Final = 1.2e-4
+"""Of the board's crystal against the host's: 100 ppm, and a little."""
+SUPPORT: Final = 0.75
+"""The line touches the points on both sides of this part of their span: late enough to follow what
+has lately been found out, early enough not to follow the last second's jitter."""
+FEWEST_READS: Final = 12
+"""In a block, to tell from them which were late."""
+LATE_PART: Final = 0.1
+"""Of the reads may be later than ``LATE_S``."""
+LATE_S: Final = 1e-4
+WIDEST: Final = 0.2
+"""Part of a period between earliest and latest, of which the middle is taken. A 16 ms timer makes
+reads 2 ms apart, as seen from the tick."""
+
+Point = tuple[int, float]
+"""A tick, and a time that bounds it."""
+
+
+class TickLine:
+    """The line over the ticks from the first one seen on. ``period_s``: the nominal one."""
+
+    def __init__(self, period_s: float, first: Point) -> None:
+        self.slope_s = period_s
+        self._period_s = period_s
+        self._anchor = first
+        self._latest: deque[tuple[Point, bool]] = deque(maxlen=BLOCKS_KEPT)
+        self._earliest: deque[Point] = deque(maxlen=BLOCKS_KEPT)
+        self._best: tuple[Point, bool] | None = None
+        self._not_before: list[Point] = []
+        self._block_from = first[0]
+
+    def at(self, tick: int) -> float:
+        """The time of this tick."""
+        return self._anchor[1] + self.slope_s * (tick - self._anchor[0])
+
+    def see(self, latest: Point, earliest: Point, *, cut: bool) -> None:
+        """A read: its newest tick had come by ``latest``; the next, or if ``cut`` the same, was not
+        to come before ``earliest``."""
+        tick, arrival = latest
+        if arrival < self.at(tick):
+            self._anchor = latest
+        if self._best is None or self._height(latest) < self._height(self._best[0]):
+            self._best = latest, cut
+        self._not_before.append(earliest)
+        if tick - self._block_from >= BLOCK_TICKS:
+            self._end_block(*self._best)
+            self._best, self._not_before, self._block_from = None, [], tick
+
+    def _end_block(self, best: Point, cut: bool) -> None:
+        if not self._latest or self._latest[-1][0][0] < best[0]:
+            self._latest.append((best, cut))
+        if len(self._not_before) >= FEWEST_READS:
+            ends = sorted(self._not_before, key=self._height)
+            tick, time = ends[-1 - int(LATE_PART * len(ends))]
+            earliest = tick, time - LATE_S
+            if 0.0 < self._height(best) - self._height(earliest) < WIDEST * self._period_s:
+                self._earliest.append(earliest)
+        if not (self._earliest and self._lay_between()):
+            self._lay_under()
+
+    def _height(self, point: Point) -> float:
+        """Above a line through the origin."""
+        return point[1] - self.slope_s * point[0]
+
+    def _within_skew(self, slope_s: float) -> float:
+        least, most = self._period_s * (1 - LARGEST_SKEW), self._period_s * (1 + LARGEST_SKEW)
+        return min(max(slope_s, least), most)
+
+    def _lay_between(self) -> bool:
+        """In the middle of all bounds, unless they contradict: then the earliest are forgotten."""
+        flattest, steepest = -math.inf, math.inf
+        for latest, _ in self._latest:
+            for earliest in self._earliest:
+                if earliest[0] < latest[0]:
+                    steepest = min(steepest, _slope(earliest, latest))
+                elif earliest[0] > latest[0]:
+                    flattest = max(flattest, _slope(latest, earliest))
+        flattest, steepest = self._within_skew(flattest), self._within_skew(steepest)
+        self.slope_s = (flattest + steepest) / 2
+        low = max(map(self._height, self._earliest))
+        high = min(self._height(latest) for latest, _ in self._latest)
+        if flattest > steepest or low > high:
+            self._earliest.clear()
+            return False
+        tick = self._latest[-1][0][0]
+        self._anchor = tick, (low + high) / 2 + self.slope_s * tick
+        return True
+
+    def _lay_under(self) -> None:
+        """Under the latest points, as high as it goes over their middle."""
+        hull: list[Point] = []
+        for point in [at for at, cut in self._latest if cut] or [at for at, _ in self._latest]:
+            while len(hull) > 1 and _slope(hull[-2], point) <= _slope(hull[-2], hull[-1]):
+                hull.pop()
+            hull.append(point)
+        middle = hull[0][0] + SUPPORT * (hull[-1][0] - hull[0][0])
+        for before, after in pairwise(hull):
+            if after[0] >= middle:
+                self.slope_s = self._within_skew(_slope(before, after))
+                break
+        self._anchor = min(hull, key=self._height)
+
+
+def _slope(before: Point, after: Point) -> float:
+    return (after[1] - before[1]) / (after[0] - before[0])

@@ -1,0 +1,40 @@
+"""The monitor in front of the demo, where there is a terminal for it. Knows processes, no ROS."""
+
+import subprocess
+import sys
+from importlib.util import find_spec
+
+from omnibot_driver.demo.program import end_with_parent
+from omnibot_driver.tools.monitor.screen import has_screen
+
+
+class Dashboard:
+    """``monitor`` on this terminal, where that is ``possible``, until it is quitted or closed.
+
+    It shows the driver of this namespace, as soon as there is one.
+    """
+
+    def __init__(self, namespace: str) -> None:
+        self.possible = has_screen() and find_spec("textual") is not None
+        self._process: subprocess.Popen[bytes] | None = None
+        if self.possible:
+            monitor = [sys.executable, "-m", "omnibot_driver.tools.monitor", "--timeout", "inf"]
+            self._process = subprocess.Popen(
+                [*monitor, "--namespace", namespace], preexec_fn=end_with_parent
+            )
+
+    @property
+    def quitted(self) -> bool:
+        """Whether it was there and is no more."""
+        return self._process is not None and self._process.poll() is not None
+
+    def close(self) -> None:
+        """Give the terminal back."""
+        if self._process is None:
+            return
+        self._process.terminate()
+        try:
+            self._process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()

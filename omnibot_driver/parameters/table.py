@@ -1,0 +1,47 @@
+"""Every parameter of the driver, and the check of all values together. Knows no ROS."""
+
+import difflib
+from collections.abc import Mapping
+from typing import Any, Final
+
+from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.parameters import operating, robot
+from omnibot_driver.parameters.parameter import Value
+
+SECTIONS: Final = {
+    "The line": operating.LINE,
+    "Commands": operating.COMMANDS,
+    "Frames": operating.FRAMES,
+    "The robot and its board": robot.ROBOT,
+    "The IMU": robot.IMU,
+    "How sure the measurements are": robot.NOISE,
+}
+PARAMETERS: Final = tuple(parameter for rows in SECTIONS.values() for parameter in rows)
+BY_NAME: Final = {parameter.name: parameter for parameter in PARAMETERS}
+
+
+def check_all(given: Mapping[str, object]) -> dict[str, Value]:
+    """Every parameter's value, from those given and the defaults. Raises ParameterError."""
+    for name in given:
+        if name not in BY_NAME:
+            nearest = difflib.get_close_matches(name, BY_NAME, n=1, cutoff=0.0)[0]
+            raise ParameterError(
+                f"there is no parameter '{name}'; the nearest is '{nearest}'"
+                " (config/driver.yaml has them all)"
+            )
+    values = {
+        parameter.name: parameter.check(given.get(parameter.name, parameter.default))
+        for parameter in PARAMETERS
+    }
+    _require_a_frame_for_goals(values)
+    return values
+
+
+def _require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
+    """A mirror turns the other way; signs that say otherwise leave positions without meaning."""
+    x, y, yaw = values["axis_signs"]
+    if values["control_method"] == "position" and x * y != yaw:
+        raise ParameterError(
+            f"parameter 'axis_signs' must not be {values['axis_signs']} with control_method"
+            " 'position': the sign of yaw must be that of x times that of y"
+        )

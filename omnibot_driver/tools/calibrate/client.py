@@ -1,0 +1,129 @@
+"""The running driver as a ROS node: found, its parameters, its services. Must not know motions.
+
+Everything runs in the caller's thread: whoever waits, spins.
+"""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
+
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+from std_srvs.srv import SetBool, Trigger
+
+from omnibot_driver.parameters import BY_NAME, PARAMETERS, Value
+from omnibot_driver.tools.calibrate.interruption import Interruption
+from omnibot_driver.tools.needs import ToolError
+
+FOUND_WITHIN_S: Final = 5.0
+ANSWER_WITHIN_S: Final = 12.0
+
+
+class Client:
+    """``driver``: the full name of the driver's node; ``parameters``: its own, by name."""
+
+    def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
+        self._node, self._interruption = node, interruption
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(node)
+        self.driver = self._find()
+        self.parameters = self._get_parameters()
+
+    def _find(self) -> str:
+        own = self._node.get_namespace().rstrip("/")
+        found: list[str] = []
+
+        def here() -> list[str]:
+            found[:] = drivers(self._node)
+            return [name for name in found if name.rpartition("/")[0] == own]
+
+        if not self._wait(here, FOUND_WITHIN_S):
+            place = f"in the namespace {own}" if own else "without a namespace"
+            others = (
+                f"there are {', '.join(found)}: choose by --namespace"
+                if found
+                else "nor any other: start it (ros2 run omnibot_driver driver), and check that"
+                " ROS_DOMAIN_ID is the same"
+            )
+            raise ToolError(f"no driver is running {place}; {others}")
+        if len(here()) > 1:
+            raise ToolError(f"there are several drivers here: {', '.join(here())}; end all but one")
+        return here()[0]
+
+    def _get_parameters(self) -> dict[str, Value]:
+        names = [parameter.name for parameter in PARAMETERS]
+        request = GetParameters.Request(names=names)
+        answer = self._call(GetParameters, f"{self.driver}/get_parameters", request)
+        values = [parameter_value_to_python(value) for value in answer.values]
+        return {
+            name: list(value) if isinstance(value, Sequence) and type(value) is not str else value
+            for name, value in zip(names, values, strict=False)
+        }
+
+    def set_parameters(self, values: Mapping[str, Value]) -> None:
+        """In the running driver. Raises ToolError with its reason for a refusal."""
+        messages = [
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
+        ]
+        request = SetParameters.Request(parameters=messages)
+        answer = self._call(SetParameters, f"{self.driver}/set_parameters", request)
+        for name, result in zip(values, answer.results, strict=True):
+            if not result.successful:
+                raise ToolError(f"the driver refuses {name}: {result.reason}")
+        self.parameters.update(values)
+
+    def apply(self, values: Mapping[str, Value]) -> None:
+        """Likewise, those that may change while the driver runs."""
+        changeable = {name: value for name, value in values.items() if not BY_NAME[name].fixed}
+        if changeable:
+            self.set_parameters(changeable)
+
+    def call(self, service: str, on: bool | None = None) -> str:
+        """A service of the driver, with ``data`` where it takes any; what it answers.
+
+        Raises ToolError where the driver says that it failed.
+        """
+        kind = Trigger if on is None else SetBool
+        request = Trigger.Request() if on is None else SetBool.Request(data=on)
+        answer = self._call(kind, f"{self.driver}/{service}", request)
+        if not answer.success:
+            raise ToolError(f"~/{service}: {answer.message}")
+        return str(answer.message)
+
+    def _call(self, kind: Any, name: str, request: Any) -> Any:
+        client = self._node.create_client(kind, name)
+        try:
+            if not self._wait(client.service_is_ready, FOUND_WITHIN_S):
+                raise ToolError(f"{name} is not there: does the driver still run?")
+            future = client.call_async(request)
+            if not self._wait(future.done, ANSWER_WITHIN_S):
+                raise ToolError(f"{name} does not answer: does the driver still run?")
+            return future.result()
+        finally:
+            self._node.destroy_client(client)
+
+    def _wait(self, done: Callable[[], object], seconds: float) -> bool:
+        """Whether it came about."""
+        deadline_s = time.monotonic() + seconds
+        while not (held := done()) and time.monotonic() < deadline_s:
+            self._spin(0.05)
+        return bool(held)
+
+    def _spin(self, seconds: float) -> None:
+        self._interruption.check()
+        self._hear(seconds)
+
+    def _hear(self, seconds: float) -> None:
+        deadline_s = time.monotonic() + seconds
+        while (left_s := deadline_s - time.monotonic()) > 0:
+            self._executor.spin_once(timeout_sec=left_s)
+
+
+def drivers(node: Node) -> list[str]:
+    """Full names of the drivers that run, by the service that only they have."""
+    offered = (name for name, _kinds in node.get_service_names_and_types())
+    tail = "/calibrate_gyro"
+    return sorted(name.removesuffix(tail) for name in offered if name.endswith(tail))

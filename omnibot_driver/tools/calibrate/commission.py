@@ -1,0 +1,262 @@
+"""``calibrate commission``: a guided walk that finds which way round everything is.
+
+What the board's data can tell is taken from them; a person is asked for the rest, which is what the
+wheels really do, and to hold the robot. An answer that cannot be is told, and asked for again.
+"""
+
+import argparse
+import math
+from collections.abc import Callable
+from typing import Any, Final, TypeVar
+
+from omnibot_driver.core.board import Vector3
+from omnibot_driver.tools.calibrate.commission_result import Found, result_of
+from omnibot_driver.tools.calibrate.console import Console
+from omnibot_driver.tools.calibrate.log import Log
+from omnibot_driver.tools.calibrate.meaning import (
+    control_method,
+    deltas_are_understood,
+    drift,
+    frame_is_right,
+    require_motion,
+)
+from omnibot_driver.tools.calibrate.motion import Bounds, stairs, steady
+from omnibot_driver.tools.calibrate.mounting import (
+    Mounting,
+    bias,
+    mounting,
+    require_left_turn,
+    up,
+)
+from omnibot_driver.tools.calibrate.result import Result
+from omnibot_driver.tools.calibrate.seen import (
+    AXES,
+    WHEELS,
+    Contradiction,
+    Pattern,
+    axis_sign,
+    in_words,
+    understand,
+    wheel_sign,
+)
+from omnibot_driver.tools.needs import ToolError
+
+PARTS: Final = ("board", "wheels", "imu")
+TRIES: Final = 3
+JOG_S: Final = 2.0
+WHEEL_RADPS: Final = 2.0
+"""docs/commissioning.md, step 5; the axes too."""
+AXIS_SPEEDS: Final[tuple[Vector3, ...]] = ((0.05, 0.0, 0.0), (0.0, 0.05, 0.0), (0.0, 0.0, 0.3))
+SLOW_LSB, FAST_LSB = 4, 8
+"""Of Vx, 0.06 and 0.11 m/s by default: whole words, so that one is exactly twice the other."""
+TURN_RADPS: Final = 0.5
+TURN_RAD: Final = 1.6
+HELD_S: Final = 1.5
+TURN_BY_HAND_S: Final = 5.0
+SETTLING_S: Final = 0.5
+
+T = TypeVar("T")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to leave out."""
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        choices=PARTS,
+        default=PARTS,
+        metavar="PART",
+        help=f"some of {', '.join(PARTS)} (default: all)",
+    )
+
+
+def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
+    """Raises ToolError where an answer stays impossible."""
+    walk = Walk(robot, console)
+    found = Found(before=robot.parameters)
+    if "board" in arguments.only or "wheels" in arguments.only:
+        console.confirm(
+            "The wheels will turn, slowly, one by one and together. Is the robot on a box, all"
+            " wheels off the ground, somebody at its power switch?"
+        )
+    if "board" in arguments.only:
+        walk.board(found)
+    if "wheels" in arguments.only:
+        walk.wheels(found)
+    if "imu" in arguments.only:
+        found.mounting = walk.imu()
+    return result_of(found)
+
+
+class Walk:
+    """The conversation, with a robot in it."""
+
+    def __init__(self, robot: Any, console: Console) -> None:
+        self._robot, self._console = robot, console
+        self._obeys = True
+
+    # What the data tell
+
+    def board(self, found: Found) -> None:
+        """Where the switch stands, and what the deltas are."""
+        say = self._console.say
+        slow_mps = SLOW_LSB / self._robot.parameters["linear_scale"]
+        say("The mode switch: forward slowly, then twice as fast.")
+        log = self._drive(
+            [(JOG_S, (slow_mps, 0.0, 0.0)), (JOG_S, (2 * slow_mps, 0.0, 0.0))], obeys=False
+        )
+        began_s = log.commands.stamp_s[0]
+        require_motion(log.odometry)
+        slow, fast = (
+            drift(log.odometry, began_s + after_s + SETTLING_S, began_s + after_s + JOG_S)
+            for after_s in (0.0, JOG_S)
+        )
+        found.control_method = control_method(slow, fast, slow_mps)
+        if found.control_method == "position":
+            say(
+                f"Told {slow_mps:.3f} m/s, then {2 * slow_mps:.3f}, it went {slow.late_mps:.3f}"
+                f" and {fast.late_mps:.3f} in the end: positional control."
+            )
+            return
+        say(f"{slow.speed_mps:.3f} m/s, then {fast.speed_mps:.3f}: velocity control.")
+        say("The deltas: a turn on the spot, then forward once more.")
+        seconds = TURN_RAD / TURN_RADPS
+        log = self._drive([(seconds, (0.0, 0.0, TURN_RADPS))], obeys=False)
+        began_s = log.commands.stamp_s[0]
+        turning = drift(log.odometry, began_s + SETTLING_S, began_s + seconds)
+        frame = str(found.before["delta_frame"])
+        if not deltas_are_understood(turning, found.before["base_radius"]):
+            found.delta_frame = "earth" if frame == "wheel_counts" else "wheel_counts"
+            say(
+                f"By the deltas it went {turning.speed_mps:.3f} m/s sideways in a turn on the spot:"
+                f" they are not what delta_frame: {frame} says, but {found.delta_frame}."
+            )
+            self._obeys = False  # no speed that the driver tells is right
+            return
+        turned_rad = float(log.odometry.pose[-1, 2] - log.odometry.pose[0, 2])
+        log = self._drive([(JOG_S, (2 * slow_mps, 0.0, 0.0))], obeys=False)
+        began_s = log.commands.stamp_s[0]
+        again = drift(log.odometry, began_s + SETTLING_S, began_s + JOG_S)
+        right = frame == "wheel_counts" or frame_is_right(fast, again, turned_rad)
+        found.delta_frame = frame if right else {"earth": "body", "body": "earth"}[frame]
+        verdict = "as before" if right else "and by the deltas it went elsewhere"
+        say(f"Turned by {turned_rad:.2f} rad, {verdict}: the deltas are {found.delta_frame}.")
+
+    # What eyes tell
+
+    def wheels(self, found: Found) -> None:
+        """Which wheel is which, and the signs of the axes."""
+        self._console.say(
+            "Look at each wheel from outside, towards the robot's centre. By the manual A is front"
+            " right, B front left, C at the back.\nAnswer with three signs, for A, B and C:"
+            " + counter-clockwise, - clockwise, 0 still; such as +00. (r: show it again)"
+        )
+        signs = [self._until_possible(lambda n=wheel: self._wheel(n)) for wheel in range(3)]  # type: ignore[misc]
+        a, b, c = signs
+        found.wheel_signs = (a, b, c)
+        if len(set(signs)) > 1:
+            odd = WHEELS[next(n for n in range(3) if signs.count(signs[n]) == 1)]
+            raise ToolError(
+                f"wheel {odd} turns the other way than the two others: no parameter mends a single"
+                " wheel; check how its motor and encoder are connected, then begin again"
+            )
+        if found.control_method == "position":
+            self._console.say("The axes cannot be looked at with the switch on positional control.")
+            return
+        seen = [self._until_possible(lambda n=axis: self._axis(n)) for axis in range(3)]  # type: ignore[misc]
+        x, y, yaw = (now * sign for now, sign in zip(found.before["axis_signs"], seen, strict=True))
+        found.axis_signs = (x, y, yaw)
+
+    def _wheel(self, wheel: int) -> int:
+        a, b, c = (WHEEL_RADPS if n == wheel else 0.0 for n in range(3))
+        seen = self._show(f"wheel_cmd for wheel {WHEELS[wheel]} alone", (a, b, c), "wheel_cmd")
+        sign = wheel_sign(wheel, seen)
+        self._console.say(
+            f"Wheel {WHEELS[wheel]} is where it should be"
+            + (" and turns as the manual says." if sign > 0 else ", and turns the other way.")
+        )
+        return sign
+
+    def _axis(self, axis: int) -> int:
+        seen = self._show(f"cmd_vel, +{AXES[axis]}", AXIS_SPEEDS[axis], "cmd_vel")
+        sign = axis_sign(axis, seen)
+        self._console.say(
+            f"+{AXES[axis]} is "
+            + ("right as it is." if sign > 0 else "reversed: its sign in axis_signs changes.")
+        )
+        return sign
+
+    def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
+        """Have it move until the answer makes a pattern."""
+        while True:
+            self._console.say(f"\n{what}:")
+            self._drive([(JOG_S, command)], topic=topic, obeys=self._obeys)
+            seen = self._console.ask(
+                "What did A, B, C do?",
+                _understand,
+                "Please answer with three of + - 0, such as +00, or r to see it again.",
+            )
+            if seen:
+                self._console.say(f"So: {in_words(seen)}.")
+                a, b, c = seen
+                return a, b, c
+
+    # What gravity tells
+
+    def imu(self) -> Mounting:
+        """How the IMU is mounted."""
+        console = self._console
+        console.say(
+            "\nThe IMU. The motors stay off; hold the robot as you are asked to, and keep it still."
+        )
+        return self._until_possible(self._postures)
+
+    def _postures(self) -> Mounting:
+        ask = self._console.wait
+        ask("Put it down level, untouched.")
+        resting = self._robot.rest(HELD_S).imu
+        level = up(resting)
+        ask("Raise its front by about 30°, hold it.")
+        nose_up = up(self._robot.rest(HELD_S).imu)
+        ask("Put it down; raise its left side by about 30°, hold it.")
+        left_up = up(self._robot.rest(HELD_S).imu)
+        found = mounting(level, nose_up, left_up)
+        ask(
+            "Put it down. After Enter turn it to the left by hand, by a quarter turn or more,"
+            f" within {TURN_BY_HAND_S:.0f} s."
+        )
+        turn_rad = require_left_turn(self._robot.rest(TURN_BY_HAND_S).imu, bias(resting), level)
+        self._console.say(f"Turned to the left by {turn_rad:.1f} rad: gyro and gravity agree.")
+        return found
+
+    # Both
+
+    def _until_possible(self, find: Callable[[], T]) -> T:
+        """What was found, once it can be so. Raises ToolError after a few times."""
+        for _ in range(TRIES):
+            try:
+                return find()
+            except Contradiction as error:
+                said = str(error)
+                self._console.say(f"That cannot be: {said}. Once more.")
+        raise ToolError(f"{said}; this does not become clear, see docs/commissioning.md")
+
+    def _drive(
+        self, plan: list[tuple[float, Vector3]], *, topic: str = "cmd_vel", obeys: bool
+    ) -> Log:
+        fastest = max(max(map(abs, command)) for _, command in plan)
+        bounds = Bounds(
+            speed=fastest + 1e-6,
+            way=math.inf,
+            seconds=sum(seconds for seconds, _ in plan) + 2.0,
+            acceleration=math.inf,
+            angular_acceleration=math.inf,
+        )
+        law = stairs(plan) if len(plan) > 1 else steady(plan[0][1], plan[0][0])
+        log: Log = self._robot.drive(law, bounds, topic=topic, obeys=obeys)
+        return log
+
+
+def _understand(answer: str) -> tuple[int, ...] | None:
+    """A pattern, or nothing to see it again."""
+    return () if answer == "r" else understand(answer)

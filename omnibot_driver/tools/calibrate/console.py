@@ -1,0 +1,137 @@
+"""The conversation with whoever stands beside the robot: questions, progress, the table.
+
+``read`` is what answers; tests answer themselves.
+"""
+
+import math
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Final, TypeVar
+
+from rich.console import Console as RichConsole
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from omnibot_driver.tools.calibrate.result import Finding
+from omnibot_driver.tools.needs import ToolError
+
+T = TypeVar("T")
+
+PLAIN_WIDTH: Final = 100
+"""Of what goes into a pipe or a file."""
+
+
+class Console:
+    """``yes``: yes to every question; figures are still asked for, nobody else knows them."""
+
+    def __init__(
+        self, *, yes: bool = False, read: Callable[[str], str] = input, file: object = None
+    ) -> None:
+        out = file or sys.stdout
+        terminal = bool(getattr(out, "isatty", lambda: False)())
+        self.rich = RichConsole(
+            file=out,  # type: ignore[arg-type]
+            highlight=False,
+            width=None if terminal else PLAIN_WIDTH,
+        )
+        self._yes, self._read = yes, read
+
+    def say(self, text: str = "") -> None:
+        """A paragraph."""
+        self.rich.print(text, markup=False)
+
+    def confirm(self, question: str) -> None:
+        """Raises ToolError unless the answer is yes."""
+        if not self.asks(question):
+            raise ToolError("you said no, so nothing was moved or written")
+
+    def asks(self, question: str) -> bool:
+        """Yes or no; no unless said."""
+        if self._yes:
+            self.say(f"{question} yes (--yes)")
+            return True
+        return self._answer(f"{question} [y/N] ").lower() in ("y", "yes")
+
+    def choose(self, question: str, answers: Sequence[str]) -> str:
+        """One of these words, by the beginning that tells it from the others."""
+        while True:
+            answer = self._answer(f"{question} [{'/'.join(answers)}] ").lower()
+            fitting = [one for one in answers if answer and one.lower().startswith(answer)]
+            if answer in answers:
+                return answer
+            if len(fitting) == 1:
+                return fitting[0]
+            self.say(f"Please answer one of: {', '.join(answers)}.")
+
+    def number(self, question: str, unit: str, low: float, high: float) -> float:
+        """A figure in this unit and range."""
+        while True:
+            answer = self._answer(f"{question} in {unit}: ")
+            try:
+                value = float(answer.replace(",", "."))
+            except ValueError:
+                value = math.nan
+            if low <= value <= high:
+                return value
+            self.say(f"Please type a number of {unit} from {low:g} to {high:g}.")
+
+    def ask(self, question: str, understand: Callable[[str], T | None], otherwise: str) -> T:
+        """What an answer means; ``otherwise`` is said to one that means nothing."""
+        while (meant := understand(self._answer(f"{question} "))) is None:
+            self.say(otherwise)
+        return meant
+
+    def wait(self, request: str) -> None:
+        """Until whoever is there has done what no program can."""
+        self._answer(f"{request} [Enter] ")
+
+    @contextmanager
+    def progress(self, what: str) -> Iterator[Callable[[float], None]]:
+        """Shows how far it is; the caller tells the part done, from 0 to 1."""
+        if not self.rich.is_terminal:
+            self.say(f"{what} ...")
+            yield lambda _part: None
+            return
+        columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=self.rich, transient=True) as bar:
+            task = bar.add_task(what, total=1.0)
+            yield lambda part: bar.update(task, completed=min(1.0, max(0.0, part)))
+        self.say(f"{what}: done")
+
+    def table(self, title: str, findings: Sequence[Finding]) -> None:
+        """Value ± uncertainty, and what the driver has now."""
+        table = Table(title=title, title_justify="left", pad_edge=False)
+        for heading in ("", "found", "±", "unit", "now"):
+            table.add_column(heading, justify="left" if heading in ("", "unit") else "right")
+        for one in findings:
+            value, sigma, before = digits(one)
+            table.add_row(one.name, value, sigma, one.unit, before)
+        self.rich.print(table)
+
+    def _answer(self, question: str) -> str:
+        try:
+            return self._read(question).strip()
+        except EOFError:
+            raise ToolError(
+                f"nobody answered “{question.strip()}”: run it in a terminal, or pipe answers in"
+            ) from None
+
+
+def digits(finding: Finding) -> tuple[str, str, str]:
+    """Value, uncertainty and the value before, to two figures of the uncertainty."""
+    value, sigma, before = finding.value, finding.sigma, finding.before
+    places = None
+    if sigma and math.isfinite(sigma):
+        places = max(0, 1 - math.floor(math.log10(sigma)))
+    return (
+        _number(value, places),
+        "" if sigma is None else _number(sigma, places),
+        "" if before is None else _number(before, places),
+    )
+
+
+def _number(value: float | str, places: int | None) -> str:
+    if isinstance(value, str):
+        return value
+    return f"{value:.6g}" if places is None else f"{value:.{places}f}"

@@ -1,0 +1,78 @@
+"""Where a calibration goes: the driver's calibration file, and a picture."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from omnibot_driver import calibration
+from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.parameters import BY_NAME
+from omnibot_driver.tools.calibrate.result import Result
+from omnibot_driver.tools.needs import ToolError
+
+DEFAULT = "omnibot_calibration.yaml"
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def output_file(given: str | None, drivers: str) -> Path:
+    """The file to write: the one given, else the driver's own, else one in this folder.
+
+    Raises ToolError where it cannot be written or holds something else.
+    """
+    path = Path(given or drivers or DEFAULT).expanduser()
+    try:
+        calibration.load(path)
+        content: Any = yaml.safe_load(path.read_text(encoding="utf-8")) if path.exists() else {}
+    except ParameterError as error:
+        raise ToolError(f"{error}; or name another file with --output") from error
+    if any(isinstance(part, dict) and "ros__parameters" in part for part in _values(content)):
+        raise ToolError(
+            f"{path} is a file of ROS parameters: give --output a file of its own, and have the"
+            " driver load it with the parameter calibration_file"
+        )
+    _require_writable(path)
+    return path
+
+
+def picture_file(given: str | None, subcommand: str) -> Path:
+    """The file to draw into; a folder, or none given, gets ``calibrate_<subcommand>.png``."""
+    path = Path(given or ".").expanduser()
+    if path.is_dir():
+        path = path / f"calibrate_{subcommand}.png"
+    if path.suffix.lower() not in PICTURES:
+        raise ToolError(
+            f"--plot {given} is no folder, nor a picture this tool can draw: let it end in"
+            f" {', '.join(PICTURES)}"
+        )
+    _require_writable(path)
+    return path
+
+
+def write(result: Result, output: Path, picture: Path) -> None:
+    """Both files; raises ToolError."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 6), layout="constrained")
+    FigureCanvasAgg(figure)
+    result.draw(figure)
+    try:
+        figure.savefig(picture, dpi=110)
+        if result.parameters or result.record:
+            for name, value in result.parameters.items():
+                BY_NAME[name].check(value)
+            calibration.save(output, {**result.record, **result.parameters})
+    except (OSError, ParameterError) as error:
+        raise ToolError(f"the result cannot be written: {error}") from error
+
+
+def _values(content: Any) -> list[Any]:
+    return list(content.values()) if isinstance(content, dict) else []
+
+
+def _require_writable(path: Path) -> None:
+    folder = next(one for one in path.absolute().parents if one.exists())
+    if not (folder.is_dir() and os.access(folder, os.W_OK)) or path.is_dir():
+        raise ToolError(f"{path} cannot be written: choose another place")

@@ -1,0 +1,209 @@
+"""``calibrate geometry``: lines, turns and squares, and a tape measure: wheel and base radius."""
+
+import argparse
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.tools.calibrate.arguments import positive, whole
+from omnibot_driver.tools.calibrate.console import Console
+from omnibot_driver.tools.calibrate.geometry_figure import draw
+from omnibot_driver.tools.calibrate.geometry_fit import Geometry, Reading, fit, rolled
+from omnibot_driver.tools.calibrate.log import Column
+from omnibot_driver.tools.calibrate.motion import Bounds
+from omnibot_driver.tools.calibrate.result import Finding, Result
+from omnibot_driver.tools.calibrate.waypoints import square, visit
+from omnibot_driver.tools.needs import ToolError
+
+PLAIN: Final = 0.005
+"""A wheel that differs from the others by more is worth a word."""
+INTRODUCTION: Final = """\
+You need a tape measure, something to mark the floor with, and a plumb or a fixed point under the
+robot's centre. Before each drive mark where the centre is and where the front points; after it you
+are asked where the robot has got to, seen from those marks: forward and left count as positive,
+back and right as negative. Let it go where it goes, and do not push it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """``places`` to go through; ``heading``: whether the heading is measured, else the place."""
+
+    name: str
+    places: list[Pose]
+    heading: bool
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Of this subcommand alone."""
+    parser.add_argument(
+        "--side", type=positive, default=1.0, help="of lines and squares, m (default %(default)s)"
+    )
+    parser.add_argument(
+        "--turns", type=whole, default=3, help="on the spot, each way (default %(default)s)"
+    )
+    parser.add_argument(
+        "--speed", type=positive, default=0.2, help="fastest, m/s (default %(default)s)"
+    )
+    parser.add_argument(
+        "--turning", type=positive, default=0.5, help="fastest, rad/s (default %(default)s)"
+    )
+    parser.add_argument(
+        "--tape",
+        type=positive,
+        default=2.0,
+        help="how exact your tape is, mm (default %(default)s)",
+    )
+    parser.add_argument(
+        "--angle",
+        type=positive,
+        default=1.0,
+        help="how exactly you read a heading, degrees (default %(default)s)",
+    )
+    parser.add_argument(
+        "--without-squares", action="store_true", help="lines and turns only: faster, less certain"
+    )
+
+
+def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
+    """Raises ToolError."""
+    console.say(INTRODUCTION)
+    drives = plan(arguments.side, arguments.turns, squares=not arguments.without_squares)
+    console.confirm(
+        f"The robot will make {len(drives)} drives, within {arguments.side:g} m of where each one"
+        f" begins, at up to {arguments.speed:g} m/s. Is there room for it?"
+    )
+    readings = []
+    for number, drive in enumerate(drives, 1):
+        console.wait(f"Drive {number} of {len(drives)}: {drive.name}. Mark the floor.")
+        path = _drive(robot, console, drive, arguments)
+        readings.append(_reading(console, drive, path, arguments))
+    return result(readings, fit(readings, robot.parameters["base_radius"]), robot.parameters)
+
+
+def plan(side_m: float, turns: int, *, squares: bool) -> list[Drive]:
+    """What to drive, one after the other."""
+    angle_rad = math.tau * turns
+    drives = [
+        Drive(f"{turns} turns to the left", [Pose(0.0, 0.0, angle_rad)], True),
+        Drive(f"{turns} turns to the right", [Pose(0.0, 0.0, -angle_rad)], True),
+        Drive(f"{side_m:g} m forward", [Pose(side_m, 0.0, 0.0)], False),
+        Drive(f"{side_m:g} m to the left", [Pose(0.0, side_m, 0.0)], False),
+    ]
+    if squares:
+        drives += [
+            Drive("a square to the left", square(side_m, 1), False),
+            Drive("a square to the right", square(side_m, -1), False),
+        ]
+    return drives
+
+
+def _drive(robot: Any, console: Console, drive: Drive, arguments: argparse.Namespace) -> Column:
+    now = robot.parameters
+    speed = min(arguments.speed, now["max_linear_speed"])
+    turning = min(arguments.turning, now["max_angular_speed"])
+    if not (speed and turning):
+        raise ToolError("max_linear_speed or max_angular_speed is 0: the robot may not move")
+    way_m = turn_rad = 0.0
+    for before, after in zip([Pose(), *drive.places], drive.places, strict=False):
+        way_m += (after - before).way_m
+        turn_rad += abs((after - before).yaw_rad)
+    seconds = way_m / speed + turn_rad / turning + 2.0 * len(drive.places)
+    bounds = Bounds(
+        speed=speed + 1e-6,
+        turning=turning + 1e-6,
+        way=1.5 * arguments.side + 0.2,
+        turn=abs(drive.places[-1].yaw_rad) + 1.0,
+        seconds=3 * seconds,
+    )
+    with console.progress(f"Driving {drive.name}") as told:
+        law = visit(drive.places, speed, turning)
+        log = robot.drive(law, bounds, show=lambda s: told(s / seconds))
+    path: Column = log.odometry.pose
+    if not len(path) or not np.isfinite(path).all():
+        raise ToolError("odom gave no finite poses: see what the driver logs")
+    return path
+
+
+def _reading(
+    console: Console, drive: Drive, path: Column, arguments: argparse.Namespace
+) -> Reading:
+    end = np.full(3, math.nan)
+    if drive.heading:
+        past_deg = console.number(
+            "How far past its mark does the front point, left +, right -", "degrees", -170.0, 170.0
+        )
+        end[2] = drive.places[-1].yaw_rad + math.radians(past_deg)
+    else:
+        far_mm = 3000.0 * arguments.side
+        for axis, question in enumerate(("forward of", "to the left of")):
+            asked = f"How far {question} its mark is the robot's centre"
+            end[axis] = console.number(asked, "mm", -far_mm, far_mm) / 1000.0
+    sigma = np.array([arguments.tape / 1000.0] * 2 + [math.radians(arguments.angle)])
+    return Reading(drive.name, path, end, sigma)
+
+
+def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any]) -> Result:
+    """What to show and to write of a geometry; ``now`` are the driver's parameters."""
+    wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance)[:2])
+    factors = {
+        "wheel_radius": (found.wheels, float(wheels_sigma), "m"),
+        "base_radius": (found.base, float(base_sigma), "m"),
+    }
+    if now["delta_frame"] != "wheel_counts":  # the board computes with sizes of its own
+        factors["odom_linear_scale"] = (found.wheels, float(wheels_sigma), "m/m")
+        factors["odom_angular_scale"] = (found.turn, found.turn_sigma, "rad/rad")
+    findings = [
+        Finding(
+            name=name, value=now[name] * factor, sigma=now[name] * sigma, unit=unit,
+            before=now[name],
+        )
+        for name, (factor, sigma, unit) in factors.items()
+    ]  # fmt: skip
+    findings += [
+        Finding(name=f"wheel {wheel} over the mean", value=100 * float(more),
+                sigma=100 * float(sigma), unit="%")
+        for wheel, more, sigma in zip("ABC", found.unlike, found.unlike_sigma, strict=True)
+    ]  # fmt: skip
+    before, after = misses(readings, found, now["base_radius"])
+    notes = [
+        f"The odometry was off by {before * 1000:.0f} mm in the mean; with these values it would"
+        f" have been by {after * 1000:.0f} mm.",
+        "Speeds are another matter: now run `calibrate scale`, with these values loaded.",
+    ]
+    notes += [
+        f"Wheel {wheel} is {abs(more):.1%} {'larger' if more > 0 else 'smaller'} than the mean,"
+        " which no parameter mends: look at its rollers, and whether all wheels carry alike."
+        for wheel, more, sigma in zip("ABC", found.unlike, found.unlike_sigma, strict=True)
+        if abs(more) > max(PLAIN, 3 * sigma)
+    ]
+    if found.excess > 2.0:
+        notes.append(
+            f"The readings scatter {found.excess:.1f} times as much as --tape and --angle allow,"
+            " and the uncertainties are that much larger: was one misread, or does the robot slip?"
+        )
+    return Result(
+        findings=findings,
+        parameters={name: now[name] * factor for name, (factor, _, _) in factors.items()},
+        notes=notes,
+        draw=lambda figure: draw(figure, readings, found, now["base_radius"]),
+    )
+
+
+def misses(
+    readings: Sequence[Reading], found: Geometry, base_radius_m: float
+) -> tuple[float, float]:
+    """Mean distance in m of measured places from those of the odometry, before and after. The
+    driver has one radius for all wheels, so their differences are not made use of.
+    """
+    before: list[float] = []
+    after: list[float] = []
+    for one in readings:
+        if not np.isnan(one.end[:2]).any():
+            for sizes, into in (((1.0, 1.0), before), ((found.wheels, found.base), after)):
+                end = rolled(one.path, np.full(3, sizes[0]), sizes[1], base_radius_m)[-1]
+                into.append(float(np.hypot(*(end - one.end)[:2])))
+    return sum(before) / len(before), sum(after) / len(after)

@@ -1,0 +1,55 @@
+"""The picture of ``calibrate geometry``."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from omnibot_driver.tools.calibrate.geometry_fit import Geometry, Reading, rolled
+from omnibot_driver.tools.calibrate.log import Column
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def draw(
+    figure: "Figure", readings: Sequence[Reading], found: Geometry, base_radius_m: float
+) -> None:
+    """Where the odometry believed to be, where it would now, and where the tape found the robot;
+    then how far each reading is off, before and after, in its own standard deviations.
+    """
+    left, right = figure.subplots(1, 2, width_ratios=(3, 2))
+    placed = [one for one in readings if not np.isnan(one.end[:2]).any()]
+    for number, one in enumerate(placed):
+        colour = f"C{number}"
+        was = rolled(one.path, np.ones(3), 1.0, base_radius_m)
+        now = _with(one, found, base_radius_m)
+        left.plot(was[:, 0], was[:, 1], ":", color=colour)
+        left.plot(now[:, 0], now[:, 1], color=colour, label=one.name)
+        left.errorbar(*one.end[:2], *one.sigma[:2], fmt="x", ms=9, mew=2, color=colour)
+    left.plot([], [], ":", color="grey", label="as odom had it")
+    left.plot([], [], "x", color="grey", label="by the tape")
+    left.set(title="Drives, with the geometry found", xlabel="forward, m", ylabel="left, m")
+    left.set_aspect("equal")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    labels, before, after = [], [], []
+    for one in readings:
+        was = rolled(one.path, np.ones(3), 1.0, base_radius_m)[-1]
+        now = _with(one, found, base_radius_m)[-1]
+        for axis, what in enumerate(("x", "y", "heading")):
+            if not np.isnan(one.end[axis]):
+                labels.append(f"{one.name}, {what}")
+                before.append(abs(was[axis] - one.end[axis]) / one.sigma[axis])
+                after.append(abs(now[axis] - one.end[axis]) / one.sigma[axis])
+    rows = np.arange(len(labels))
+    right.barh(rows - 0.2, before, 0.4, color="tab:grey", label="before")
+    right.barh(rows + 0.2, after, 0.4, color="tab:green", label="after")
+    right.set_yticks(rows, labels, fontsize="small")
+    right.invert_yaxis()
+    right.set(title="Off by", xlabel="standard deviations of the reading", xscale="symlog")
+    right.legend()
+
+
+def _with(reading: Reading, found: Geometry, base_radius_m: float) -> Column:
+    factors = found.wheels * (1 + found.unlike)
+    return rolled(reading.path, factors, found.base, base_radius_m)

@@ -1,0 +1,128 @@
+"""From where the odometry believed to be and where the tape found the robot, to its geometry. Pure.
+
+Every way of the odometry is taken back to what the wheels rolled, and rolled again with wheels and
+a base of other sizes; the sizes that end where the tape says are the ones. So any mixture of lines,
+turns and squares will do, as far as it tells the sizes apart. After J. Borenstein and L. Feng,
+"UMBmark: a benchmark test for measuring odometry errors in mobile robots" (1995), for three wheels.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.tools.calibrate.log import Column
+from omnibot_driver.tools.needs import ToolError
+
+WHEELS_ALIKE: Final = 0.01
+"""Relative standard deviation of one wheel's radius from the mean, as wheels are made."""
+UNKNOWN: Final = 0.2
+"""Sizes further from the believed ones are no sizes but a mistake."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """``path``: (n, 3) poses of the odometry, the last one at rest; ``end``: (3,) where the robot
+    truly ended, seen from where it began, in m, m and unwrapped rad, NaN where nobody measured;
+    ``sigma``: (3,) of the measurement.
+    """
+
+    name: str
+    path: Column
+    end: Column
+    sigma: Column
+
+
+@dataclass(frozen=True, slots=True)
+class Geometry:
+    """Sizes over the believed ones: ``wheels`` (the mean radius), ``base``, and by how much each
+    wheel exceeds the mean (``unlike``: (3,), relative). ``covariance``: (4, 4), of wheels, base and
+    the first two of ``unlike``; ``excess``: misfit over what was to be expected (1: as expected).
+    """
+
+    wheels: float
+    base: float
+    unlike: Column
+    covariance: Column
+    excess: float
+
+    @property
+    def turn(self) -> float:
+        """True turn over the believed one."""
+        return self.wheels / self.base
+
+    @property
+    def turn_sigma(self) -> float:
+        """Its standard deviation."""
+        slope = np.array([1 / self.base, -self.wheels / self.base**2, 0.0, 0.0])
+        return _sigma(slope, self.covariance)
+
+    @property
+    def unlike_sigma(self) -> Column:
+        """Of each wheel's difference from the mean."""
+        slopes = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, -1, -1]], dtype=float)
+        return np.array([_sigma(slope, self.covariance) for slope in slopes])
+
+
+def fit(readings: Sequence[Reading], base_radius_m: float) -> Geometry:
+    """The geometry that explains the readings best; ``base_radius_m``: the believed one.
+
+    Raises ToolError for readings that no such robot can have made.
+    """
+
+    def misfit(sizes: Column) -> Column:
+        wheels, base, a, b = sizes
+        factors = wheels * (1 + np.array([a, b, -a - b]))
+        parts = [np.array([a, b, a + b]) / WHEELS_ALIKE]
+        for reading in readings:
+            off = rolled(reading.path, factors, base, base_radius_m)[-1] - reading.end
+            parts.append((off / reading.sigma)[~np.isnan(reading.end)])
+        return np.concatenate(parts)
+
+    count = sum(int((~np.isnan(reading.end)).sum()) for reading in readings)
+    found = least_squares(misfit, np.array([1.0, 1.0, 0.0, 0.0]), x_scale=(0.01, 0.01, 0.01, 0.01))
+    wheels, base, a, b = found.x
+    if not found.success or max(abs(wheels - 1), abs(base - 1)) > UNKNOWN:
+        raise ToolError(
+            "the readings do not fit this robot (wheel or base radius off by more than"
+            f" {UNKNOWN:.0%}): check their signs and units, and that forward is forward, then again"
+        )
+    excess = max(1.0, 2 * found.cost / max(1, count + 3 - 4)) ** 0.5
+    covariance = excess**2 * np.linalg.inv(found.jac.T @ found.jac)
+    return Geometry(float(wheels), float(base), np.array([a, b, -a - b]), covariance, excess)
+
+
+def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
+    """The (n, 3) poses, from the identity on, of the same turns of wheels whose radii are
+    ``factors`` times as large, on a base that is ``base`` times as large.
+    """
+    steps = np.diff(path, axis=0)
+    middle = path[:-1, 2] + steps[:, 2] / 2
+    cos, sin = np.cos(middle), np.sin(middle)
+    body = np.stack(
+        (cos * steps[:, 0] + sin * steps[:, 1], cos * steps[:, 1] - sin * steps[:, 0], steps[:, 2]),
+        axis=1,
+    )
+    rims = body @ _rims(base_radius_m).T * factors
+    body = rims @ np.linalg.inv(_rims(base * base_radius_m)).T
+    yaw = np.concatenate(([0.0], np.cumsum(body[:, 2])))
+    middle = yaw[:-1] + body[:, 2] / 2
+    cos, sin = np.cos(middle), np.sin(middle)
+    x = np.cumsum(cos * body[:, 0] - sin * body[:, 1])
+    y = np.cumsum(sin * body[:, 0] + cos * body[:, 1])
+    return np.stack((np.concatenate(([0.0], x)), np.concatenate(([0.0], y)), yaw), axis=1)
+
+
+def _rims(base_radius_m: float) -> Column:
+    """(3, 3): from a body's twist to the speeds of its rims."""
+    wheels = OmniKinematics(1.0, base_radius_m)
+    columns = [BodyTwist(1.0, 0.0, 0.0), BodyTwist(0.0, 1.0, 0.0), BodyTwist(0.0, 0.0, 1.0)]
+    return np.array([wheels.wheel_rates(column) for column in columns]).T
+
+
+def _sigma(slope: Column, covariance: Column) -> float:
+    return math.sqrt(float(slope @ covariance @ slope))

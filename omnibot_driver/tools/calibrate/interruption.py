@@ -1,0 +1,63 @@
+"""Ctrl-C, a lost SSH session and kill: told when somebody asks, except while a person is asked.
+
+Inside ROS an exception at any place would leave the executor half done.
+"""
+
+import signal
+import threading
+from collections.abc import Callable
+from types import FrameType, TracebackType
+from typing import Self
+
+from omnibot_driver.tools.needs import ToolError
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Interrupted(ToolError):
+    """Somebody wants this to end."""
+
+
+class Interruption:
+    """While it is entered, the signals are its own. Outside the main thread it hears nothing."""
+
+    def __init__(self) -> None:
+        self._requested = self._asking = False
+
+    def __enter__(self) -> Self:
+        self._before = {}
+        if threading.current_thread() is threading.main_thread():
+            self._before = {number: signal.signal(number, self._heard) for number in SIGNALS}
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        at: TracebackType | None,
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def check(self) -> None:
+        """Raises Interrupted once a signal has come."""
+        if self._requested:
+            raise Interrupted("interrupted: the robot is told to stand still, nothing was written")
+
+    def reading(self, read: Callable[[str], str]) -> Callable[[str], str]:
+        """The same way of asking, but a signal ends it."""
+
+        def ask(question: str) -> str:
+            self.check()
+            self._asking = True
+            try:
+                return read(question)
+            finally:
+                self._asking = False
+
+        return ask
+
+    def _heard(self, _number: int, _frame: FrameType | None) -> None:
+        self._requested = True
+        if self._asking:
+            self.check()

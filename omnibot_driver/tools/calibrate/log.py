@@ -1,0 +1,88 @@
+"""What was heard of a robot and told to it during one motion or one rest, as columns.
+
+Times are in seconds by ROS's clock; those of measurements are when the board sampled. Knows no ROS.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Column = NDArray[np.float64]
+Row = tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Imu:
+    """``force_mps2`` and ``rate_radps``: (n, 3), in the sensor's axes."""
+
+    stamp_s: Column
+    force_mps2: Column
+    rate_radps: Column
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """``pose``: (n, 3), m, m and unwrapped rad; ``twist``: (n, 3), m/s and rad/s in the body."""
+
+    stamp_s: Column
+    pose: Column
+    twist: Column
+
+
+@dataclass(frozen=True, slots=True)
+class Wheels:
+    """``angle_rad`` and ``rate_radps``: (n, 3), wheels A, B, C."""
+
+    stamp_s: Column
+    angle_rad: Column
+    rate_radps: Column
+
+
+@dataclass(frozen=True, slots=True)
+class Commands:
+    """``values``: (n, 3), a twist in m/s and rad/s or wheel rates in rad/s, when it was sent."""
+
+    stamp_s: Column
+    values: Column
+
+
+@dataclass(slots=True)
+class Log:
+    """Rows as they come; columns for whoever calculates."""
+
+    imu_rows: list[Row] = field(default_factory=list)
+    odometry_rows: list[Row] = field(default_factory=list)
+    wheel_rows: list[Row] = field(default_factory=list)
+    command_rows: list[Row] = field(default_factory=list)
+
+    @property
+    def imu(self) -> Imu:
+        """Rows of a stamp, three forces and three rates."""
+        rows = _columns(self.imu_rows, 7)
+        return Imu(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
+
+    @property
+    def odometry(self) -> Odometry:
+        """Rows of a stamp, a pose and a twist."""
+        rows = _columns(self.odometry_rows, 7)
+        pose = rows[:, 1:4].copy()
+        pose[:, 2] = np.unwrap(pose[:, 2])
+        return Odometry(rows[:, 0], pose, rows[:, 4:7])
+
+    @property
+    def wheels(self) -> Wheels:
+        """Rows of a stamp, three angles and three rates (NaN where the driver gave none)."""
+        rows = _columns(self.wheel_rows, 7)
+        return Wheels(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
+
+    @property
+    def commands(self) -> Commands:
+        """Rows of a time and three values."""
+        rows = _columns(self.command_rows, 4)
+        return Commands(rows[:, 0], rows[:, 1:4])
+
+
+def _columns(rows: Sequence[Row], width: int) -> Column:
+    return np.array(rows, dtype=np.float64).reshape(len(rows), width)

@@ -1,0 +1,118 @@
+"""What the board's commands and deltas mean, told by what the wheels do. Pure calculation.
+
+Nothing here needs eyes or floor: the board's own odometry is enough, whatever its signs and scales.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from omnibot_driver.tools.calibrate.log import Column, Odometry
+from omnibot_driver.tools.needs import ToolError
+
+ControlMethod = Literal["velocity", "position"]
+
+STANDS_PART: Final = 0.1
+"""Slower than this part of what is commanded is standing."""
+STEADY_PART: Final = 0.25
+DOUBLED: Final = (1.6, 2.5)
+"""What may come of twice the command, friction and rounding considered."""
+PURE_TURN: Final = 0.5
+"""Of sideways motion to rim speed, in a turn on the spot: 0 if the deltas are understood, else 2
+or more."""
+ALIKE: Final = 0.35
+"""Of a turn: directions that differ by less are the same, by 1 minus it or more another."""
+
+
+LEAST_M: Final = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """Mean velocity of a while, as the driver understands it: the body's axes, m/s and rad/s.
+
+    ``early`` and ``late`` are the speeds of its two halves.
+    """
+
+    vx_mps: float
+    vy_mps: float
+    yaw_rate: float
+    early_mps: float
+    late_mps: float
+
+    @property
+    def speed_mps(self) -> float:
+        """Whichever way."""
+        return math.hypot(self.vx_mps, self.vy_mps)
+
+    @property
+    def direction_rad(self) -> float:
+        """In the body's plane."""
+        return math.atan2(self.vy_mps, self.vx_mps)
+
+
+def drift(odometry: Odometry, begin_s: float, end_s: float) -> Drift:
+    """Between two times by the stamps. Raises ToolError where nothing was heard."""
+    within = (odometry.stamp_s >= begin_s) & (odometry.stamp_s < end_s)
+    twist = odometry.twist[within]
+    if len(twist) < 4:
+        raise ToolError("odometry was lost while the robot moved; see /diagnostics, and try again")
+    early, late = (_speed(half) for half in np.array_split(twist, 2))
+    vx, vy, yaw_rate = (float(value) for value in twist.mean(axis=0))
+    return Drift(vx, vy, yaw_rate, early, late)
+
+
+def require_motion(odometry: Odometry) -> None:
+    """Raises ToolError for a robot that has not moved at all."""
+    if not len(odometry.pose) or np.ptp(odometry.pose[:, :2], axis=0).max() < LEAST_M:
+        raise ToolError(
+            "the robot does not move when told: check the motors' power, and what the driver logs"
+        )
+
+
+def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod:
+    """Where the switch stands, by what came of ``slow_mps`` and of twice as much.
+
+    Velocities are held and doubled. As a pose the same words are a place a few millimetres from the
+    origin of the board's frame: it is driven to, and not any further.
+    """
+    least_mps = STANDS_PART * slow_mps
+    held = all(
+        min(one.early_mps, one.late_mps) > least_mps
+        and abs(one.late_mps - one.early_mps) < STEADY_PART * one.early_mps
+        for one in (slow, fast)
+    )
+    if held and DOUBLED[0] < fast.speed_mps / slow.speed_mps < DOUBLED[1]:
+        return "velocity"
+    return "position"
+
+
+def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
+    """Whether a turn on the spot is one. Wheel counts taken for displacements, or the other way
+    round, make sideways motion of it."""
+    return turning.speed_mps < PURE_TURN * base_radius_m * abs(turning.yaw_rate)
+
+
+def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
+    """Whether the same command goes the same way in the body's axes after a turn by so much.
+
+    In the wrong one of the frames "earth" and "body" its direction has turned as well. Raises
+    ToolError where it has done neither.
+    """
+    change_rad = abs(math.remainder(after.direction_rad - before.direction_rad, math.tau))
+    if change_rad < ALIKE * abs(turned_rad):
+        return True
+    if abs(change_rad - abs(math.remainder(turned_rad, math.tau))) < ALIKE * abs(turned_rad):
+        return False
+    raise ToolError(
+        f"the odometry makes no sense: after a turn of {math.degrees(turned_rad):.0f}° the same"
+        f" command leads {math.degrees(change_rad):.0f}° elsewhere; see /diagnostics, and"
+        " docs/protocol.md"
+    )
+
+
+def _speed(twist: Column) -> float:
+    vx, vy, _ = twist.mean(axis=0)
+    return math.hypot(vx, vy)

@@ -1,0 +1,151 @@
+"""How a robot is moved for a calibration: laws, their bounds, and whether the robot obeys.
+
+Pure. A law says what is commanded at a time, given where the odometry is; None ends the motion.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from omnibot_driver.core.board import Vector3
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.tools.needs import ToolError
+
+Topic = Literal["cmd_vel", "wheel_cmd"]
+HALT: Final[Vector3] = (0.0, 0.0, 0.0)
+
+Law = Callable[[float, Pose], Vector3 | None]
+"""Seconds since the motion began, and the pose since then (yaw unwrapped), to a command: m/s, m/s
+and rad/s for ``cmd_vel``, rad/s of A, B, C for ``wheel_cmd``."""
+
+LOOK_S: Final = 1.0
+"""How long a robot is watched before it is said not to obey."""
+OBEYED_PART: Final = 0.2
+"""A robot that does less than this part of what it is told does not move."""
+PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
+"""Slower commands may be lost in friction: m/s and rad/s, rad/s of a wheel."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What one motion must not exceed. Linear in m and m/s, turning in rad and rad/s.
+
+    ``speed``, ``turning``: of commands (for wheels, ``speed`` is the fastest one's, in rad/s);
+    ``way``, ``turn``: from where it began, by the odometry; ``seconds``: altogether;
+    ``acceleration``, ``angular_acceleration``: how fast a command is changed (for wheels, the
+    first). Infinite is at once.
+    """
+
+    speed: float
+    turning: float = math.inf
+    way: float
+    turn: float = math.inf
+    seconds: float
+    acceleration: float = 0.3
+    angular_acceleration: float = 0.8
+
+    def require_allowed(self, topic: Topic, command: Vector3) -> None:
+        """Raises ToolError for a command that is too fast or not finite."""
+        if topic == "wheel_cmd":
+            allowed = max(map(abs, command)) <= self.speed
+        else:
+            twist = BodyTwist(*command)
+            allowed = not twist.faster_than(self.speed, self.turning)
+        if not (all(map(math.isfinite, command)) and allowed):
+            raise ToolError(
+                f"a command of {_numbers(command)} on {topic} is beyond this calibration's own"
+                " bounds: choose lower speeds"
+            )
+
+    def require_within(self, seconds: float, pose: Pose) -> None:
+        """Raises ToolError for a robot that is further, or drives longer, than it should."""
+        if pose.way_m > self.way:
+            where = f"{pose.way_m:.2f} m from where it began, {self.way:.2f} m allowed"
+        elif abs(pose.yaw_rad) > self.turn:
+            where = f"turned by {abs(pose.yaw_rad):.1f} rad, {self.turn:.1f} rad allowed"
+        elif seconds > self.seconds:
+            where = f"under way for {seconds:.0f} s, {self.seconds:.0f} s allowed"
+        else:
+            return
+        raise ToolError(
+            f"the robot was stopped, it went too far ({where}): check `linear_scale`,"
+            " `angular_scale` and that `odom` is right (docs/commissioning.md)"
+        )
+
+    def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:
+        """The command after so long on the straight way to what is wanted."""
+        if topic == "wheel_cmd":
+            a, b, c = _step(now, wanted, self.acceleration * seconds)
+            return a, b, c
+        vx, vy = _step(now[:2], wanted[:2], self.acceleration * seconds)
+        (yaw_rate,) = _step(now[2:], wanted[2:], self.angular_acceleration * seconds)
+        return vx, vy, yaw_rate
+
+
+class Obedience:
+    """Whether the robot does what it is told, roughly, second by second."""
+
+    def __init__(self, topic: Topic) -> None:
+        self._topic = topic
+        self._began_s = math.nan
+        self._told, self._done = [0.0, 0.0], [0.0, 0.0]
+
+    def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
+        """Raises ToolError once the robot has not moved for a second in which it was told to.
+
+        ``seconds`` since the last look; ``measured`` has the units of ``command``.
+        """
+        if math.isnan(self._began_s):
+            self._began_s = now_s
+        for number, (told, done) in enumerate(
+            zip(self._sizes(command), self._sizes(measured), strict=True)
+        ):
+            self._told[number] += told * seconds
+            self._done[number] += done * seconds
+        if now_s - self._began_s < LOOK_S:
+            return
+        told_ways, done_ways = self._told, self._done
+        self._began_s, self._told, self._done = now_s, [0.0, 0.0], [0.0, 0.0]
+        for told, done, plain in zip(told_ways, done_ways, PLAIN[self._topic], strict=True):
+            if told > plain * LOOK_S and done < OBEYED_PART * told:
+                raise ToolError(
+                    f"the robot does not move when told ({self._topic}): check the motors' power,"
+                    " the switch of the board, `linear_scale` and `angular_scale`, and what the"
+                    " driver logs"
+                )
+
+    def _sizes(self, values: Vector3) -> tuple[float, float]:
+        if self._topic == "wheel_cmd":
+            return max(map(abs, values)), 0.0
+        return math.hypot(values[0], values[1]), abs(values[2])
+
+
+def steady(command: Vector3, seconds: float) -> Law:
+    """The same command for so long."""
+    return lambda now_s, _pose: command if now_s < seconds else None
+
+
+def stairs(steps: list[tuple[float, Vector3]]) -> Law:
+    """One command after the other, each for its seconds."""
+
+    def law(now_s: float, _pose: Pose) -> Vector3 | None:
+        for seconds, command in steps:
+            if now_s < seconds:
+                return command
+            now_s -= seconds
+        return None
+
+    return law
+
+
+def _step(now: tuple[float, ...], wanted: tuple[float, ...], longest: float) -> tuple[float, ...]:
+    way = math.dist(now, wanted)
+    if way <= longest:
+        return wanted
+    return tuple(a + (b - a) * longest / way for a, b in zip(now, wanted, strict=True))
+
+
+def _numbers(vector: Vector3) -> str:
+    return "(" + ", ".join(f"{value:.3g}" for value in vector) + ")"

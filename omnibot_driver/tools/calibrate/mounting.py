@@ -1,0 +1,160 @@
+"""How the IMU is mounted, from gravity in three postures and from one turn. Pure calculation.
+
+Level, nose up and left side up, by some unknown angle each: what is straight up in the body is then
+known but for that angle, and the angle is that between two measured directions. The rotation that
+fits the three pairs best is the mounting (Wahba's problem, solved by singular values).
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import permutations, product
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnibot_driver.core.imu import STANDARD_GRAVITY
+from omnibot_driver.tools.calibrate.log import Imu
+from omnibot_driver.tools.calibrate.seen import Contradiction
+
+Array = NDArray[np.float64]
+
+STILL_RADPS: Final = 0.1
+"""Of the rate's deviations: a hand trembles less."""
+GRAVITY_PART: Final = 0.15
+LEAST_TILT_RAD: Final = math.radians(10)
+MOST_TILT_RAD: Final = math.radians(75)
+SQUARE_RAD: Final = math.radians(35)
+"""How far from a right angle two tilts by hand may be."""
+LEAST_TURN_RAD: Final = math.radians(30)
+SNAP_RAD: Final = math.radians(15)
+"""A sensor so close to right angles is mounted at right angles."""
+HAND_RAD: Final = math.radians(2)
+"""No hand tilts straighter than this, whatever the two tilts say of each other."""
+LEVEL_WEIGHT: Final = 20.0
+"""The floor is more level than a hand is straight."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mounting:
+    """``rotation``: from the sensor's axes to the body's; ``yaw_sigma_rad``: of its turn about
+    the vertical, which hands have told; ``tilts_rad``: how far it was tilted."""
+
+    rotation: Array
+    yaw_sigma_rad: float
+    tilts_rad: tuple[float, float]
+
+    @property
+    def rpy_rad(self) -> tuple[float, float, float]:
+        """Fixed-axis roll, pitch and yaw of the sensor in the body, as a URDF has them."""
+        return rpy(self.rotation)
+
+    def snapped(self) -> "Mounting | None":
+        """The one at right angles; None where it is not near."""
+        nearest = max(_right_angles(), key=lambda one: float(np.trace(one.T @ self.rotation)))
+        cosine = (float(np.trace(nearest.T @ self.rotation)) - 1.0) / 2.0
+        if math.acos(max(-1.0, min(1.0, cosine))) > SNAP_RAD:
+            return None
+        return Mounting(nearest, self.yaw_sigma_rad, self.tilts_rad)
+
+
+def up(imu: Imu) -> Array:
+    """The mean specific force: straight up, in the sensor's axes. Raises Contradiction."""
+    if not len(imu.stamp_s):
+        raise Contradiction("nothing was measured")
+    trembling = float(np.max(np.std(imu.rate_radps, axis=0)))
+    force: Array = np.mean(imu.force_mps2, axis=0)
+    length = float(np.linalg.norm(force))
+    if trembling > STILL_RADPS:
+        raise Contradiction(f"it was not held still (it turned by {trembling:.2f} rad/s rms)")
+    if abs(length / STANDARD_GRAVITY - 1.0) > GRAVITY_PART:
+        raise Contradiction(
+            f"{length:.2f} m/s² is not gravity: it was moved, or `accel_range` is wrong"
+        )
+    return force / length
+
+
+def bias(imu: Imu) -> Array:
+    """What the gyro says of rest."""
+    return np.asarray(np.mean(imu.rate_radps, axis=0))
+
+
+def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
+    """From three directions straight up, of unit length. Raises Contradiction."""
+    nose_rad, left_rad = _tilt(level, nose_up, "front"), _tilt(level, left_up, "left side")
+    forward, left = _level_part(level, nose_up), _level_part(level, left_up)
+    square_rad = math.atan2(float(level @ np.cross(forward, left)), float(forward @ left))
+    if abs(square_rad - math.pi / 2) > SQUARE_RAD:
+        raise Contradiction(
+            "raising the left side should tilt it a quarter turn to the left of where raising the"
+            f" front did, and tilted it {math.degrees(square_rad):.0f}°: one of the two was not as"
+            " asked"
+        )
+    body = np.array(
+        [
+            (0.0, 0.0, 1.0),
+            (math.sin(nose_rad), 0.0, math.cos(nose_rad)),
+            (0.0, math.sin(left_rad), math.cos(left_rad)),
+        ]
+    )
+    weights = np.diag([LEVEL_WEIGHT, 1.0, 1.0])
+    u, _, vt = np.linalg.svd(body.T @ weights @ np.array([level, nose_up, left_up]))
+    rotation = u @ vt  # no mirror image: right-handed are the three in both
+    sigma_rad = math.hypot(abs(square_rad - math.pi / 2) / math.sqrt(2), HAND_RAD)
+    return Mounting(rotation, sigma_rad, (nose_rad, left_rad))
+
+
+def require_left_turn(imu: Imu, bias_radps: Array, level: Array) -> float:
+    """The turn about straight up, in rad, of one to the left. Raises Contradiction."""
+    rate = (imu.rate_radps - bias_radps) @ level
+    turn_rad = float(np.sum((rate[1:] + rate[:-1]) / 2 * np.diff(imu.stamp_s)))
+    if abs(turn_rad) < LEAST_TURN_RAD:
+        raise Contradiction(f"it was turned by {math.degrees(turn_rad):.0f}° only")
+    if turn_rad < 0:
+        raise Contradiction(
+            f"by gyro and gravity together it was turned to the right, by"
+            f" {-math.degrees(turn_rad):.0f}°"
+        )
+    return turn_rad
+
+
+def rpy(rotation: Array) -> tuple[float, float, float]:
+    """Fixed-axis roll, pitch and yaw; of a pitch of 90°, where they are not unique, roll 0."""
+    sine = max(-1.0, min(1.0, -float(rotation[2, 0])))
+    if abs(sine) > 1.0 - 1e-9:
+        yaw = math.atan2(-float(rotation[0, 1]), float(rotation[1, 1]))
+        return 0.0, math.copysign(math.pi / 2, sine), yaw
+    return (
+        math.atan2(float(rotation[2, 1]), float(rotation[2, 2])),
+        math.asin(sine),
+        math.atan2(float(rotation[1, 0]), float(rotation[0, 0])),
+    )
+
+
+def _tilt(level: Array, tilted: Array, what: str) -> float:
+    tilt_rad = math.acos(max(-1.0, min(1.0, float(level @ tilted))))
+    if not LEAST_TILT_RAD <= tilt_rad <= MOST_TILT_RAD:
+        raise Contradiction(
+            f"with the {what} raised it was tilted by {math.degrees(tilt_rad):.0f}°; raise it by"
+            " 20° to 45°"
+        )
+    return tilt_rad
+
+
+def _level_part(level: Array, tilted: Array) -> Array:
+    """Where the tilt points to, in the level plane; of unit length."""
+    part = tilted - (tilted @ level) * level
+    return np.asarray(part / np.linalg.norm(part))
+
+
+def _right_angles() -> list[Array]:
+    """The 24 rotations that put axes on axes."""
+    found = []
+    for places in permutations(range(3)):
+        for signs in product((1.0, -1.0), repeat=3):
+            one = np.zeros((3, 3))
+            for row, (place, sign) in enumerate(zip(places, signs, strict=True)):
+                one[row, place] = sign
+            if np.linalg.det(one) > 0:
+                found.append(one)
+    return found

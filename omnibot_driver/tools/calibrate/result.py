@@ -1,0 +1,37 @@
+"""What a calibration found: values with their uncertainty. Knows no terminal, no file, no ROS."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from omnibot_driver.parameters import Value
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One row of the table. ``sigma``: standard deviation, None where it has none.
+
+    ``before``: what the driver has now, None where it has nothing of the kind.
+    """
+
+    name: str
+    value: float | str
+    sigma: float | None = None
+    unit: str = ""
+    before: float | str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """``parameters``: what the driver should load, by name; ``record``: what else belongs into the
+    file, which the driver leaves alone; ``notes``: sentences for the user;
+    ``draw``: fills a figure of 9 by 6 inches."""
+
+    findings: list[Finding]
+    parameters: Mapping[str, Value]
+    record: Mapping[str, Any] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    draw: "Callable[[Figure], None]"

@@ -1,0 +1,89 @@
+"""What a person saw the wheels do, and what follows from it.
+
+Pure. Patterns are of wheels A, B, C: 1 counter-clockwise seen from outside (what the manual's
+equations call positive), -1 clockwise, 0 still.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
+
+Pattern = tuple[int, int, int]
+
+WHEELS: Final = "ABC"
+AXES: Final = ("x", "y", "yaw")
+WORDS: Final = {1: "counter-clockwise", -1: "clockwise", 0: "still"}
+STILL: Final[Pattern] = (0, 0, 0)
+
+
+class Contradiction(Exception):
+    """An answer that cannot be, with the others; a sentence that says why."""
+
+
+def understand(answer: str) -> Pattern | None:
+    """``+0-`` and the like, with or without spaces or commas."""
+    signs = answer.replace(" ", "").replace(",", "")
+    values = [{"+": 1, "-": -1, "0": 0}.get(sign) for sign in signs]
+    if len(values) != 3:
+        return None
+    a, b, c = values
+    return None if a is None or b is None or c is None else (a, b, c)
+
+
+def in_words(pattern: Sequence[int]) -> str:
+    """For a person."""
+    return ", ".join(f"{wheel} {WORDS[sign]}" for wheel, sign in zip(WHEELS, pattern, strict=True))
+
+
+def wanted(axis: int) -> Pattern:
+    """What the manual's equations make the wheels do for +x, +y or +yaw."""
+    x, y, yaw = (float(axis == n) for n in range(3))
+    rates = OmniKinematics(1.0, 1.0).wheel_rates(BodyTwist(x, y, yaw))
+    a, b, c = ((rate > 1e-6) - (rate < -1e-6) for rate in rates)
+    return a, b, c
+
+
+def wheel_sign(wheel: int, seen: Pattern) -> int:
+    """1 or, of a wheel that turns the other way than the manual says, -1.
+
+    Raises Contradiction for anything but this wheel alone.
+    """
+    name = WHEELS[wheel]
+    turned = [n for n in range(3) if seen[n]]
+    if not turned:
+        raise Contradiction(
+            f"no wheel was seen to turn, but wheel {name} was commanded: look again, and whether"
+            " the motors have power"
+        )
+    if len(turned) > 1:
+        raise Contradiction(
+            f"wheel {name} alone was commanded, but {in_words(seen)} was seen: each of the three"
+            " has a motor of its own"
+        )
+    if turned != [wheel]:
+        raise Contradiction(
+            f"wheel {name} was commanded and wheel {WHEELS[turned[0]]} was seen to turn. By the"
+            " manual A is front right, B front left, C at the back: if another side may be the"
+            " front, look from there; if none is, no parameter mends the order of the wheels"
+        )
+    return seen[wheel]
+
+
+def axis_sign(axis: int, seen: Pattern) -> int:
+    """1, or -1 for an axis that is reversed as a whole. Raises Contradiction for anything else."""
+    expected = wanted(axis)
+    if seen == expected:
+        return 1
+    if seen == tuple(-sign for sign in expected):
+        return -1
+    raise Contradiction(
+        f"for +{AXES[axis]} the wheels turn {in_words(expected)}, or all of them the other way;"
+        f" {in_words(seen)} is neither"
+    )
+
+
+def mirrored(signs: Sequence[int]) -> bool:
+    """Whether these axes are a mirror image, which no place of the front explains."""
+    x, y, yaw = signs
+    return x * y != yaw

@@ -1,0 +1,155 @@
+"""Commanded against measured speeds: what to command, and the scale that explains it. Pure.
+
+The board takes whole counts. So whole counts are commanded, and a speed that was measured is
+compared with the counts that it was asked for by, not with a wish that was rounded. It is measured
+by where the odometry has got to, which the board's own pose keeps right; a twist is made of one
+displacement, whose rounding does not average out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from omnibot_driver.core.board import Vector3
+from omnibot_driver.tools.calibrate.log import Column, Log
+from omnibot_driver.tools.needs import ToolError
+
+SETTLE_S: Final = 1.2
+"""From a new speed to a steady one: the board's integrator leaves 0.1 % after a second."""
+REPEATED_WITHIN_S: Final = 0.2
+FEWEST: Final = 5
+LEAST_SIGMA: Final = 1e-4
+"""m and rad: no odometry is better, in m/s and rad/s after a second."""
+CORRECTED_WITH: Final = 5
+"""Steps of the odometry over which a correction is spread: so many are one piece of news."""
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """One steady speed along an axis (0, 1, 2: x, y, yaw): asked for by ``counts``, measured in
+    m/s or rad/s; ``gyro`` likewise about the vertical, NaN where the robot did not turn.
+    """
+
+    axis: int
+    counts: int
+    measured: float
+    sigma: float
+    gyro: float
+    gyro_sigma: float
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Counts per m/s or rad/s, its standard deviation, and how much more than claimed the speeds
+    scatter about it (1: as claimed).
+    """
+
+    value: float
+    sigma: float
+    excess: float
+
+
+def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tuple[float, Vector3]]:
+    """Stairs to both sides along each axis, in whole counts, level by level; ``top``: fastest."""
+    stairs = []
+    for level in range(1, levels + 1):
+        for axis in range(3):
+            counts = max(1, int(top[axis] * scales[axis] * level / levels + 1e-9))
+            for sign in (1, -1):
+                command = [0.0, 0.0, 0.0]
+                command[axis] = sign * counts / scales[axis]
+                stairs.append((seconds, (command[0], command[1], command[2])))
+    return stairs
+
+
+def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
+    """Of every command in the log that was held for a while. ``up``: which way that is for the
+    sensor; ``bias``: of its gyro. Raises ToolError where there is none.
+    """
+    odometry, imu = log.odometry, log.imu
+    found = []
+    for began_s, ended_s, command in _held(log):
+        axis = int(np.argmax(np.abs(command)))
+        within = _within(odometry.stamp_s, began_s, ended_s)
+        turned = (imu.rate_radps[_within(imu.stamp_s, began_s, ended_s)] - bias) @ up
+        if within.sum() < FEWEST or len(turned) < FEWEST:
+            continue
+        way = _way(odometry.pose[within], axis)
+        measured, sigma = _slope(odometry.stamp_s[within], way)
+        found.append(
+            Speed(
+                axis,
+                round(float(command[axis]) * scales[axis]),
+                measured,
+                sigma,
+                float(turned.mean()) if axis == 2 else np.nan,
+                max(LEAST_SIGMA, _of_mean(turned)),
+            )
+        )
+    if not found or not all(np.isfinite([one.measured, one.sigma]).all() for one in found):
+        raise ToolError("no steady speed could be measured: see the rates in /diagnostics")
+    return found
+
+
+def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") -> Scale:
+    """The scale through the origin that explains the speeds best, each by its uncertainty."""
+    counts = np.array([one.counts for one in found], dtype=float)
+    measured = np.array([one.measured if by == "odometry" else one.gyro for one in found])
+    sigma = np.array([one.sigma if by == "odometry" else one.gyro_sigma for one in found])
+    weight = 1 / sigma**2
+    information = float((weight * counts**2).sum())
+    per_count = float((weight * counts * measured).sum() / information)
+    if per_count <= 0.0:
+        raise ToolError(
+            "the robot drives against its commands: set `axis_signs` first (docs/commissioning.md)"
+        )
+    freedom = max(1, len(found) - 1)
+    misfit = float((weight * (measured - per_count * counts) ** 2).sum()) / freedom
+    excess = max(1.0, misfit) ** 0.5
+    return Scale(1 / per_count, excess / information**0.5 / per_count**2, excess)
+
+
+def _held(log: Log) -> list[tuple[float, float, Column]]:
+    """From when to when the robot had settled in one command other than zero.
+
+    A command that was not repeated in time may have been forgotten by the driver: it begins anew.
+    """
+    commands = log.commands
+    if not len(commands.stamp_s):
+        return []
+    other = np.any(np.diff(commands.values, axis=0), axis=1)
+    changes = np.flatnonzero(other | (np.diff(commands.stamp_s) > REPEATED_WITHIN_S)) + 1
+    firsts, lasts = [0, *changes], [*changes - 1, len(commands.stamp_s) - 1]
+    return [
+        (commands.stamp_s[first] + SETTLE_S, commands.stamp_s[last], commands.values[first])
+        for first, last in zip(firsts, lasts, strict=True)
+        if commands.values[first].any()
+        and commands.stamp_s[last] - commands.stamp_s[first] > SETTLE_S
+    ]
+
+
+def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
+    return np.asarray((stamp_s > began_s) & (stamp_s <= ended_s))
+
+
+def _way(pose: Column, axis: int) -> Column:
+    """Along the body's axis, as it lay on average."""
+    if axis == 2:
+        return np.asarray(pose[:, 2])
+    heading_rad = pose[:, 2].mean() + axis * np.pi / 2
+    return np.asarray(pose[:, 0] * np.cos(heading_rad) + pose[:, 1] * np.sin(heading_rad))
+
+
+def _slope(stamp_s: Column, way: Column) -> tuple[float, float]:
+    """Of the straight line through the way over time, with its standard deviation."""
+    off_s = stamp_s - stamp_s.mean()
+    speed = float(off_s @ way / (off_s @ off_s))
+    left = way - way.mean() - speed * off_s
+    spread = max(LEAST_SIGMA, float(np.sqrt(left @ left / (len(way) - 2))))
+    return speed, spread * float(np.sqrt(CORRECTED_WITH / (off_s @ off_s)))
+
+
+def _of_mean(values: Column) -> float:
+    return float(values.std(ddof=1) / np.sqrt(len(values)))

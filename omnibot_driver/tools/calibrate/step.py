@@ -1,0 +1,138 @@
+"""``calibrate step``: how each wheel answers a step, its motor, and which gains suit it.
+
+Each wheel alone is sent to and fro between two speeds in the same direction, then in the other one.
+"""
+
+import argparse
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+from omnibot_driver.core.board import Vector3
+from omnibot_driver.tools.calibrate.arguments import positive, whole
+from omnibot_driver.tools.calibrate.console import Console
+from omnibot_driver.tools.calibrate.motion import Bounds, Law, stairs
+from omnibot_driver.tools.calibrate.result import Result
+from omnibot_driver.tools.calibrate.step_fit import Step, fit_wheel, steps_of
+from omnibot_driver.tools.calibrate.step_result import result_of
+from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, TICK_S, Gains
+from omnibot_driver.tools.needs import ToolError
+
+WHEELS: Final = "ABC"
+RUN_UP_S: Final = 2.0
+"""The first of two speeds is reached from rest, against friction; that is not what is looked at."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which wheels, how fast, how often; and the gains that the firmware was built with."""
+    parser.add_argument("--wheels", default=WHEELS, help=f"some of {WHEELS} (default: all)")
+    parser.add_argument(
+        "--speeds",
+        type=float,
+        nargs=2,
+        default=(4.0, 12.0),
+        metavar=("SLOW", "FAST"),
+        help="of a wheel, in rad/s (default 4 12)",
+    )
+    parser.add_argument(
+        "--hold", type=positive, default=1.5, help="seconds at each speed (default 1.5)"
+    )
+    parser.add_argument(
+        "--steps", type=whole, default=8, help="up and down together, each direction (default 8)"
+    )
+    parser.add_argument(
+        "--gains",
+        type=positive,
+        nargs=3,
+        default=(MANUAL.feed_forward, MANUAL.proportional, MANUAL.integral),
+        metavar=("K_FF", "K_VP", "K_VI"),
+        help="what the firmware was built with (default: the manual's 40 10 1.5)",
+    )
+
+
+def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
+    """Record, fit, tune."""
+    wheels = [WHEELS.index(name) for name in _wheels(arguments.wheels)]
+    levels = _levels(robot.parameters, arguments)
+    _law, seconds = _to_and_fro(levels, arguments)
+    console.confirm(
+        f"Each wheel will turn alone, at up to {levels[1]:.1f} rad/s, {2 * seconds:.0f} s for each."
+        " Is the robot on a box, all wheels off the ground, nothing near them?"
+    )
+    now = Gains(*arguments.gains)
+    found = []
+    for wheel in wheels:
+        steps: list[Step] = []
+        with console.progress(f"wheel {WHEELS[wheel]}") as show:
+            for part, sign in enumerate((1.0, -1.0)):
+                steps += _record(
+                    robot,
+                    wheel,
+                    [sign * level for level in levels],
+                    arguments,
+                    lambda s, part=part: show((part + s / seconds) / 2),  # type: ignore[misc]
+                )
+        found.append(fit_wheel(WHEELS[wheel], steps, now))
+    return result_of(found, now)
+
+
+def _record(
+    robot: Any,
+    wheel: int,
+    levels: Sequence[float],
+    arguments: argparse.Namespace,
+    show: Callable[[float], object],
+) -> list[Step]:
+    law, seconds = _to_and_fro(levels, arguments, wheel)
+    bounds = Bounds(
+        speed=max(map(abs, levels)) + 1e-6,
+        way=math.inf,
+        seconds=seconds + 1.0,
+        acceleration=math.inf,
+    )
+    log = robot.drive(law, bounds, topic="wheel_cmd", show=show)
+    return steps_of(log.commands, log.wheels, wheel, levels)
+
+
+def _to_and_fro(
+    levels: Sequence[float], arguments: argparse.Namespace, wheel: int = 0
+) -> tuple[Law, float]:
+    """Slow, then fast and slow in turn; and how long that takes.
+
+    No two steps begin at the same place between two deltas, so together they show what happens in
+    between.
+    """
+    plan: list[tuple[float, Vector3]] = []
+    for number in range(arguments.steps + 1):
+        seconds = arguments.hold if number else RUN_UP_S
+        seconds += 4 * TICK_S * (0.618 * number % 1.0)
+        a, b, c = (levels[number % 2] if n == wheel else 0.0 for n in range(3))
+        plan.append((seconds, (a, b, c)))
+    return stairs(plan), sum(seconds for seconds, _ in plan)
+
+
+def _wheels(names: str) -> str:
+    wanted = names.upper().replace(",", "")
+    if not wanted or set(wanted) - set(WHEELS):
+        raise ToolError(f"--wheels must be some of {WHEELS}, not {names!r}")
+    return "".join(sorted(set(wanted)))
+
+
+def _levels(parameters: dict[str, Any], arguments: argparse.Namespace) -> tuple[float, float]:
+    """The two speeds as the wire can say them, in rad/s. Raises ToolError for those it cannot."""
+    slow, fast = arguments.speeds
+    if not 0.0 < slow < fast <= parameters["max_wheel_speed"]:
+        raise ToolError(
+            "--speeds must be two of which the first is slower, up to the driver's max_wheel_speed"
+            f" of {parameters['max_wheel_speed']:g} rad/s"
+        )
+    if arguments.hold < 0.5 or arguments.steps < 2:
+        raise ToolError("--hold must be 0.5 s at least, --steps 2")
+    lsb = parameters["linear_scale"] * parameters["wheel_radius"]
+    words = round(slow * lsb), round(fast * lsb)
+    if words[0] < 1 or words[1] <= words[0]:
+        raise ToolError(
+            f"--speeds {slow:g} {fast:g} are the same on the wire, whose unit is {1 / lsb:.2f}"
+            " rad/s: choose speeds further apart"
+        )
+    return words[0] / lsb, words[1] / lsb

@@ -1,0 +1,83 @@
+"""The picture of ``calibrate step``: what was measured, and what the gains would do."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from omnibot_driver.tools.calibrate.step_models import SPAN_S
+from omnibot_driver.tools.calibrate.wheel_loop import TICK_S, Gains, Motor, answer
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from omnibot_driver.tools.calibrate.step_fit import WheelFound
+
+SHOWN_S: Final = 0.8
+PREDICTED_TICKS: Final = 60
+
+
+def draw(figure: "Figure", wheels: "Sequence[WheelFound]", now: Gains, better: Gains) -> None:
+    """Left the wheels, right what is predicted."""
+    halves: Any = figure.subfigures(1, 2)
+    left, right = halves
+    measured: Any = left.subplots(len(wheels), 1, sharex=True, squeeze=False)
+    for axes, wheel in zip(measured[:, 0], wheels, strict=True):
+        _draw_wheel(axes, wheel)
+    measured[0, 0].set_title("Measured: deltas of 40 ms, as part of the step", fontsize=10)
+    measured[-1, 0].legend(fontsize=7, loc="lower right")
+    measured[-1, 0].set_xlabel("middle of the delta, ms after the control tick")
+    command, load = right.subplots(2, 1, sharex=True)
+    motors = [wheel.motor for wheel in wheels]
+    _draw_predictions(command, motors, now, better, command=1.0, load=0.0)
+    command.set_title("Predicted: a step of command", fontsize=10)
+    command.set_ylabel("part of the step")
+    command.legend(fontsize=7, loc="lower right")
+    _draw_predictions(load, motors, now, better, command=0.0, load=1.0)
+    load.set_title("Predicted: a load worth 1 count per tick", fontsize=10)
+    load.set_ylabel("counts per tick")
+    load.set_xlabel("ms after the control tick")
+
+
+def _draw_wheel(axes: "Axes", wheel: "WheelFound") -> None:
+    gain = wheel.answer.values[0]
+    for step in wheel.steps:
+        part = (step.rate_radps / gain - step.before_radps) / (step.after_radps - step.before_radps)
+        axes.plot(_middles_ms(step.end_ticks * TICK_S), part, ".", color="0.6", markersize=3)
+    end_s = np.arange(0.0, SHOWN_S, TICK_S)
+    for fit, style in ((wheel.first, ":"), (wheel.second, "--"), (wheel.motor_fit, "-")):
+        mean = fit.model.mean(fit.values[1:], end_s)
+        axes.plot(_middles_ms(end_s), mean, style, linewidth=1, label=fit.model.title)
+    axes.set_xlim(-100, 1000 * SHOWN_S - 100)
+    axes.set_ylabel(f"wheel {wheel.name}")
+    axes.grid(alpha=0.3)
+
+
+def _middles_ms(end_s: Any) -> Any:
+    return 1000 * (end_s - SPAN_S / 2)
+
+
+def _draw_predictions(
+    axes: "Axes",
+    motors: Sequence[Motor],
+    now: Gains,
+    better: Gains,
+    *,
+    command: float,
+    load: float,
+) -> None:
+    """One line for each wheel; ``load`` in counts per tick's worth of effort."""
+    times_ms = 1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5)
+    for name, gains, colour in (("now", now, "C0"), ("better", better, "C1")):
+        label: str | None = (
+            f"{name}: K_ff {gains.feed_forward:.1f}, K_VP {gains.proportional:.1f},"
+            f" K_VI {gains.integral:.1f}"
+        )
+        for motor in motors:
+            effort = load * motor.pwm_per_count
+            speed = answer(motor, gains, PREDICTED_TICKS, command=command, load=effort).speed
+            axes.plot(times_ms, speed, color=colour, linewidth=1, label=label)
+            label = None
+    axes.axhline(command, color="0.5", linewidth=0.5)
+    axes.grid(alpha=0.3)

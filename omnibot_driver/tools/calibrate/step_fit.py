@@ -1,0 +1,238 @@
+"""From recorded steps of one wheel to models with uncertainties. Pure calculation.
+
+Time counts from the *onset*: the board's control tick that could first see the command. The ticks
+are known from the stamps; a command that came in close to a tick, or waited on a busy computer, was
+seen at another one than it seems, and then the recorded step itself tells.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from omnibot_driver.tools.calibrate.log import Column, Commands, Wheels
+from omnibot_driver.tools.calibrate.step_models import (
+    FIRST_ORDER,
+    SECOND_ORDER,
+    Model,
+    motor_model,
+)
+from omnibot_driver.tools.calibrate.wheel_loop import TICK_S, Gains, Motor
+from omnibot_driver.tools.needs import ToolError
+
+ON_THE_WAY_S: Final = 0.0015
+"""From publishing a command to its last bit on the line: DDS, and 9 bytes at 115200 baud."""
+BEFORE: Final = 3
+"""Deltas before the onset that belong to a step."""
+FEWEST_DELTAS: Final = 10
+ROUNDS: Final = 4
+SOONER: Final = range(-20, 3)
+"""Ticks by which an onset may be sooner than it seems; a late command has a later one."""
+UNLIKE: Final = 3.0
+"""So many times the usual misfit is something else than noise."""
+
+
+LOOK_S: Final = np.arange(0.0, 2.0, 1e-3)
+"""Times at which a model is looked at for its traits."""
+DRAWS: Final = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Commanded from one rate to another, in rad/s.
+
+    ``end_ticks``: whole control ticks from the onset to the end of each delta; ``rate_radps``: the
+    mean over the four ticks before that. ``last_radps``: what was commanded ``last_ticks`` before
+    the onset, until it was ``before_radps``; an answer may still be under way.
+    """
+
+    before_radps: float
+    after_radps: float
+    end_ticks: Column
+    rate_radps: Column
+    last_radps: float
+    last_ticks: int
+
+    def sooner(self, ticks: int) -> "Step":
+        """The same with an earlier onset."""
+        return replace(self, end_ticks=self.end_ticks + ticks, last_ticks=self.last_ticks - ticks)
+
+    def told_by(self, mean: Callable[[Column], Column]) -> Column:
+        """The rates, given the mean of a unit step's answer by the ticks at which a delta ends."""
+        earlier = self.before_radps - self.last_radps
+        height = self.after_radps - self.before_radps
+        return np.asarray(
+            self.last_radps
+            + earlier * mean(self.end_ticks + self.last_ticks)
+            + height * mean(self.end_ticks)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A model with the parameters that explain the steps best.
+
+    ``covariance`` is scaled by the residuals; ``rms_radps`` is theirs.
+    """
+
+    model: Model
+    values: Column
+    covariance: Column
+    rms_radps: float
+    samples: int
+
+    @property
+    def sigmas(self) -> Column:
+        """Standard deviations."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def aic(self) -> float:
+        """Akaike's criterion: of two models of the same steps, the smaller one's is preferred."""
+        return 2 * self.samples * math.log(self.rms_radps) + 2 * len(self.values)
+
+    def told(self, step: Step) -> Column:
+        """What the model says of a step's deltas, in rad/s."""
+        told = step.told_by(lambda ticks: self.model.mean(self.values[1:], ticks * TICK_S))
+        return np.asarray(self.values[0] * told)
+
+    def traits(self) -> dict[str, tuple[float, float]]:
+        """Rise time (a tenth to nine tenths, s) and overshoot (part), with standard deviations."""
+        random = np.random.default_rng(0)
+        draws = random.multivariate_normal(self.values, self.covariance, DRAWS)
+        draws = np.clip(draws, self.model.low, self.model.high)
+        values = np.array([self._traits(drawn[1:]) for drawn in draws])
+        found = self._traits(self.values[1:])
+        names = ("rise time", "overshoot")
+        return dict(zip(names, zip(found, values.std(axis=0).tolist(), strict=True), strict=True))
+
+    def _traits(self, parameters: Column) -> tuple[float, float]:
+        rate = np.gradient(self.model.turned(parameters, LOOK_S), LOOK_S)
+        tenth, most = (LOOK_S[np.argmax(rate >= part)] for part in (0.1, 0.9))
+        return float(most - tenth), float(max(0.0, rate.max() - 1.0))
+
+
+def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[float]) -> list[Step]:
+    """The steps between two of these rates that one wheel was commanded to make.
+
+    Raises ToolError where the deltas have gaps too long to tell any.
+    """
+    told = commands.values[:, wheel]
+    heard = np.isfinite(wheels.rate_radps[:, wheel])
+    stamp_s, rates = wheels.stamp_s[heard], wheels.rate_radps[heard, wheel]
+    changes = [n for n in range(1, len(told)) if told[n] != told[n - 1]]
+    steps = []
+    for number, change in enumerate(changes):
+        before, after = float(told[change - 1]), float(told[change])
+        if before not in levels or after not in levels:
+            continue
+        seen_s = commands.stamp_s[change] + ON_THE_WAY_S
+        until_s = commands.stamp_s[changes[number + 1]] if number + 1 < len(changes) else math.inf
+        first = int(np.searchsorted(stamp_s, seen_s)) - BEFORE
+        last = int(np.searchsorted(stamp_s, until_s))
+        if first < 0 or last - first < FEWEST_DELTAS:
+            continue
+        reference_s = stamp_s[first]
+        onset = math.ceil((seen_s - reference_s) / TICK_S)
+        ends = np.rint((stamp_s[first:last] - reference_s) / TICK_S) - onset
+        sooner = changes[number - 1] if number else change
+        last_radps = float(told[sooner - 1])
+        if last_radps not in levels:  # from rest, against friction
+            last_radps = before
+        ticks = round((commands.stamp_s[change] - commands.stamp_s[sooner]) / TICK_S)
+        steps.append(Step(before, after, ends, rates[first:last], last_radps, ticks))
+    if not steps:
+        raise ToolError(
+            "no step was recorded whole: odometry was lost on the way; see /diagnostics, and try"
+            " again"
+        )
+    return steps
+
+
+def fit(model: Model, steps: Sequence[Step]) -> Fit:
+    """Least squares. Raises ToolError where the steps do not determine the model."""
+    rates = np.concatenate([step.rate_radps for step in steps])
+    first = min(int(step.end_ticks.min()) for step in steps)
+    last = max(int(step.end_ticks.max()) + step.last_ticks for step in steps)
+    moments_s = TICK_S * np.arange(first, last + 1, dtype=np.float64)
+
+    def residuals(parameters: Column) -> Column:
+        means = model.mean(parameters[1:], moments_s)
+        told = [step.told_by(lambda ticks: means[ticks.astype(int) - first]) for step in steps]
+        return np.asarray(parameters[0] * np.concatenate(told) - rates)
+
+    found = least_squares(residuals, model.start, bounds=(model.low, model.high), x_scale="jac")
+    freedom = len(rates) - len(found.x)
+    if not found.success or freedom <= 0:
+        raise ToolError("the steps do not determine a model of the wheel: repeat more of them")
+    squares = float(np.sum(found.fun**2))
+    information = found.jac.T @ found.jac
+    covariance = np.linalg.pinv(information) * squares / freedom
+    return Fit(model, found.x, covariance, math.sqrt(squares / len(rates)), len(rates))
+
+
+@dataclass(frozen=True, slots=True)
+class WheelFound:
+    """One wheel: its steps, how many others were left out, and the models that were fitted."""
+
+    name: str
+    steps: list[Step]
+    left_out: int
+    first: Fit
+    second: Fit
+    motor_fit: Fit
+
+    @property
+    def answer(self) -> Fit:
+        """The closed loop's: of the two models that suppose nothing of it, the preferred one."""
+        return min(self.first, self.second, key=lambda fit: fit.aic)
+
+    @property
+    def motor(self) -> Motor:
+        """In ticks."""
+        _gain, pwm_per_count, time_constant_s, delay_s = self.motor_fit.values
+        return Motor(pwm_per_count, time_constant_s / TICK_S, delay_s / TICK_S)
+
+
+def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
+    """All three models; ``now``: the gains in the firmware."""
+    whole = alike(aligned(alike(aligned(steps))))
+    first, second, motor = (
+        fit(model, whole) for model in (FIRST_ORDER, SECOND_ORDER, motor_model(now))
+    )
+    return WheelFound(name, whole, len(steps) - len(whole), first, second, motor)
+
+
+def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
+    """The steps with the onset that each of them shows: a command may have been late.
+
+    All of them sooner or later would be a delay, so the middle one stays.
+    """
+    shifts = [0] * len(steps)
+    for _ in range(ROUNDS):
+        guess = fit(model, [step.sooner(n) for step, n in zip(steps, shifts, strict=True)])
+        best = [
+            min(SOONER, key=lambda n, step=step: _misfit(guess, step.sooner(n)))  # type: ignore[misc]
+            for step in steps
+        ]
+        middle = sorted(best)[len(best) // 2]
+        best = [n - middle for n in best]
+        if best == shifts:
+            break
+        shifts = best
+    return [step.sooner(n) for step, n in zip(steps, shifts, strict=True)]
+
+
+def alike(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
+    """Without those that differ from all others."""
+    guess = fit(model, steps)
+    misfits = [_misfit(guess, step) for step in steps]
+    most = UNLIKE * sorted(misfits)[len(misfits) // 2]
+    return [step for step, misfit in zip(steps, misfits, strict=True) if misfit <= most]
+
+
+def _misfit(guess: Fit, step: Step) -> float:
+    return float(np.sqrt(np.mean((guess.told(step) - step.rate_radps) ** 2)))

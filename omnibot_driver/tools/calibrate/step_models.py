@@ -1,0 +1,108 @@
+"""Step responses as an odometry delta sees them: averaged over the 40 ms that it covers.
+
+Every model knows how far a wheel has turned at a time, after a step of 1 in rate at time 0; so a
+delta's mean rate is a difference of two of these, never a sample. Knows no data and no ROS.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from omnibot_driver.tools.calibrate.wheel_loop import TICK_S, Array, Gains, Motor, answer
+
+DELTA_TICKS: Final = 4
+SPAN_S: Final = DELTA_TICKS * TICK_S
+"""Manual, "25Hz Encoder data"; docs/protocol.md."""
+
+Turned = Callable[[Array, Array], Array]
+"""Parameters without the gain, and times in s, to the angle turned after a unit step, in s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """``names``, ``units``, a start and bounds of the parameters; the first is always the gain."""
+
+    title: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    start: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    turned: Turned
+
+    def mean(self, parameters: Array, end_s: Array) -> Array:
+        """Of the unit step's answer, over the deltas that end at these times."""
+        turned = self.turned(parameters, np.concatenate((end_s, end_s - SPAN_S)))
+        return np.asarray((turned[: len(end_s)] - turned[len(end_s) :]) / SPAN_S)
+
+
+def first_order(parameters: Array, time_s: Array) -> Array:
+    """exp(-L s) / (1 + T s)."""
+    time_constant_s, delay_s = parameters
+    after_s = np.maximum(0.0, time_s - delay_s)
+    return np.asarray(after_s + time_constant_s * np.expm1(-after_s / time_constant_s))
+
+
+def second_order(parameters: Array, time_s: Array) -> Array:
+    """(1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²), of any damping.
+
+    The zero Z belongs to it: a PI loop with feed-forward around a motor of first order has one.
+    """
+    omega, damping, zero_s, delay_s = parameters
+    root = np.sqrt(complex(damping * damping - 1.0))
+    root = root if abs(root) > 1e-4 else 1e-4  # two equal poles are told as two close ones
+    poles = omega * (-damping + root), omega * (-damping - root)
+    after_s = np.maximum(0.0, time_s - delay_s)
+    turned = after_s.astype(complex)
+    for pole, other in (poles, poles[::-1]):
+        part = (1.0 + zero_s * pole) * other / (pole - other)
+        turned += part / pole * np.expm1(pole * after_s)
+    return np.asarray(turned.real)
+
+
+def motor_in_loop(gains: Gains) -> Turned:
+    """The manual's loop with these gains around a motor: PWM per count, time constant, delay."""
+
+    def turned(parameters: Array, time_s: Array) -> Array:
+        pwm_per_count, time_constant_s, delay_s = parameters
+        motor = Motor(pwm_per_count, time_constant_s / TICK_S, delay_s / TICK_S)
+        ticks = max(1, int(np.ceil(time_s.max() / TICK_S)))
+        angle = np.concatenate(([0.0], np.cumsum(answer(motor, gains, ticks).speed))) * TICK_S
+        return np.asarray(np.interp(time_s, np.arange(ticks + 1) * TICK_S, angle))
+
+    return turned
+
+
+FIRST_ORDER: Final = Model(
+    "first order with delay",
+    ("gain", "time constant", "delay"),
+    ("", "s", "s"),
+    (1.0, 0.06, 0.01),
+    (0.05, 1e-3, 0.0),
+    (20.0, 3.0, 0.5),
+    first_order,
+)
+SECOND_ORDER: Final = Model(
+    "second order with zero and delay",
+    ("gain", "natural frequency", "damping", "zero", "delay"),
+    ("", "rad/s", "", "s", "s"),
+    (1.0, 15.0, 1.0, 0.03, 0.01),
+    (0.05, 0.5, 0.05, -0.2, 0.0),
+    (20.0, 400.0, 20.0, 2.0, 0.5),
+    second_order,
+)
+
+
+def motor_model(gains: Gains) -> Model:
+    """The motor in the manual's loop, with these gains in the firmware."""
+    return Model(
+        "motor in the manual's loop",
+        ("gain", "PWM per count", "motor time constant", "motor delay"),
+        ("", "PWM/(count/tick)", "s", "s"),
+        (1.0, 45.0, 0.06, 0.005),
+        (0.05, 3.0, 3e-3, 0.0),
+        (20.0, 500.0, 1.0, 0.2),
+        motor_in_loop(gains),
+    )

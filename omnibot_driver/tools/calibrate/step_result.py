@@ -1,0 +1,148 @@
+"""What ``calibrate step`` found, for the table, the file and the reader."""
+
+from typing import Any, Final
+
+from omnibot_driver.tools.calibrate.result import Finding, Result
+from omnibot_driver.tools.calibrate.step_figure import draw
+from omnibot_driver.tools.calibrate.step_fit import Fit, WheelFound
+from omnibot_driver.tools.calibrate.tuning import Behaviour, behaviour, better_gains
+from omnibot_driver.tools.calibrate.wheel_loop import Gains
+
+UNLIKE_ONE: Final = 0.02
+"""A gain that differs more from 1 is the scale's affair."""
+QUANTUM_RADPS: Final = 0.05
+"""Standard deviation of a delta's rate by the steps of the encoder and of 0.1 mm on the wire."""
+MANY: Final = 3.0
+UNEXPLAINED: Final = 1.2
+"""So many times the second order's residuals tell that no motor fits."""
+
+
+def result_of(found: list[WheelFound], now: Gains) -> Result:
+    """Gains are the same for all wheels, so they are chosen for all of them."""
+    motors = [wheel.motor for wheel in found]
+    better = better_gains(motors, now)
+    findings = [row for wheel in found for row in _rows(wheel)]
+    findings += [
+        Finding(name=name, value=round(value, 1), unit=unit, before=before)
+        for name, unit, value, before in (
+            ("better K_ff", "PWM/(count/tick)", better.feed_forward, now.feed_forward),
+            ("better K_VP", "PWM/(count/tick)", better.proportional, now.proportional),
+            ("better K_VI", "PWM/count", better.integral, now.integral),
+        )
+    ]
+    record = {
+        "step": {
+            "wheels": {wheel.name: _recorded(wheel) for wheel in found},
+            "gains": [now.feed_forward, now.proportional, now.integral],
+            "better_gains": [
+                round(gain, 2)
+                for gain in (better.feed_forward, better.proportional, better.integral)
+            ],
+        }
+    }
+    notes = [sentence for wheel in found for sentence in _remarks(wheel)]
+    notes += [
+        f"With the gains that it has, {_told([behaviour(motor, now) for motor in motors])}.",
+        f"With the better ones, {_told([behaviour(motor, better) for motor in motors])}.",
+        "No message sets them: they are constants of the firmware.",
+    ]
+    return Result(
+        findings=findings,
+        parameters={},
+        record=record,
+        notes=notes,
+        draw=lambda figure: draw(figure, found, now, better),
+    )
+
+
+def _rows(wheel: WheelFound) -> list[Finding]:
+    answer, motor = wheel.answer, wheel.motor_fit
+    rows = [
+        Finding(name=f"{wheel.name}: {what}", value=value, sigma=sigma, unit=unit)
+        for what, value, sigma, unit in [
+            *_of(answer, "gain"),
+            *((f"{name}", *figures, unit) for (name, figures), unit in _traits(answer)),
+            *((f"first order, {row[0]}", *row[1:]) for row in _of(wheel.first)[1:]),
+            *((f"second order, {row[0]}", *row[1:]) for row in _of(wheel.second)[1:]),
+            *_of(motor)[1:],
+        ]
+    ]
+    return rows
+
+
+def _of(fit: Fit, *names: str) -> list[tuple[str, float, float, str]]:
+    rows = zip(fit.model.names, fit.values, fit.sigmas, fit.model.units, strict=True)
+    return [
+        (name, float(value), float(sigma), unit)
+        for name, value, sigma, unit in rows
+        if not names or name in names
+    ]
+
+
+def _traits(fit: Fit) -> Any:
+    return zip(fit.traits().items(), ("s", ""), strict=True)
+
+
+def _recorded(wheel: WheelFound) -> dict[str, Any]:
+    """Value and standard deviation of everything, for the file."""
+    return {
+        fit.model.title: {
+            "residual_radps": round(fit.rms_radps, 4),
+            "aic": round(fit.aic, 1),
+            **{name: [float(f"{v:.5g}"), float(f"{s:.2g}")] for name, v, s, _ in _of(fit)},
+        }
+        for fit in (wheel.first, wheel.second, wheel.motor_fit)
+    }
+
+
+def _remarks(wheel: WheelFound) -> list[str]:
+    first, second, motor = wheel.first, wheel.second, wheel.motor_fit
+    gain = float(second.values[0])
+    remarks = [
+        f"Wheel {wheel.name}: residuals of {first.rms_radps:.3f} rad/s with the first order,"
+        f" {second.rms_radps:.3f} with the second, {motor.rms_radps:.3f} with a motor in the"
+        f" manual's loop; by AIC the {wheel.answer.model.title} tells the answer."
+    ]
+    if wheel.left_out:
+        remarks.append(
+            f"Wheel {wheel.name}: {wheel.left_out} of {wheel.left_out + len(wheel.steps)} steps"
+            " were unlike the others and are left out."
+        )
+    if second.rms_radps > MANY * QUANTUM_RADPS:
+        remarks.append(
+            f"Wheel {wheel.name}: it answers differently from step to step, by more than the"
+            f" {QUANTUM_RADPS} rad/s that encoder and wire make. Is something in its way, the"
+            " battery weak, this computer too busy?"
+        )
+    if motor.rms_radps > UNEXPLAINED * second.rms_radps:
+        remarks.append(
+            f"Wheel {wheel.name}: no motor explains this in the manual's loop. Was the firmware"
+            " built with other gains (--gains)? What is said of motor and gains does not hold."
+        )
+    if abs(gain - 1.0) > UNLIKE_ONE:
+        remarks.append(
+            f"Wheel {wheel.name}: it turns {gain:.3f} times as fast as commanded, by the board's"
+            " own odometry: `calibrate scale` finds `linear_scale`."
+        )
+    return remarks
+
+
+def _told(wheels: list[Behaviour]) -> str:
+    """Of the worst wheel, each figure by itself."""
+    rise_ms, command_ms, load_ms = (
+        1000 * max(float(value) for value in values)
+        for values in (
+            [wheel.rise_s for wheel in wheels],
+            [wheel.command_error_s for wheel in wheels],
+            [wheel.load_error_s for wheel in wheels],
+        )
+    )
+    overshoot, ms = (
+        max(float(value) for value in values)
+        for values in ([wheel.overshoot for wheel in wheels], [wheel.ms for wheel in wheels])
+    )
+    return (
+        f"a step of command rises within {rise_ms:.0f} ms at the most, overshoots by"
+        f" {100 * overshoot:.0f} % and leaves {command_ms:.0f} ms of itself as error, a load"
+        f" {load_ms:.0f} ms; Ms is {ms:.2f}"
+    )

@@ -1,0 +1,119 @@
+"""Which gains of the manual's law suit a motor, and what they and the manual's do on it.
+
+Criterion: a step of command followed and a step of load held off (a floor, a sagging battery, dry
+friction), each by its integral of absolute error as a part of what the manual's gains leave, half
+and half. Limits: the loop stays Ms <= 1.6 away from instability, which forgives an error of a
+factor 2.6 in gain or of 36° in phase; the speed overshoots a command by 5 % at the most; and one
+count of the encoder, its smallest step, moves the effort by no more than a count of speed needs.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnibot_driver.tools.calibrate.wheel_loop import (
+    MANUAL,
+    TICK_S,
+    Array,
+    Gains,
+    Motor,
+    answer,
+    sensitivity_peak,
+)
+
+LARGEST_MS: Final = 1.6
+LARGEST_OVERSHOOT: Final = 0.05
+HORIZON_TICKS: Final = 400
+SETTLED: Final = 1e-3
+"""Part of the command that may be wrong at the horizon; what is worse is not stable."""
+CANDIDATES: Final = 24
+"""Of each gain in one round."""
+ROUNDS: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Behaviour:
+    """What a motor does under some gains.
+
+    ``rise_s``: from a tenth to nine tenths of a step; ``overshoot``: part of the step;
+    ``command_error_s``: integral of absolute error of a step of 1; ``load_error_s``: the same for a
+    load of one count per tick's worth of effort; ``ms``: robustness, 1 is best; ``stable``: whether
+    it comes to an end. Scalars or arrays.
+    """
+
+    rise_s: Array
+    overshoot: Array
+    command_error_s: Array
+    load_error_s: Array
+    ms: Array
+    stable: NDArray[np.bool_]
+
+
+def behaviour(motor: Motor, gains: Gains) -> Behaviour:
+    """Simulated in the manual's loop."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        speed = answer(motor, gains, HORIZON_TICKS).speed
+        feedback = Gains(0.0, gains.proportional, gains.integral)
+        loaded = answer(motor, feedback, HORIZON_TICKS, command=0.0, load=motor.pwm_per_count).speed
+        wrong = np.maximum(abs(speed[-1] - 1.0), abs(loaded[-1]))
+        return Behaviour(
+            rise_s=(np.argmax(speed >= 0.9, axis=0) - np.argmax(speed >= 0.1, axis=0)) * TICK_S,
+            overshoot=np.maximum(0.0, speed.max(axis=0) - 1.0),
+            command_error_s=abs(speed - 1.0).sum(axis=0) * TICK_S,
+            load_error_s=abs(loaded).sum(axis=0) * TICK_S,
+            ms=sensitivity_peak(motor, gains),
+            stable=wrong < SETTLED,  # also where it is not a number
+        )
+
+
+def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
+    """The best for all of these alike within the limits, by a search that narrows down.
+
+    ``now`` is what they are compared with.
+    """
+    references = [behaviour(motor, now) for motor in motors]
+    need = min(motor.pwm_per_count for motor in motors)
+    forward, proportional, integral = (0.0, 1.0), (0.02, 1.0), (1e-3, 1.0)
+    best = Gains(need, 0.02 * need, 1e-3 * need)
+    for _ in range(ROUNDS):
+        grid = np.meshgrid(
+            need * np.linspace(*forward, CANDIDATES),
+            need * np.geomspace(*proportional, CANDIDATES),
+            need * np.geomspace(*integral, CANDIDATES),
+            indexing="ij",
+            sparse=True,
+        )
+        gains = Gains(*grid)
+        cost = sum(
+            _cost(behaviour(motor, gains), reference)
+            for motor, reference in zip(motors, references, strict=True)
+        )
+        place = np.unravel_index(np.argmin(cost), np.shape(cost))
+        best = Gains(*(float(axis.flat[n]) for axis, n in zip(grid, place, strict=True)))
+        forward = _around(best.feed_forward / need, 1.0 / CANDIDATES, 0.0, 1.2)
+        proportional = _near(proportional, best.proportional / need)
+        integral = _near(integral, best.integral / need)
+    return best
+
+
+def _cost(behaves: Behaviour, reference: Behaviour) -> Array:
+    """Infinite beyond the limits."""
+    cost = (
+        behaves.command_error_s / reference.command_error_s
+        + behaves.load_error_s / reference.load_error_s
+    )
+    allowed = behaves.stable & (behaves.ms <= LARGEST_MS) & (behaves.overshoot <= LARGEST_OVERSHOOT)
+    return np.where(allowed, cost, np.inf)
+
+
+def _around(value: float, reach: float, low: float, high: float) -> tuple[float, float]:
+    return max(low, value - reach), min(high, value + reach)
+
+
+def _near(span: tuple[float, float], value: float) -> tuple[float, float]:
+    """A step of the grid to both sides, within what there was."""
+    factor = (span[1] / span[0]) ** (1.0 / (CANDIDATES - 1))
+    return max(span[0], value / factor), min(span[1], value * factor)

@@ -1,0 +1,60 @@
+"""Driving by the odometry, from one pose to the next. Pure."""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from omnibot_driver.core.board import Vector3
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.tools.calibrate.motion import Law
+
+NEAR_M: Final = 0.005
+NEAR_RAD: Final = 0.01
+BRAKING: Final = 0.15
+"""m/s²: half of what commands may change by."""
+ANGULAR_BRAKING: Final = 0.4
+
+
+def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
+    """Through these places, which count from where the motion begins (yaw unwrapped); stopping at
+    each. ``speed`` in m/s, ``turning`` in rad/s.
+    """
+    number = 0
+
+    def law(_seconds: float, pose: Pose) -> Vector3 | None:
+        nonlocal number
+        while number < len(places) and _arrived(pose, places[number]):
+            number += 1
+        return _towards(pose, places[number], speed, turning) if number < len(places) else None
+
+    return law
+
+
+def square(side_m: float, sign: int) -> list[Pose]:
+    """Forward and a quarter turn (1: left, -1: right), four times: back to where it began."""
+    places = []
+    place = Pose()
+    for _ in range(4):
+        place = place.moved(Pose(side_m, 0.0, 0.0))
+        places.append(place)
+        place = place + Pose(0.0, 0.0, sign * math.pi / 2)
+        places.append(place)
+    return places
+
+
+def _arrived(pose: Pose, place: Pose) -> bool:
+    off = place - pose
+    return off.way_m < NEAR_M and abs(off.yaw_rad) < NEAR_RAD
+
+
+def _towards(pose: Pose, place: Pose, speed: float, turning: float) -> Vector3:
+    off = place - pose
+    way = off.turned(-pose.yaw_rad)
+    x = y = yaw_rate = 0.0
+    if way.way_m > NEAR_M / 2:
+        per_m = min(speed, math.sqrt(2 * BRAKING * way.way_m)) / way.way_m
+        x, y = per_m * way.x_m, per_m * way.y_m
+    if abs(off.yaw_rad) > NEAR_RAD / 2:
+        fastest = min(turning, math.sqrt(2 * ANGULAR_BRAKING * abs(off.yaw_rad)))
+        yaw_rate = math.copysign(fastest, off.yaw_rad)
+    return x, y, yaw_rate

@@ -1,0 +1,114 @@
+"""One wheel in the manual's control loop, small signals: what it answers to which gains.
+
+All speeds are encoder counts per control tick of 10 ms, all efforts PWM steps, all times ticks.
+The loop is linear: it tells of changes between two speeds in the same direction, where dry friction
+does not change and has no part. Knows nothing of measuring, radians or ROS.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+TICK_S: Final = 0.01
+"""Manual, "Wheel control: 100Hz loop"."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """Of first order: what a count per tick needs, how slowly it follows, how late it begins."""
+
+    pwm_per_count: float
+    time_constant_ticks: float
+    delay_ticks: float
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """K_ff, K_VP, K_VI: one number each, or arrays of one shape to compare many at once."""
+
+    feed_forward: Any
+    proportional: Any
+    integral: Any
+
+
+MANUAL: Final = Gains(40.0, 10.0, 1.5)
+"""Manual, "Controller parameters"."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """Speed and effort of each tick from the one on in which the wheel can first be different.
+
+    Arrays of shape (ticks, ...) with the shape of the gains.
+    """
+
+    speed: Array
+    effort: Array
+
+
+def answer(
+    motor: Motor, gains: Gains, ticks: int, *, command: float = 1.0, load: float = 0.0
+) -> Answer:
+    """What comes of a change of the commanded speed, and of a load in PWM steps, at once.
+
+    The law is the manual's ("Wheel control") with the feed-forward outside the accumulator:
+    u(k) = K_ff v + w(k), w(k) = w(k-1) + K_VP (e(k) - e(k-1)) + K_VI e(k). An effort counts from
+    the next tick on, or ``delay_ticks`` later, which need not be whole.
+    """
+    shape = np.broadcast(gains.feed_forward, gains.proportional, gains.integral).shape
+    whole, part = divmod(motor.delay_ticks, 1.0)
+    efforts = np.zeros((ticks + int(whole) + 1, *shape))
+    speeds = np.zeros((ticks, *shape))
+    momentary, turned = np.zeros(shape), np.zeros(shape)
+    feedback, before = np.zeros(shape), np.zeros(shape)
+    for tick in range(ticks):
+        error = command - turned
+        feedback = feedback + gains.proportional * (error - before) + gains.integral * error
+        before = error
+        late = tick + int(whole) + 1
+        efforts[late] = gains.feed_forward * command + feedback
+        turned = np.zeros(shape)
+        for effort, share in ((efforts[tick], part), (efforts[tick + 1], 1.0 - part)):
+            settled = (effort - load) / motor.pwm_per_count
+            decay = np.exp(-share / motor.time_constant_ticks)
+            after = settled + (momentary - settled) * decay
+            turned = turned + settled * share + motor.time_constant_ticks * (momentary - after)
+            momentary = after
+        speeds[tick] = turned
+    return Answer(speeds, efforts[int(whole) + 1 :])
+
+
+def sensitivity_peak(motor: Motor, gains: Gains, points: int = 400) -> Array:
+    """Ms: the inverse of the smallest distance between the loop's Nyquist curve and -1.
+
+    Of a stable loop, how much the worst disturbance is amplified; 1 at best.
+    """
+    frequency = np.geomspace(1e-3, np.pi, points)
+    z = np.exp(1j * frequency)
+    plant = _plant(motor, z)
+    shape = np.broadcast(gains.proportional, gains.integral).shape
+    along = (points, *(1,) * len(shape))
+    integrator = (1.0 / (1.0 - 1.0 / z)).reshape(along)
+    loop = plant.reshape(along) * (gains.proportional + gains.integral * integrator)
+    return np.asarray(np.max(1.0 / np.abs(1.0 + loop), axis=0))
+
+
+def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """From effort to the counts of the next ticks, at points z of the unit circle."""
+    whole, part = divmod(motor.delay_ticks, 1.0)
+    lag = motor.time_constant_ticks
+    decay = np.exp(-1.0 / lag)
+
+    def way(share: float) -> float:
+        """Turned within this share of a tick from rest, under an effort worth one count."""
+        return float(share - lag * (1.0 - np.exp(-share / lag)))
+
+    risen = [way(1.0 - part), way(2.0 - part) - way(1.0 - part), way(3.0 - part) - way(2.0 - part)]
+    pulse = [risen[0], risen[1] - risen[0], risen[2] - risen[1]]
+    tail = pulse[2] / z**3 / (1.0 - decay / z)
+    response = (pulse[0] / z + pulse[1] / z**2 + tail) / z ** int(whole)
+    return np.asarray(response / motor.pwm_per_count)

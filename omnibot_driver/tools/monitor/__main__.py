@@ -1,0 +1,163 @@
+"""Runs the monitor: ``ros2 run omnibot_driver monitor``."""
+
+import argparse
+import io
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Final
+
+from omnibot_driver.tools.monitor import text
+from omnibot_driver.tools.monitor.model import View
+from omnibot_driver.tools.monitor.rates import WINDOW_S
+from omnibot_driver.tools.monitor.screen import has_screen
+from omnibot_driver.tools.monitor.teleop import DeadMan
+from omnibot_driver.tools.needs import ToolError, need
+
+if TYPE_CHECKING:
+    from omnibot_driver.tools.monitor.feed import Feed
+
+LOOK_EVERY_S: Final = 0.05
+ROS_ARGUMENTS: Final = "--ros-args"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Return 0; 1 when something is missing or wrong, told on stderr; 2 on wrong usage."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    options, ros_arguments = _parse(arguments)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # question marks where there are no bars
+    try:
+        return _run(options, ros_arguments)
+    except ToolError as error:
+        print(f"monitor: {error}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("monitor: interrupted before the driver was found", file=sys.stderr)
+    except BrokenPipeError:  # nobody wants to read any more
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return 1
+
+
+def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
+    parser = argparse.ArgumentParser(
+        prog="monitor",
+        description="A running driver on one screen. ROS arguments follow --ros-args.",
+    )
+    parser.add_argument("--namespace", default="", help="the driver's, such as /robot1")
+    parser.add_argument(
+        "--driver", default="omnibot_driver", help="its node name (default: %(default)s)"
+    )
+    parser.add_argument("--once", action="store_true", help="print what is known and end")
+    parser.add_argument("--json", action="store_true", help="print it as JSON; means --once")
+    parser.add_argument(
+        "--teleop", action="store_true", help="steer with WASD or arrows; J and L turn"
+    )
+    parser.add_argument(
+        "--timeout",
+        type=float,
+        default=10.0,
+        metavar="S",
+        help="wait so long for the driver, inf for ever (default: %(default)g)",
+    )
+    ours = list(arguments)
+    ros = ours.index(ROS_ARGUMENTS) if ROS_ARGUMENTS in ours else len(ours)
+    options = parser.parse_args(ours[:ros])
+    options.once |= options.json
+    if not options.timeout > 0.0:
+        parser.error("--timeout must be a number above 0")
+    if options.once and options.teleop:
+        parser.error("--teleop needs the screen: leave --once and --json out")
+    return options, ours[ros:]
+
+
+def _run(options: argparse.Namespace, ros_arguments: list[str]) -> int:
+    if not options.once and not has_screen():
+        if options.teleop:
+            raise ToolError("--teleop needs a terminal: a pipe has no keys to be held")
+        print("monitor: no terminal here, so this is a snapshot as of --once", file=sys.stderr)
+        options.once = True
+    if not options.once:
+        need("textual")
+    try:
+        from omnibot_driver.tools.monitor.feed import Feed
+    except ImportError as error:
+        raise ToolError(
+            f"this needs ROS 2 Jazzy's Python packages ({error}): source its setup.bash"
+        ) from error
+    dead_man = DeadMan() if options.teleop else None
+    feed = Feed(ros_arguments, options.namespace, options.driver, dead_man)
+    try:
+        _find(feed, options.timeout)
+        if options.once:
+            return _print(_gather(feed, options.timeout), feed, options.json)
+        from omnibot_driver.tools.monitor.app import Monitor
+
+        screen = Monitor(feed)
+        screen.run()
+        return screen.return_code or 0
+    finally:
+        feed.close()
+
+
+def _find(feed: "Feed", timeout_s: float) -> None:
+    """Until the driver says its state; raises ToolError, which names those that are there."""
+    if _comes_about(lambda: bool(feed.view().state), timeout_s):
+        return
+    there = feed.drivers()
+    if feed.driver in there:
+        raise ToolError(
+            f"{feed.driver} is there, but says nothing for {timeout_s:g} s: does it hang, or is its"
+            " computer out of reach?"
+        )
+    if not there:
+        domain = os.environ.get("ROS_DOMAIN_ID", "0")
+        raise ToolError(
+            f"no driver is running in ROS domain {domain}: start one with ros2 run omnibot_driver"
+            " driver, or set ROS_DOMAIN_ID as it is where the driver runs"
+        )
+    namespace, _, name = there[0].rpartition("/")
+    others = f"--namespace {namespace or '/'}" + (
+        f" --driver {name}" if name != feed.driver.rpartition("/")[2] else ""
+    )
+    raise ToolError(f"no driver {feed.driver} here, but {', '.join(there)}: try {others}")
+
+
+def _gather(feed: "Feed", timeout_s: float) -> View:
+    """A view of all that a driver in this state says, over a whole window; or what there is."""
+    began_s = time.monotonic()
+    _comes_about(lambda: not feed.view().missing(feed.diagnoses()), timeout_s)
+    _comes_about(lambda: time.monotonic() - began_s > WINDOW_S, WINDOW_S)
+    view: View = feed.view()
+    return view
+
+
+def _print(view: View, feed: "Feed", as_json: bool) -> int:
+    troubles = []
+    if missing := view.missing(feed.diagnoses()):
+        troubles.append(
+            f"{view.driver} is {view.state}, but nothing comes on {', '.join(missing)}: is it"
+            " remapped, or lost on the network?"
+        )
+    if strange := view.not_finite():
+        troubles.append(
+            f"not a finite number: {', '.join(strange)}; whoever publishes that is not to be"
+            " trusted with a robot"
+        )
+    print(
+        text.as_json(view, troubles) if as_json else text.report(view), end="\n" if as_json else ""
+    )
+    for trouble in troubles:
+        print(f"monitor: {trouble}", file=sys.stderr)
+    return 1 if troubles else 0
+
+
+def _comes_about(predicate: Callable[[], bool], timeout_s: float) -> bool:
+    deadline_s = time.monotonic() + timeout_s
+    while not (holds := predicate()) and time.monotonic() < deadline_s:
+        time.sleep(LOOK_EVERY_S)
+    return holds
+
+
+if __name__ == "__main__":
+    sys.exit(main())

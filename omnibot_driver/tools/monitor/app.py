@@ -1,0 +1,206 @@
+"""The dashboard. Knows terminals and keys; what it shows and whom it tells is a ``Robot``."""
+
+import asyncio
+import signal
+import time
+from typing import ClassVar, Final, Protocol
+
+from rich.text import Text
+from textual import events
+from textual.app import App, ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal
+from textual.screen import ModalScreen
+from textual.widgets import Footer, Static
+
+from omnibot_driver.core.diagnosis import Level
+from omnibot_driver.tools.monitor import text
+from omnibot_driver.tools.monitor.model import View
+from omnibot_driver.tools.monitor.plot import ARROWS, draw_path
+from omnibot_driver.tools.monitor.teleop import LEVELS, DeadMan
+
+REFRESH_S: Final = 0.2
+PARTS: Final = ("title", "estop", "path", "figures", "verdicts", "teleop", "said")
+MOST_IN_FULL: Final = 4
+"""Verdicts, that all are in full; of more there is the beginning, as there is no room."""
+GREEN, YELLOW, RED, GREY, CYAN = "#98e024", "#f4bf4f", "#ff5f57", "#a0a0a0", "#58d1eb"
+COLOURS: Final = {
+    Level.OK: GREEN,
+    Level.WARN: YELLOW,
+    Level.ERROR: f"bold {RED}",
+    Level.STALE: GREY,
+}
+STATES: Final = {"nominal": GREEN, "imu_only": YELLOW, "paused": YELLOW}
+
+
+class Robot(Protocol):
+    """What is shown, and what a key may ask for. Each call returns at once."""
+
+    dead_man: DeadMan | None
+
+    def view(self) -> View:
+        """What is known now."""
+
+    def estop(self) -> None:
+        """Latch."""
+
+    def release(self) -> None:
+        """Let go."""
+
+    def start(self) -> None:
+        """Run."""
+
+    def pause(self) -> None:
+        """Pause."""
+
+    def reset_odometry(self) -> None:
+        """Begin here."""
+
+
+class Release(ModalScreen[bool]):
+    """Asks whether the e-stop is really to be released; y does, every other key does not."""
+
+    def compose(self) -> ComposeResult:
+        """One question."""
+        yield Static(
+            "Release the e-stop?\n\nIs everybody clear of the robot?\nIt stands until a new command"
+            " comes.\n\ny releases, any other key does not",
+            markup=False,
+        )
+
+    def on_key(self, event: events.Key) -> None:
+        """The answer."""
+        event.stop()
+        self.dismiss(event.key == "y")
+
+
+class Monitor(App[None]):
+    """The screen of one robot."""
+
+    ENABLE_COMMAND_PALETTE = False
+    CSS = """
+    #title, #estop, #teleop { height: 1; padding: 0 1; }
+    #title { background: $panel; }
+    #estop { color: $text-muted; }
+    #estop.latched { background: red; color: white; text-style: bold; text-align: center; }
+    #middle { height: 1fr; min-height: 8; }
+    #path { width: 1fr; height: 1fr; border: round $foreground-muted; }
+    #figures { width: 44; height: 1fr; padding: 0 0 0 1; }
+    #verdicts { height: auto; max-height: 10; padding: 0 1; }
+    #said { height: auto; max-height: 2; min-height: 1; padding: 0 1; background: $panel; }
+    Release { align: center middle; }
+    Release Static { width: 48; height: auto; padding: 1 2; border: heavy red;
+                     background: $surface; text-align: center; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("space", "estop", "E-STOP", priority=True),
+        Binding("R", "release", "release it", key_display="R"),
+        Binding("g", "start", "start"),
+        Binding("p", "pause", "pause"),
+        Binding("z", "reset_odometry", "zero odometry"),
+        Binding("q,ctrl+c", "quit", "quit", key_display="q"),
+    ]
+
+    def __init__(self, robot: Robot) -> None:
+        super().__init__()
+        self._robot = robot
+        self._parts = {name: Static(id=name, markup=False) for name in PARTS}
+
+    def compose(self) -> ComposeResult:
+        """From top to bottom."""
+        parts = self._parts
+        yield from (parts["title"], parts["estop"])
+        yield Horizontal(parts["path"], parts["figures"], id="middle")
+        yield parts["verdicts"]
+        if self._robot.dead_man:
+            yield parts["teleop"]
+        yield parts["said"]
+        yield Footer()
+
+    def on_mount(self) -> None:
+        """Begin to show, and to heed signals."""
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            asyncio.get_running_loop().add_signal_handler(number, self.exit)
+        self.set_interval(REFRESH_S, self.refresh_view)
+        self.refresh_view()
+
+    def refresh_view(self) -> None:
+        """Show what is known now."""
+        view = self._robot.view()
+        self._show_title(view)
+        line = self._parts["estop"]
+        line.set_class(bool(view.estop) or view.estop_asked, "latched")
+        line.update(text.estop(view) + ("  ·  R releases it" if view.estop else ""))
+        self._show_path(view)
+        self._parts["figures"].update(Text("\n".join(text.figures(view))))
+        self._show_verdicts(view)
+        self._parts["said"].update(Text(text.clean(view.said)))
+        if self._robot.dead_man:
+            self._show_teleop(self._robot.dead_man, view.steers)
+
+    def _show_title(self, view: View) -> None:
+        colour = RED if view.silent else STATES.get(view.state, RED)
+        self._parts["title"].update(Text(text.title(view), f"bold {colour}"))
+
+    def _show_path(self, view: View) -> None:
+        plot = self._parts["path"]
+        picture = draw_path(view.path, plot.content_size.width, plot.content_size.height, view.pose)
+        plot.border_title = "odom, x → y ↑"
+        plot.border_subtitle = f"{picture.width_m:.2f} m wide"
+        drawn = Text("\n".join(picture.rows), CYAN)
+        drawn.highlight_regex(f"[{ARROWS}]", f"bold {YELLOW}")
+        plot.update(drawn)
+
+    def _show_verdicts(self, view: View) -> None:
+        verdicts = text.verdicts(view)
+        columns = self._parts["verdicts"].content_size.width
+        longest = columns if len(verdicts) > MOST_IN_FULL else None
+        lines = [Text(words[:longest], COLOURS[level]) for level, words in verdicts]
+        self._parts["verdicts"].update(Text("\n").join([*lines, Text(text.counts(view))]))
+
+    def _show_teleop(self, dead_man: DeadMan, steers: bool) -> None:
+        linear, angular = dead_man.speeds
+        words = (
+            f"steer: WASD or arrows, J L turn, +/- speed {dead_man.level}/{LEVELS}: "
+            f"{linear:.2f} m/s {angular:.2f} rad/s"
+        )
+        self._parts["teleop"].update(Text(words if steers else "steer: nobody takes cmd_vel yet"))
+
+    # Keys
+
+    def on_key(self, event: events.Key) -> None:
+        """What steers."""
+        dead_man = self._robot.dead_man
+        if dead_man is None:
+            return
+        if dead_man.press(event.key, time.monotonic()):
+            event.stop()
+        elif event.key in ("plus", "minus"):
+            dead_man.change_speed(1 if event.key == "plus" else -1)
+
+    def on_app_blur(self) -> None:
+        """Whoever looks elsewhere does not steer."""
+        if self._robot.dead_man:
+            self._robot.dead_man.stop()
+
+    def action_estop(self) -> None:
+        """At once, whatever else is on the screen."""
+        self._robot.estop()
+        if isinstance(self.screen, Release):
+            self.screen.dismiss(False)
+
+    def action_release(self) -> None:
+        """After a question."""
+        self.push_screen(Release(), lambda sure: self._robot.release() if sure else None)
+
+    def action_start(self) -> None:
+        """Have the board run."""
+        self._robot.start()
+
+    def action_pause(self) -> None:
+        """Have the board pause."""
+        self._robot.pause()
+
+    def action_reset_odometry(self) -> None:
+        """Zero where the robot stands."""
+        self._robot.reset_odometry()

@@ -1,0 +1,195 @@
+"""What is known of the robot: the latest values, how often they come, the way it went.
+
+Must not know ROS, terminals or the clock. Values are kept as they came, NaN and infinity included:
+that they are nonsense is something to be seen.
+"""
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.board import Vector3
+from omnibot_driver.core.diagnosis import RUNNING, Level, Status
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.tools.monitor.rates import Rate
+
+IMU_TOPIC: Final = "imu/data_raw"
+ODOM_TOPIC: Final = "odom"
+DIAGNOSTICS_TOPIC: Final = "/diagnostics"
+COMMAND_LIVES_S: Final = 0.5
+"""As the driver's ``cmd_vel_timeout``: an older one moves nobody."""
+SILENT_S: Final = 3.0
+"""Diagnostics come every second: after three without, they and the driver are history."""
+STEP_M: Final = 0.02
+LONGEST_PATH: Final = 5000
+JUMP_M: Final = 0.05
+JUMP_MPS: Final = 2.0
+"""A pose further away than the robot can have driven begins a new path: the odometry was reset."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flow:
+    """How a topic comes in; ``age_s`` is None where nothing came of late."""
+
+    hz: float
+    age_s: float | None
+    history: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """All of it at one moment. What is not known, or no longer, is None or empty.
+
+    ``steers`` is whether somebody takes what is commanded here.
+    """
+
+    driver: str
+    state: str
+    estop: bool | None
+    estop_asked: bool
+    silent_s: float
+    imu: Flow
+    odom: Flow
+    pose: Pose | None
+    measured: BodyTwist | None
+    commanded: BodyTwist | None
+    force_mps2: Vector3 | None
+    rate_radps: Vector3 | None
+    statuses: tuple[Status, ...]
+    path: tuple[tuple[float, float], ...]
+    steers: bool
+    said: str
+
+    @property
+    def silent(self) -> bool:
+        """Whether the driver is not heard any more."""
+        return self.silent_s > SILENT_S
+
+    @property
+    def link(self) -> str:
+        """What the diagnostics say of the link, with the port."""
+        for status in self.statuses:
+            if status.name == "Link":
+                return f"{status.message}, {status.values.get('Port', '')}".rstrip(", ")
+        return ""
+
+    def missing(self, diagnostics: bool) -> list[str]:
+        """Topics that a driver in this state publishes and that are not heard."""
+        wanted = {
+            "state": bool(self.state),
+            "estop_active": self.estop is not None,
+            IMU_TOPIC: self.imu.age_s is not None or self.state not in RUNNING,
+            ODOM_TOPIC: self.odom.age_s is not None or self.state != "nominal",
+            DIAGNOSTICS_TOPIC: bool(self.statuses) or not diagnostics,
+        }
+        return [name for name, heard in wanted.items() if not heard]
+
+    def not_finite(self) -> list[str]:
+        """Names of the values that are NaN or infinite."""
+        return [name for name, value in self._numbers() if not math.isfinite(value)]
+
+    def _numbers(self) -> Iterator[tuple[str, float]]:
+        pose, force, rate = self.pose, self.force_mps2, self.rate_radps
+        if pose:
+            yield from (("pose x", pose.x_m), ("pose y", pose.y_m), ("yaw", pose.yaw_rad))
+        for name, twist in (("measured", self.measured), ("commanded", self.commanded)):
+            if twist:
+                yield from ((f"{name} x", twist.vx_mps), (f"{name} y", twist.vy_mps))
+                yield f"{name} turn", twist.yaw_rate_radps
+        for name, vector in (("acceleration", force), ("angular velocity", rate)):
+            for axis, value in zip("xyz", vector or (), strict=False):
+                yield f"{name} {axis}", value
+
+
+class Model:
+    """Told what comes in, asked for a View. Times are of one clock, in s."""
+
+    def __init__(self, driver: str, now_s: float) -> None:
+        self.said = ""
+        self.estop_asked = False
+        self._driver = driver
+        self._state = ""
+        self._estop: bool | None = None
+        self._heard_s = now_s
+        self._imu, self._odom = Rate(now_s), Rate(now_s)
+        self._pose: Pose | None = None
+        self._pose_s = now_s
+        self._measured: BodyTwist | None = None
+        self._commanded: tuple[BodyTwist, float] | None = None
+        self._force: Vector3 | None = None
+        self._rate: Vector3 | None = None
+        self._statuses: tuple[Status, ...] = ()
+        self._diagnosed_s = now_s
+        self._path: deque[tuple[float, float]] = deque(maxlen=LONGEST_PATH)
+
+    def state(self, state: str, now_s: float) -> None:
+        """``~/state``."""
+        self._state, self._heard_s = state, now_s
+
+    def estop(self, active: bool, now_s: float) -> None:
+        """``~/estop_active``."""
+        self._estop, self._heard_s = active, now_s
+
+    def imu(self, force_mps2: Vector3, rate_radps: Vector3, now_s: float) -> None:
+        """``imu/data_raw``."""
+        self._imu.arrived(now_s)
+        self._force, self._rate, self._heard_s = force_mps2, rate_radps, now_s
+
+    def odom(self, pose: Pose, twist: BodyTwist | None, now_s: float) -> None:
+        """``odom``; the twist is None where it is not known."""
+        self._odom.arrived(now_s)
+        self._follow(pose, now_s)
+        self._pose, self._pose_s, self._measured, self._heard_s = pose, now_s, twist, now_s
+
+    def commanded(self, twist: BodyTwist, now_s: float) -> None:
+        """``cmd_vel``, from whomever: it tells nothing of the driver."""
+        self._commanded = twist, now_s
+
+    def diagnosed(self, statuses: tuple[Status, ...], now_s: float) -> None:
+        """``/diagnostics`` of this driver."""
+        self._statuses, self._diagnosed_s, self._heard_s = statuses, now_s, now_s
+
+    def view(self, now_s: float, *, steers: bool = False) -> View:
+        """All that is known now."""
+        moves = self._commanded and now_s - self._commanded[1] < COMMAND_LIVES_S
+        imu, odom = (
+            Flow(rate.hz(now_s), rate.age_s(now_s), rate.history(now_s))
+            for rate in (self._imu, self._odom)
+        )
+        return View(
+            driver=self._driver,
+            state=self._state,
+            estop=self._estop,
+            estop_asked=self.estop_asked,
+            silent_s=now_s - self._heard_s,
+            imu=imu,
+            odom=odom,
+            pose=self._pose,
+            measured=self._measured if odom.age_s is not None else None,
+            commanded=self._commanded[0] if self._commanded and moves else None,
+            force_mps2=self._force if imu.age_s is not None else None,
+            rate_radps=self._rate if imu.age_s is not None else None,
+            statuses=self._statuses if now_s - self._diagnosed_s <= SILENT_S else (),
+            path=tuple(self._path),
+            steers=steers,
+            said=self.said,
+        )
+
+    def _follow(self, pose: Pose, now_s: float) -> None:
+        if not pose.finite:
+            return
+        before, here = self._pose, (pose.x_m, pose.y_m)
+        if before and before.finite:
+            reach_m = JUMP_M + JUMP_MPS * (now_s - self._pose_s)
+            if math.dist((before.x_m, before.y_m), here) > reach_m:
+                self._path.clear()
+        if not self._path or math.dist(self._path[-1], here) >= STEP_M:
+            self._path.append(here)
+
+
+def level(byte: int) -> Level:
+    """As in diagnostic_msgs/DiagnosticStatus; what is none counts as the worst."""
+    return Level(byte) if byte in tuple(Level) else Level.ERROR

@@ -1,0 +1,48 @@
+"""How often something arrives. Knows counting; must not know what arrives, nor read a clock."""
+
+from collections import deque
+from typing import Final
+
+WINDOW_S: Final = 2.0
+HISTORY_S: Final = 60
+
+
+class Rate:
+    """Arrivals since ``began_s``; times in s, of one clock, never going back."""
+
+    def __init__(self, began_s: float) -> None:
+        self._began_s = began_s
+        self._recent_s: deque[float] = deque()
+        self._seconds: deque[int] = deque([0], maxlen=HISTORY_S + 1)
+        self._latest_second = 0
+        self.count = 0
+
+    def arrived(self, now_s: float) -> None:
+        """One more."""
+        self.count += 1
+        self._recent_s.append(now_s)
+        self._forget(now_s)
+        self._seconds[-1] += 1
+
+    def hz(self, now_s: float) -> float:
+        """Over the window, or over the time since the beginning while that is shorter."""
+        self._forget(now_s)
+        span_s = min(WINDOW_S, now_s - self._began_s)
+        return len(self._recent_s) / span_s if span_s > 0.0 else 0.0
+
+    def age_s(self, now_s: float) -> float | None:
+        """Since the last one within the window; None where there was none."""
+        self._forget(now_s)
+        return now_s - self._recent_s[-1] if self._recent_s else None
+
+    def history(self, now_s: float) -> tuple[int, ...]:
+        """Arrivals in each whole second since the beginning, the last minute of them."""
+        self._forget(now_s)
+        return tuple(self._seconds)[:-1]
+
+    def _forget(self, now_s: float) -> None:
+        while self._recent_s and now_s - self._recent_s[0] >= WINDOW_S:
+            self._recent_s.popleft()
+        second = int(now_s - self._began_s)
+        self._seconds.extend([0] * min(second - self._latest_second, HISTORY_S + 1))
+        self._latest_second = second

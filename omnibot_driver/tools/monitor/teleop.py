@@ -1,0 +1,81 @@
+"""Steering by keys, with a dead man's rule. Knows keys and times; no terminal, no ROS, no clock.
+
+A terminal tells that a key is pressed, repeats it while it is held, and never tells of its release.
+So a key moves the robot for a short time only, and holding it renews that time.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.kinematics import BodyTwist
+
+FIRST_S: Final = 0.6
+"""A key pressed anew moves the robot so long: most keyboards repeat after 0.25 s to 0.6 s."""
+REPEAT_S: Final = 0.3
+"""After a repetition: several of them may get lost or be late."""
+ZEROS: Final = 5
+"""So many commands to stand still, and then none: others may want to drive."""
+LEVELS: Final = 10
+NOTHING: Final = ("", -math.inf)
+HALT: Final = BodyTwist(0.0, 0.0, 0.0)
+
+MOTIONS: Final = {
+    **dict.fromkeys(("w", "up"), (1, 0, 0)),
+    **dict.fromkeys(("s", "down"), (-1, 0, 0)),
+    **dict.fromkeys(("a", "left"), (0, 1, 0)),
+    **dict.fromkeys(("d", "right"), (0, -1, 0)),
+    "j": (0, 0, 1),
+    "l": (0, 0, -1),
+}
+"""Forward, to the left, turning to the left."""
+
+
+class DeadMan:
+    """What is to be driven now, by the keys that were pressed.
+
+    Keys may come from another thread than the one that asks: what they change is one reference.
+    """
+
+    def __init__(self) -> None:
+        self.level = 3
+        self.fastest = (0.5, 0.5)
+        """In m/s and rad/s, at the highest level."""
+        self.has_driven = False
+        self._held = NOTHING
+        self._zeros = 0
+
+    def press(self, key: str, now_s: float) -> bool:
+        """Whether this key steers; if so, it does from now on."""
+        if key not in MOTIONS:
+            return False
+        before, until_s = self._held
+        lasts_s = REPEAT_S if key == before and now_s < until_s else FIRST_S
+        self._held = key, now_s + lasts_s
+        return True
+
+    def stop(self) -> None:
+        """Whatever is held: stand still."""
+        self._held = NOTHING
+
+    def change_speed(self, steps: int) -> None:
+        """By tenths of the fastest, from one to ten."""
+        self.level = min(max(self.level + steps, 1), LEVELS)
+
+    @property
+    def speeds(self) -> tuple[float, float]:
+        """In m/s and rad/s, at this level."""
+        part = self.level / LEVELS
+        return part * self.fastest[0], part * self.fastest[1]
+
+    def command(self, now_s: float) -> BodyTwist | None:
+        """What is to be published now: a motion, then a few times to stand still, then nothing."""
+        key, until_s = self._held
+        if now_s < until_s:
+            self._zeros, self.has_driven = ZEROS, True
+            ahead, aside, turn = MOTIONS[key]
+            linear, angular = self.speeds
+            return BodyTwist(ahead * linear, aside * linear, turn * angular)
+        if self._zeros:
+            self._zeros -= 1
+            return HALT
+        return None

@@ -1,0 +1,169 @@
+"""A view of the robot in words and in JSON. Must not know ROS, nor where it is shown."""
+
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Any, Final
+
+from omnibot_driver.core.diagnosis import Level, Status
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.tools.monitor.model import IMU_TOPIC, ODOM_TOPIC, View
+from omnibot_driver.tools.monitor.plot import sparkline
+
+WIDTH: Final = 7
+BAR_COLUMNS: Final = 20
+COUNTS: Final = (
+    ("Stream", "Framing faults", "framing faults"),
+    ("Stream", "Sequence gaps", "gaps"),
+    ("Stream", "IMU frames lost", "IMU lost"),
+    ("Stream", "Odometry frames lost", "odom lost"),
+    ("Board", "Restarts", "restarts"),
+    ("Link", "Reconnects", "reconnects"),
+    ("Commands", "Refused", "refused"),
+)
+
+
+def clean(text: str) -> str:
+    """Without what would move a terminal's cursor."""
+    return "".join(char if char.isprintable() else "?" for char in text)
+
+
+def number(value: float | None, places: int = 2) -> str:
+    """In seven columns, whatever it is."""
+    if value is None:
+        return "–".rjust(WIDTH)
+    if 999.9 < abs(value) < math.inf:
+        return f"{value:{WIDTH}.0f}" if abs(value) < 99_999.0 else f"{value:{WIDTH}.0e}"
+    return f"{round(value, places) + 0.0:{WIDTH}.{places}f}"  # + 0.0 makes a rounded -0.0 positive
+
+
+def numbers(values: Iterable[float] | None) -> str:
+    """Three of them, or three dashes."""
+    return " ".join(number(value) for value in (values or (None, None, None)))
+
+
+def title(view: View) -> str:
+    """Who, in which mode, over which link."""
+    if view.silent:
+        return f"{view.driver}  nothing heard for {view.silent_s:.0f} s (was {view.state})"
+    return clean(f"{view.driver}  {view.state}  {view.link}".rstrip())
+
+
+def estop(view: View) -> str:
+    """The latch, in words."""
+    if view.estop_asked:
+        return "E-STOP ASKED FOR, NOT YET CONFIRMED"
+    if view.estop is None or (view.silent and not view.estop):
+        return "e-stop: not known"
+    return "E-STOP LATCHED" if view.estop else "e-stop not latched"
+
+
+def figures(view: View) -> list[str]:
+    """Rates, pose, velocities, IMU: lines of 42 columns at most."""
+    return [
+        *(
+            f"{name:<12}{flow.hz:5.0f} Hz  {sparkline(flow.history, BAR_COLUMNS)}"
+            for name, flow in ((IMU_TOPIC, view.imu), (ODOM_TOPIC, view.odom))
+        ),
+        "                        x       y yaw or z",
+        f"pose      m, °     {_pose(view)}",
+        f"commanded m/s rad/s{numbers(_twist(view.commanded))}",
+        f"measured  m/s rad/s{numbers(_twist(view.measured))}",
+        f"force     m/s²     {numbers(view.force_mps2)}",
+        f"gyro      rad/s    {numbers(view.rate_radps)}",
+    ]
+
+
+def verdicts(view: View) -> list[tuple[Level, str]]:
+    """Each status that is not OK in its own words, all that are in one line, and the counts."""
+    if not view.statuses:
+        return [(Level.STALE, "no diagnostics are heard")]
+    worst = sorted((s for s in view.statuses if s.level), key=_urgency, reverse=True)
+    lines = [(s.level, clean(f"{s.name}: {s.message}")) for s in worst]
+    if fine := [s.name for s in view.statuses if not s.level]:
+        lines.append((Level.OK, clean(f"OK: {', '.join(fine)}")))
+    return lines
+
+
+def counts(view: View) -> str:
+    """What has happened since the driver started; what is zero is not worth a word."""
+    values = {(s.name, key): value for s in view.statuses for key, value in s.values.items()}
+    happened = [
+        f"{word} {values[name, key]}"
+        for name, key, word in COUNTS
+        if values.get((name, key), "0") != "0"
+    ]
+    if not view.statuses:
+        return ""
+    return clean(f"since its start: {', '.join(happened) or 'nothing lost, nothing refused'}")
+
+
+def report(view: View) -> str:
+    """All of it for a terminal, a log or a pipe."""
+    statuses = [clean(f"{s.name:<10}{s.level.name:<6}{s.message}") for s in view.statuses]
+    lines = [title(view), estop(view), "", *figures(view), "", *statuses, counts(view)]
+    return "\n".join(line.rstrip() for line in lines).rstrip() + "\n"
+
+
+def as_json(view: View, troubles: Iterable[str]) -> str:
+    """The same for programs; JSON knows no NaN, so what is not finite is null and in troubles."""
+    return json.dumps(
+        {
+            "driver": view.driver,
+            "state": view.state or None,
+            "estop": view.estop,
+            "rates_hz": {
+                IMU_TOPIC: round(view.imu.hz, 1),
+                ODOM_TOPIC: round(view.odom.hz, 1),
+            },
+            "pose": _fields(view.pose),
+            "commanded": _fields(view.commanded),
+            "measured": _fields(view.measured),
+            "imu": {
+                "linear_acceleration_mps2": _finite(view.force_mps2),
+                "angular_velocity_radps": _finite(view.rate_radps),
+            },
+            "diagnostics": {s.name: _status(s) for s in view.statuses},
+            "troubles": list(troubles),
+        },
+        indent=2,
+        ensure_ascii=False,
+    )
+
+
+def _urgency(status: Status) -> int:
+    return status.level % Level.STALE
+
+
+def _pose(view: View) -> str:
+    if view.pose is None:
+        return numbers(None)
+    yaw_rad = view.pose.yaw_rad
+    if math.isfinite(yaw_rad):
+        yaw_rad = math.remainder(yaw_rad, math.tau)
+    return f"{numbers((view.pose.x_m, view.pose.y_m))} {number(math.degrees(yaw_rad), 1)}"
+
+
+def _twist(twist: BodyTwist | None) -> tuple[float, float, float] | None:
+    return (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps) if twist else None
+
+
+def _status(status: Status) -> dict[str, Any]:
+    return {
+        "level": status.level.name,
+        "message": status.message,
+        "values": dict(status.values),
+    }
+
+
+def _fields(value: Any) -> dict[str, float | None] | None:
+    if value is None:
+        return None
+    return {
+        name: number if math.isfinite(number) else None for name, number in asdict(value).items()
+    }
+
+
+def _finite(values: Iterable[float] | None) -> list[float | None] | None:
+    return None if values is None else [v if math.isfinite(v) else None for v in values]

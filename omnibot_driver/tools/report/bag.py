@@ -1,0 +1,108 @@
+"""A rosbag2 read without ROS: a folder or a file of it, sqlite3 or mcap, also compressed."""
+
+from collections.abc import Callable, Collection, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Final
+
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
+
+from omnibot_driver.tools.needs import ToolError
+from omnibot_driver.tools.report.findings import counted
+from omnibot_driver.tools.report.log import Log
+from omnibot_driver.tools.report.recorder import Recorder
+from omnibot_driver.tools.report.robots import choose, find
+
+STORAGES: Final = (".mcap", ".db3")
+NEWS_EVERY: Final = 2000
+"""Messages between two words of progress."""
+
+Progress = Callable[[int, int], None]
+"""Told how many messages are read, and of how many."""
+
+
+def read(path: Path, namespace: str | None, progress: Progress) -> Log:
+    """What a bag has of one robot. Raises ToolError where it has nothing to read."""
+    with ExitStack() as stack:
+        readers, troubles = _open(path, stack)
+        connections = [connection for reader in readers for connection in reader.connections]
+        if not any(reader.message_count for reader in readers):
+            raise ToolError(f"{path} is empty: nothing was recorded into it")
+        robots = find((item.topic, item.msgtype) for item in connections)
+        robot, topics = choose(robots, namespace, str(path))
+        recorder = Recorder(robot)
+        total = sum(item.msgcount for item in connections if item.topic in topics)
+        types = get_typestore(Stores.ROS2_JAZZY)
+        damaged = 0
+        for reader in readers:
+            messages = _messages(reader, topics.keys(), troubles)
+            for count, (item, arrived_ns, data) in enumerate(messages, recorder.count + damaged):
+                if count % NEWS_EVERY == 0:
+                    progress(count, total)
+                try:
+                    message = types.deserialize_cdr(data, item.msgtype)
+                    recorder.hear(topics[item.topic], item.msgtype, arrived_ns, message)
+                except Exception:  # whatever a damaged message makes the library stumble over
+                    damaged += 1
+        progress(total, total)
+    if damaged:
+        troubles.append(f"{counted(damaged, 'message')} damaged, and passed over")
+    if not recorder.count:
+        why = "; ".join(troubles) or "its topics are empty"
+        raise ToolError(f"{path} has no message of the robot {robot}: {why}")
+    return recorder.log(tuple(troubles), alone=len(robots) == 1)
+
+
+def _messages(
+    reader: Reader, topics: Collection[str], troubles: list[str]
+) -> Iterator[tuple[Connection, int, bytes]]:
+    """As far as it can be read."""
+    wanted = [item for item in reader.connections if item.topic in topics]
+    if not wanted:
+        return
+    try:
+        yield from reader.messages(wanted)
+    except Exception as error:  # whatever a damaged file makes the library stumble over
+        troubles.append(f"{reader.path} cannot be read to its end: {_in_a_line(error)}")
+
+
+def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
+    """What can be opened, and what cannot."""
+    if not path.exists():
+        raise ToolError(f"there is no {path}: give the folder of a bag, or its .mcap or .db3 file")
+    if path.is_dir() and not (path / "metadata.yaml").exists():
+        return _open_unfinished(path, stack)
+    if not path.is_dir() and path.suffix not in STORAGES:
+        raise ToolError(f"{path} is no bag: give the folder of a bag, or its .mcap or .db3 file")
+    try:
+        return [stack.enter_context(Reader(path))], []
+    except Exception as error:
+        raise ToolError(
+            f"{path} cannot be read: {_in_a_line(error)}. If its recorder was killed,"
+            f" repair it with `ros2 bag reindex {path if path.is_dir() else path.parent}`"
+        ) from error
+
+
+def _open_unfinished(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
+    files = sorted(file for file in path.iterdir() if file.suffix in STORAGES)
+    if not files:
+        raise ToolError(f"{path} is no bag: it has neither metadata.yaml nor a .mcap or .db3 file")
+    readers: list[Reader] = []
+    troubles = [
+        "the bag was never finished (metadata.yaml is missing):"
+        f" `ros2 bag reindex {path}` repairs it"
+    ]
+    for file in files:
+        try:
+            readers.append(stack.enter_context(Reader(file)))
+        except Exception as error:
+            troubles.append(f"{file.name} cannot be read: {_in_a_line(error)}")
+    if not readers:
+        raise ToolError(f"{path} cannot be read: {'; '.join(troubles)}")
+    return readers, troubles
+
+
+def _in_a_line(error: Exception) -> str:
+    return " ".join(str(error).split()).rstrip(".")

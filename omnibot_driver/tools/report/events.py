@@ -1,0 +1,128 @@
+"""What the driver said of itself: its state, the e-stop, /diagnostics."""
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import groupby
+from typing import Final
+
+from omnibot_driver.tools.report.findings import Finding, Level, counted, span
+from omnibot_driver.tools.report.log import Log, Span, Status
+
+LEVELS: Final = ("OK", "WARN", "ERROR", "STALE")
+FIRST_SECONDS: Final = 3.0
+"""In which a driver that has just been started may still be connecting."""
+LONG_OUT_OF_REACH: Final = 0.1
+SILENT_S: Final = 2.0
+"""A driver that has published no /diagnostics for so long is not there."""
+
+
+def judge(log: Log) -> Iterator[Finding]:
+    """In this order."""
+    yield from _states(log)
+    yield from _estop(log)
+    yield from _diagnostics(log)
+
+
+def _states(log: Log) -> Iterator[Finding]:
+    if not log.states:
+        return
+    lengths: dict[str, float] = {}
+    states = list(log.states)
+    if len(states) > 1 and states[-1].what == "disconnected" and not _alive(log, states[-1]):
+        yield Finding(Level.NOTE, "State", f"The driver ended at {states.pop().begin_s:.1f} s.")
+    for state in states:
+        lengths[state.what] = lengths.get(state.what, 0.0) + state.length_s
+    told = ", ".join(f"{name} for {span(length)}" for name, length in lengths.items())
+    lost = [
+        state
+        for state in states
+        if state.what in ("disconnected", "connecting") and state.end_s > FIRST_SECONDS
+    ]
+    if lost:
+        yield Finding(
+            Level.BAD
+            if sum(state.length_s for state in lost) > LONG_OUT_OF_REACH * log.duration_s
+            else Level.WARN,
+            "State",
+            f"The board was out of reach {counted(len(lost), 'time')}, first at"
+            f" {lost[0].begin_s:.1f} s. In all: {told}.",
+            "Unless you reset it or pulled the cable: check cable, hub and the board's power.",
+        )
+    elif "imu_only" in lengths:
+        yield Finding(
+            Level.WARN,
+            "State",
+            f"The board ran in IMU-only mode. In all: {told}.",
+            "For odometry set the board's own mode to nominal and reboot it.",
+        )
+    else:
+        yield Finding(Level.GOOD, "State", f"{told[:1].upper()}{told[1:]}.")
+
+
+def _alive(log: Log, state: Span) -> bool:
+    """Whether the driver went on speaking in this state."""
+    return any(
+        status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what
+        for status in log.diagnostics
+    )
+
+
+def _estop(log: Log) -> Iterator[Finding]:
+    if not log.estops:
+        return
+    if not log.latched:
+        yield Finding(Level.GOOD, "E-stop", "Never latched.")
+        return
+    length_s = sum(latched.length_s for latched in log.latched)
+    still = " and still latched at the end" if log.estops[-1].what == "latched" else ""
+    yield Finding(
+        Level.NOTE,
+        "E-stop",
+        f"Latched {counted(len(log.latched), 'time')}, {span(length_s)} in all, first at"
+        f" {log.latched[0].begin_s:.1f} s{still}.",
+        "Release it with the service ~/estop (data: false) when all is clear." if still else "",
+    )
+
+
+def _diagnostics(log: Log) -> Iterator[Finding]:
+    """The worst word of each status, and how often it was said."""
+    if log.diagnostics and not log.alone:
+        ports = ", ".join(sorted({status.hardware_id for status in log.diagnostics}))
+        yield Finding(
+            Level.NOTE,
+            "Diagnostics",
+            f"/diagnostics is of several robots, on {ports}; all are told of here.",
+        )
+    troubles = [
+        status
+        for status in log.diagnostics
+        if status.level in (1, 2) and not _told_elsewhere(status)
+    ]
+    for (port, name), group in groupby(sorted(troubles, key=_key), key=_key):
+        statuses = list(group)
+        worst = max(status.level for status in statuses)
+        words = Counter(status.message for status in statuses if status.level == worst)
+        ((message, times),) = words.most_common(1)
+        yield Finding(
+            Level.BAD if worst == 2 else Level.WARN,
+            "Diagnostics",
+            f"{name} ({port}) said {LEVELS[worst]} {counted(len(statuses), 'time')}, from"
+            f" {statuses[0].at_s:.0f} s on: “{message}” ({times}×).",
+            "docs/diagnostics.md explains each status.",
+        )
+    if log.diagnostics and not troubles:
+        yield Finding(Level.GOOD, "Diagnostics", "No warning and no error.")
+
+
+def _told_elsewhere(status: Status) -> bool:
+    """The e-stop, what it refuses, and the pause are no trouble; nor the first seconds."""
+    if status.name.endswith("Commands"):
+        return "e-stop" in status.message
+    return status.name.endswith("E-stop") or (
+        status.name.endswith("Board")
+        and (status.at_s < FIRST_SECONDS or status.values.get("Mode") in ("paused", "imu_only"))
+    )
+
+
+def _key(status: Status) -> tuple[str, str]:
+    return status.hardware_id, status.name

@@ -1,0 +1,242 @@
+"""Whether the robot did what it was told: commands against what was measured."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from omnibot_driver.tools.report.findings import Finding, Level, counted, span
+from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Mask, Series, Span
+
+LAGS_S: Final = np.arange(0.0, 0.62, 0.02)
+TOLERANCE: Final = 0.1
+TOLD: Final = 0.05
+"""m/s of a wheel's rim, about: below, friction may hold the robot."""
+STANDS: Final = 0.2
+"""A robot slower than this part of its command does not follow."""
+SUSTAINED_S: Final = 1.0
+AFTER_STOP_S: Final = 1.5
+"""Until a robot that was stopped must stand."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """A command topic and what answers it. ``weights`` make the axes speeds of a rim in m/s."""
+
+    topic: str
+    axes: tuple[str, str, str]
+    unit: str
+    weights: tuple[float, float, float]
+    scales: tuple[str, str, str]
+    commands: Series
+    measured: Series
+
+
+def pairs(log: Log) -> list[Pair]:
+    """Those of which the log has both sides, without what is not finite."""
+    finite = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
+    twist = Series(finite.arrived_s, finite.stamp_s, finite.values[:, 3:])
+    wheels = log.joint_states.only(log.joint_states.finite & np.isfinite(log.joint_states.stamp_s))
+    linear, angular = "linear_scale", "angular_scale"
+    found = [
+        Pair(
+            "cmd_vel",
+            ("vx", "vy", "yaw rate"),
+            "m/s, rad/s",
+            (1.0, 1.0, 0.143),
+            (linear, linear, angular),
+            log.cmd_vel.only(log.cmd_vel.finite),
+            twist,
+        ),
+        Pair(
+            "wheel_cmd",
+            ("wheel A", "wheel B", "wheel C"),
+            "rad/s",
+            (0.029,) * 3,
+            (linear,) * 3,
+            log.wheel_cmd.only(log.wheel_cmd.finite),
+            wheels,
+        ),
+    ]
+    return [pair for pair in found if len(pair.commands) and len(pair.measured) > 1]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """How a command was followed: after ``lag_s``, with a ``gain`` on each axis (NaN: not told)."""
+
+    lag_s: float
+    gains: Array
+    error: Array
+
+
+def answer(pair: Pair, usable: Mask) -> Answer | None:
+    """The lag that explains most, and the gains with it; None where nothing was commanded."""
+    times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
+    weights = np.array(pair.weights)
+    best_s, least = 0.0, np.inf
+    for lag_s in LAGS_S:
+        told = pair.commands.held(times_s - lag_s) * weights
+        moved = values * weights
+        power = (told**2).sum()
+        if not power:
+            return None
+        gain = (told * moved).sum() / power
+        error = float(((moved - gain * told) ** 2).sum())
+        if error < least:
+            best_s, least = float(lag_s), error
+    told = pair.commands.held(times_s - best_s)
+    enough = np.sqrt(((told * weights) ** 2).mean(axis=0)) > 0.1 * TOLD
+    power = (told**2).sum(axis=0)
+    gains = np.where(enough, (told * values).sum(axis=0) / np.where(enough, power, 1.0), np.nan)
+    error = np.sqrt(((values - np.nan_to_num(gains, nan=1.0) * told) ** 2).mean(axis=0))
+    return Answer(best_s, gains, error)
+
+
+def judge(log: Log) -> Iterator[Finding]:
+    """Commands that are none, cease, are followed or not; motion that nobody told."""
+    if not len(log.cmd_vel) and not len(log.wheel_cmd):
+        yield Finding(
+            Level.NOTE,
+            "Commands",
+            "No cmd_vel and no wheel_cmd: whether the robot did what it was told is not known.",
+            "",
+        )
+        return
+    for name, series in (("cmd_vel", log.cmd_vel), ("wheel_cmd", log.wheel_cmd)):
+        broken = int((~series.finite).sum())
+        if broken:
+            yield Finding(
+                Level.WARN,
+                "Commands",
+                f"{counted(broken, 'message')} of {name} with NaN, infinity or a wrong length.",
+                "The driver refuses them: mend the node that publishes them.",
+            )
+    found = pairs(log)
+    for pair in found:
+        yield from _ceased(log, pair)
+    told, moved, times_s = _speeds(found)
+    if not len(times_s):
+        return
+    free = ~_stopped(log, times_s)
+    stalls = _sustained(times_s, free & (told > TOLD) & (moved < STANDS * told))
+    yield from _stalled(stalls)
+    for pair in found:
+        usable = ~_stopped(log, pair.measured.stamp_s)
+        usable &= ~log.within(stalls, pair.measured.stamp_s)
+        yield from _followed(log, pair, answer(pair, usable))
+    yield from _untold(log, times_s, told, moved)
+
+
+def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
+    """Told and measured, as speeds of a rim, at the times of what was measured first."""
+    if not found:
+        return np.empty(0), np.empty(0), np.empty(0)
+    times_s = found[0].measured.stamp_s
+    weights = np.array(found[0].weights)
+    moved = np.linalg.norm(found[0].measured.values * weights, axis=1)
+    told = np.zeros(len(times_s))
+    for pair in found:
+        command = np.linalg.norm(pair.commands.held(times_s) * np.array(pair.weights), axis=1)
+        told = np.maximum(told, command)
+    return told, moved, times_s
+
+
+def _stopped(log: Log, at_s: Array) -> Mask:
+    """While commands were not carried out, and shortly after."""
+    off = [state for state in log.states if state.what not in ("nominal", "imu_only")]
+    spans = [
+        Span(item.begin_s, item.end_s + COMMAND_TIMEOUT_S, "") for item in (*off, *log.latched)
+    ]
+    return log.within(spans, at_s)
+
+
+def _sustained(times_s: Array, rows: Mask) -> list[Span]:
+    """Stretches in which this holds for a second and more."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
+    spans = [Span(times_s[first], times_s[last - 1], "") for first, last in edges.reshape(-1, 2)]
+    return [item for item in spans if item.length_s >= SUSTAINED_S]
+
+
+def _ceased(log: Log, pair: Pair) -> Iterator[Finding]:
+    commands = pair.commands
+    waits_s = np.diff(commands.arrived_s)
+    moving = (commands.values[:-1] != 0.0).any(axis=1)
+    moving &= ~_stopped(log, commands.arrived_s[:-1] + COMMAND_TIMEOUT_S)
+    ceased = np.flatnonzero(moving & (waits_s > COMMAND_TIMEOUT_S))
+    if len(ceased):
+        yield Finding(
+            Level.NOTE,
+            "Commands",
+            f"{pair.topic} ceased {counted(len(ceased), 'time')} in motion for more than"
+            f" {COMMAND_TIMEOUT_S:g} s, first at {commands.arrived_s[ceased[0]]:.1f} s: the driver"
+            " stopped the robot.",
+            "If that was not meant, publish at a steady rate of 10 Hz or more.",
+        )
+
+
+def _stalled(stalls: list[Span]) -> Iterator[Finding]:
+    if stalls:
+        yield Finding(
+            Level.BAD,
+            "Commands",
+            f"Told to move, the robot stood {counted(len(stalls), 'time')},"
+            f" {span(sum(item.length_s for item in stalls))} in all, first at"
+            f" {stalls[0].begin_s:.1f} s.",
+            "Check the motors' power, the board's own e-stop and its switch (velocity control), and"
+            " whether something blocks the wheels.",
+        )
+
+
+def _followed(log: Log, pair: Pair, found: Answer | None) -> Iterator[Finding]:
+    if found is None or np.isnan(found.gains).all():
+        return
+    told = [axis for axis in range(3) if np.isfinite(found.gains[axis])]
+    figures = ", ".join(
+        f"{pair.axes[axis]} {found.gains[axis]:.2f} (±{found.error[axis]:.2g})" for axis in told
+    )
+    figure = (
+        f"{pair.topic} is followed {1e3 * found.lag_s:.0f} ms late; measured over commanded:"
+        f" {figures}"
+    )
+    off = [axis for axis in told if abs(found.gains[axis] - 1.0) > TOLERANCE]
+    if not off:
+        yield Finding(Level.GOOD, "Commands", f"{figure}.")
+        return
+    if any(found.gains[axis] < -TOLERANCE for axis in off):
+        advice = "It moves the wrong way: set axis_signs (docs/commissioning.md)."
+    else:
+        scales = sorted({pair.scales[axis] for axis in off})
+        advice = (
+            f"If the commands are within the limits max_…, divide {' and '.join(scales)} by that,"
+            " and check with a tape measure."
+        )
+    yield Finding(Level.WARN, "Commands", f"{figure}.", advice)
+
+
+def _untold(log: Log, times_s: Array, told: Array, moved: Array) -> Iterator[Finding]:
+    since = np.flatnonzero(told > 0.0)
+    last_s = np.full(len(times_s), -np.inf)
+    if len(since):
+        newest = np.searchsorted(times_s[since], times_s, "right") - 1
+        last_s = np.where(newest >= 0, times_s[since][np.maximum(newest, 0)], -np.inf)
+    untold = _sustained(times_s, (times_s - last_s > AFTER_STOP_S) & (moved > TOLD))
+    late = [Span(item.begin_s + AFTER_STOP_S, item.end_s, "") for item in log.latched]
+    stopped = _sustained(times_s, log.within(late, times_s) & (moved > TOLD))
+    if stopped:
+        yield Finding(
+            Level.BAD,
+            "E-stop",
+            f"The robot moved while the e-stop was latched, first at {stopped[0].begin_s:.1f} s.",
+            "Unless it was pushed: use the switch in the power line, and do not drive it before you"
+            " know why.",
+        )
+    elif untold:
+        yield Finding(
+            Level.WARN,
+            "Commands",
+            f"The robot moved {counted(len(untold), 'time')} without a command, first at"
+            f" {untold[0].begin_s:.1f} s.",
+            "Was it pushed or driven by a topic that was not recorded? If not, see docs/safety.md.",
+        )

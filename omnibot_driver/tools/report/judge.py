@@ -1,0 +1,46 @@
+"""Everything that a log tells, the gravest first."""
+
+from collections.abc import Iterator
+
+from omnibot_driver.tools.report import events, following, rhythm, sensing, travel
+from omnibot_driver.tools.report.findings import Finding, Level
+from omnibot_driver.tools.report.log import Log
+
+WITHOUT = {
+    "imu/data_raw": "nothing can be said of the IMU",
+    "odom": "nothing can be said of where the robot went",
+}
+
+
+def judge(log: Log) -> list[Finding]:
+    """All findings; those of one level stay in the order of the subjects."""
+    return sorted(_all(log), key=lambda finding: -finding.level)
+
+
+def _all(log: Log) -> Iterator[Finding]:
+    for trouble in log.troubles:
+        yield Finding(Level.BAD, "Recording", f"{trouble[:1].upper()}{trouble[1:]}.")
+    for topic, consequence in WITHOUT.items():
+        if topic in log.absent:
+            yield Finding(
+                Level.BAD,
+                "Recording",
+                f"No message of {topic}: {consequence}.",
+                "Record it as well (ros2 bag record --all), while the state is nominal.",
+            )
+    others = [topic for topic in log.absent if topic in ("state", "estop_active", "/diagnostics")]
+    if others:
+        yield Finding(
+            Level.NOTE,
+            "Recording",
+            f"No message of {', '.join(others)}: gaps and stops cannot be told from pauses.",
+            "Record all topics: ros2 bag record --all.",
+        )
+    yield from events.judge(log)
+    if len(log.imu):
+        yield from rhythm.judge(log, log.imu, rhythm.IMU)
+    if len(log.odom):
+        yield from rhythm.judge(log, log.odom, rhythm.ODOMETRY)
+    yield from following.judge(log)
+    yield from travel.judge(log)
+    yield from sensing.judge(log)

@@ -1,0 +1,121 @@
+"""A running robot, recorded as into a bag. Knows ROS; must not know what is made of it."""
+
+import time
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+from typing import Any, Final
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from omnibot_driver.tools.needs import ToolError
+from omnibot_driver.tools.report.log import Log
+from omnibot_driver.tools.report.recorder import DIAGNOSTICS, EVENTS, Recorder
+from omnibot_driver.tools.report.robots import Topics, choose, find
+
+LOOK_ROUND_S: Final = 2.0
+"""Even where one robot is found at once there may be others."""
+DISCOVERY_S: Final = 5.0
+DEPTH: Final = 1000
+COMMANDS: Final = ("cmd_vel", "wheel_cmd")
+
+Progress = Callable[[int, int], None]
+"""Told for how many seconds it has been listened, and for how many it will be."""
+
+
+def listen(
+    seconds: float, namespace: str | None, progress: Progress, asked_to_end: Callable[[], bool]
+) -> Log:
+    """Everything that one robot says for so long. Raises ToolError where there is none."""
+    rclpy.init(
+        args=["--ros-args", "--disable-external-lib-logs"],
+        signal_handler_options=SignalHandlerOptions.NO,
+    )
+    try:
+        node = rclpy.create_node("omnibot_report")
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        robot, topics, kinds, alone = _discover(node, executor, namespace, asked_to_end)
+        recorder = Recorder(robot)
+        for topic, role in topics.items():
+            _subscribe(node, recorder, topic, role, kinds[topic])
+        began_s = time.monotonic()
+        while (spent_s := time.monotonic() - began_s) < seconds and not asked_to_end():
+            progress(int(spent_s), int(seconds))
+            executor.spin_once(timeout_sec=0.1)
+        progress(int(seconds), int(seconds))
+    except ExternalShutdownException as error:
+        raise ToolError("ROS was shut down meanwhile") from error
+    finally:
+        rclpy.try_shutdown()
+    if not recorder.count:
+        raise ToolError(
+            f"the driver of {robot} said nothing for {seconds:g} s: is it still running?"
+        )
+    return recorder.log(alone=alone)
+
+
+def _discover(
+    node: Node,
+    executor: SingleThreadedExecutor,
+    namespace: str | None,
+    asked_to_end: Callable[[], bool],
+) -> tuple[str, Topics, dict[str, str], bool]:
+    """The robot, its topics, all types, and whether there is no other robot."""
+    began_s = time.monotonic()
+    while True:
+        executor.spin_once(timeout_sec=0.1)
+        spent_s = time.monotonic() - began_s
+        if spent_s < LOOK_ROUND_S and not asked_to_end():
+            continue
+        kinds = {topic: types[0] for topic, types in node.get_topic_names_and_types()}
+        robots = {
+            name: topics
+            for name, topics in find(kinds.items()).items()
+            if any(
+                node.count_publishers(topic) for topic, role in topics.items() if role == "state"
+            )
+        }
+        try:
+            robot, topics = choose(robots, namespace, "ROS")
+        except ToolError as error:
+            if robots and namespace is None:
+                raise
+            if spent_s < DISCOVERY_S and not asked_to_end():
+                continue
+            if robots:
+                raise
+            raise ToolError(
+                f"no driver was heard for {DISCOVERY_S:g} s: is one running, with the same"
+                " ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE as here?"
+            ) from error
+        return robot, topics, kinds, len(robots) == 1
+
+
+def _subscribe(node: Node, recorder: Recorder, topic: str, role: str, kind: str) -> None:
+    package, _, name = kind.split("/")
+    latched = role in EVENTS and role != DIAGNOSTICS
+    qos = QoSProfile(
+        depth=DEPTH,
+        # Whoever commands may offer less than reliable; what asks for less hears both.
+        reliability=ReliabilityPolicy.BEST_EFFORT
+        if role in COMMANDS
+        else ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+    hear = partial(_hear, recorder, role, kind)
+
+    # rclpy tells what it knows of a message to a callback with two arguments of its own.
+    def heard(message: Any, info: Any) -> None:
+        hear(message, info)
+
+    message_class = getattr(import_module(f"{package}.msg"), name)
+    node.create_subscription(message_class, topic, heard, qos)
+
+
+def _hear(recorder: Recorder, role: str, kind: str, message: Any, info: Any) -> None:
+    recorder.hear(role, kind, info["received_timestamp"], message)

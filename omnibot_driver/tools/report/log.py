@@ -1,0 +1,118 @@
+"""What was heard of one robot, as columns. Times are seconds since the log began."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+COMMAND_TIMEOUT_S: Final = 0.5
+"""The driver's default of ``cmd_vel_timeout``; what is older commands nothing."""
+RUNNING: Final = ("nominal", "imu_only")
+SETTLING_S: Final = 0.2
+"""Around a change of state, in which a stream may begin or end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """One topic in the order of arrival: two columns of times, and a row of values each.
+
+    ``stamp_s`` is NaN where the type has no stamp, or the stamp is zero.
+    """
+
+    arrived_s: Array
+    stamp_s: Array
+    values: Array
+
+    def __len__(self) -> int:
+        return len(self.arrived_s)
+
+    @property
+    def finite(self) -> Mask:
+        """Rows without NaN and infinity."""
+        return np.asarray(np.isfinite(self.values).all(axis=1))
+
+    def only(self, rows: Mask) -> "Series":
+        """Some of the rows."""
+        return Series(self.arrived_s[rows], self.stamp_s[rows], self.values[rows])
+
+    def held(self, at_s: Array, timeout_s: float = COMMAND_TIMEOUT_S) -> Array:
+        """The newest row at each of these times; zeros where it is older than the timeout."""
+        held = np.zeros((len(at_s), self.values.shape[1]))
+        if len(self):
+            newest = np.searchsorted(self.arrived_s, at_s, "right") - 1
+            known = (newest >= 0) & (at_s - self.arrived_s[newest] <= timeout_s)
+            held[known] = self.values[newest[known]]
+        return held
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """From when to when something was so, and what."""
+
+    begin_s: float
+    end_s: float
+    what: str
+
+    @property
+    def length_s(self) -> float:
+        return self.end_s - self.begin_s
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """One status of a /diagnostics message; the level is diagnostic_msgs'."""
+
+    at_s: float
+    hardware_id: str
+    name: str
+    level: int
+    message: str
+    values: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Log:
+    """``start_ns``: the time of day at which it began. ``troubles``: what could not be read.
+    ``alone``: there is no other robot, so /diagnostics, which all share, is this one's.
+
+    Values, in SI units: ``imu`` angular velocity and specific force (6); ``odom`` x, y, yaw, and
+    the twist (6); ``joint_states`` and ``wheel_cmd`` wheel rates (3); ``cmd_vel`` the twist (3).
+    """
+
+    robot: str
+    start_ns: int
+    duration_s: float
+    imu: Series
+    odom: Series
+    joint_states: Series
+    cmd_vel: Series
+    wheel_cmd: Series
+    states: tuple[Span, ...] = ()
+    estops: tuple[Span, ...] = ()
+    diagnostics: tuple[Status, ...] = ()
+    absent: tuple[str, ...] = ()
+    troubles: tuple[str, ...] = ()
+    alone: bool = True
+
+    @property
+    def latched(self) -> list[Span]:
+        """While the e-stop was."""
+        return [span for span in self.estops if span.what == "latched"]
+
+    def within(self, spans: list[Span], at_s: Array) -> Mask:
+        """Which of these times lie in one of the spans."""
+        inside = np.zeros(len(at_s), dtype=bool)
+        for span in spans:
+            inside |= (at_s >= span.begin_s) & (at_s < span.end_s)
+        return inside
+
+    def interrupted(self, begin_s: float, end_s: float, running: tuple[str, ...]) -> bool:
+        """Whether the driver said that between these times nothing was to be expected."""
+        begin_s, end_s = begin_s - SETTLING_S, end_s + SETTLING_S
+        touched = [span for span in self.states if span.begin_s < end_s and span.end_s > begin_s]
+        return len(touched) > 1 or any(span.what not in running for span in touched)

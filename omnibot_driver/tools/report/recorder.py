@@ -1,0 +1,175 @@
+"""From messages to columns, whether rosbags or rclpy made them: both name the fields alike."""
+
+import math
+from array import array
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from omnibot_driver.tools.report.log import Log, Series, Span, Status
+
+WHEELS: Final = ("wheel_a_joint", "wheel_b_joint", "wheel_c_joint")
+NO_STAMP: Final = -1
+DIAGNOSTICS: Final = "/diagnostics"
+
+Row = tuple[float, ...]
+
+
+def _imu(message: Any) -> Row:
+    rate, force = message.angular_velocity, message.linear_acceleration
+    return rate.x, rate.y, rate.z, force.x, force.y, force.z
+
+
+def _odometry(message: Any) -> Row:
+    pose, twist = message.pose.pose, message.twist.twist
+    turn = pose.orientation
+    yaw_rad = math.atan2(
+        2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2)
+    )
+    return (
+        *(pose.position.x, pose.position.y, yaw_rad),
+        *(twist.linear.x, twist.linear.y, twist.angular.z),
+    )
+
+
+def _joint_states(message: Any) -> Row:
+    rates = dict(zip(message.name, message.velocity, strict=False))
+    return tuple(rates.get(wheel, math.nan) for wheel in WHEELS)
+
+
+def _twist(message: Any) -> Row:
+    return message.linear.x, message.linear.y, message.angular.z
+
+
+def _wheels(message: Any) -> Row:
+    rates = tuple(message.data)
+    return rates if len(rates) == len(WHEELS) else (math.nan,) * 3
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """What a topic is to a robot: its width, and how each type that it may have is read."""
+
+    width: int
+    read: Mapping[str, Callable[[Any], Row]]
+
+
+SERIES: Final = {
+    "imu/data_raw": Role(6, {"sensor_msgs/msg/Imu": _imu}),
+    "odom": Role(6, {"nav_msgs/msg/Odometry": _odometry}),
+    "joint_states": Role(3, {"sensor_msgs/msg/JointState": _joint_states}),
+    "cmd_vel": Role(
+        3,
+        {
+            "geometry_msgs/msg/Twist": _twist,
+            "geometry_msgs/msg/TwistStamped": lambda message: _twist(message.twist),
+        },
+    ),
+    "wheel_cmd": Role(3, {"std_msgs/msg/Float32MultiArray": _wheels}),
+}
+EVENTS: Final = {
+    "state": "std_msgs/msg/String",
+    "estop_active": "std_msgs/msg/Bool",
+    DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
+}
+
+
+class _Column:
+    def __init__(self, role: Role) -> None:
+        self.role = role
+        self.arrived_ns, self.stamp_ns, self.values = array("q"), array("q"), array("d")
+
+    def hear(self, kind: str, arrived_ns: int, message: Any) -> None:
+        header = getattr(message, "header", None)
+        stamp_ns = header.stamp.sec * 10**9 + header.stamp.nanosec if header else 0
+        self.arrived_ns.append(arrived_ns)
+        self.stamp_ns.append(stamp_ns or NO_STAMP)
+        self.values.extend(self.role.read[kind](message))
+
+    def series(self, start_ns: int) -> Series:
+        arrived_ns, stamp_ns = (
+            np.array(column, dtype=np.int64) for column in (self.arrived_ns, self.stamp_ns)
+        )
+        stamp_s = np.where(stamp_ns == NO_STAMP, np.nan, (stamp_ns - start_ns) / 1e9)
+        values = np.array(self.values).reshape(-1, self.role.width)
+        order = np.argsort(arrived_ns, kind="stable")
+        return Series((arrived_ns[order] - start_ns) / 1e9, stamp_s[order], values[order])
+
+
+class Recorder:
+    """``hear`` what comes for one robot, then take the ``log``."""
+
+    def __init__(self, robot: str) -> None:
+        self._robot = robot
+        self._columns = {name: _Column(role) for name, role in SERIES.items()}
+        self._events: dict[str, list[tuple[int, Any]]] = {name: [] for name in EVENTS}
+        self.count = 0
+
+    def hear(self, role: str, kind: str, arrived_ns: int, message: Any) -> None:
+        """A message of this type on the topic that plays this role."""
+        if role in self._columns:
+            self._columns[role].hear(kind, arrived_ns, message)
+        elif role == DIAGNOSTICS:
+            self._events[role].append((arrived_ns, message.status))
+        else:
+            self._events[role].append((arrived_ns, message.data))
+        self.count += 1
+
+    def log(self, troubles: tuple[str, ...] = (), *, alone: bool = True) -> Log:
+        """All of it. There must have been a message."""
+        times = [
+            *(time for column in self._columns.values() for time in column.arrived_ns[:1]),
+            *(time for column in self._columns.values() for time in column.arrived_ns[-1:]),
+            *(time for events in self._events.values() for time, _ in events),
+        ]
+        start_ns, end_s = min(times), (max(times) - min(times)) / 1e9
+        series = {name: column.series(start_ns) for name, column in self._columns.items()}
+        absent = tuple(name for name in SERIES if not len(series[name]))
+        return Log(
+            robot=self._robot,
+            start_ns=start_ns,
+            duration_s=end_s,
+            imu=series["imu/data_raw"],
+            odom=series["odom"],
+            joint_states=series["joint_states"],
+            cmd_vel=series["cmd_vel"],
+            wheel_cmd=series["wheel_cmd"],
+            states=self._spans("state", start_ns, end_s, str),
+            estops=self._spans(
+                "estop_active", start_ns, end_s, lambda on: "latched" if on else "free"
+            ),
+            diagnostics=self._statuses(start_ns),
+            absent=(*absent, *(name for name, events in self._events.items() if not events)),
+            troubles=troubles,
+            alone=alone,
+        )
+
+    def _spans(
+        self, role: str, start_ns: int, end_s: float, name: Callable[[Any], str]
+    ) -> tuple[Span, ...]:
+        """Equal ones after each other are one."""
+        spans: list[Span] = []
+        for arrived_ns, value in sorted(self._events[role], key=lambda event: event[0]):
+            at_s, what = (arrived_ns - start_ns) / 1e9, name(value)
+            if spans and spans[-1].what == what:
+                continue
+            if spans:
+                spans[-1] = Span(spans[-1].begin_s, at_s, spans[-1].what)
+            spans.append(Span(at_s, end_s, what))
+        return tuple(spans)
+
+    def _statuses(self, start_ns: int) -> tuple[Status, ...]:
+        return tuple(
+            Status(
+                (arrived_ns - start_ns) / 1e9,
+                status.hardware_id,
+                status.name,
+                status.level if isinstance(status.level, int) else status.level[0],
+                status.message,
+                {pair.key: pair.value for pair in status.values},
+            )
+            for arrived_ns, statuses in self._events[DIAGNOSTICS]
+            for status in statuses
+        )

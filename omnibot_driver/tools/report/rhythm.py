@@ -1,0 +1,241 @@
+"""Timing of a stream: its rate, how even its stamps are, what is missing, how late it arrives."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnibot_driver.tools.report.findings import Finding, Level, counted, span
+from omnibot_driver.tools.report.log import Array, Log, Series
+
+GAP: Final = 1.5
+"""Periods between two stamps from which on something is missing."""
+LONG_GAP_S: Final = 0.5
+MANY_LOST: Final = 0.01
+RATE_TOLERANCE: Final = 0.05
+UNEVEN: Final = 0.1
+"""Standard deviation of the steps, in periods, above which stamps are no sampling times."""
+LATE_S: Final = 0.005
+EARLY_S: Final = 0.001
+OTHER_CLOCK_S: Final = 1.0
+FEWEST: Final = 10
+RECOVERY_S: Final = 0.75
+"""In which stamps that leapt ahead are where they belong again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """What a topic promises. ``lost``: the driver's own counts of what it did not get of it."""
+
+    name: str
+    rate_hz: float
+    running: tuple[str, ...]
+    lost: tuple[str, ...]
+
+
+IMU: Final = Stream(
+    "imu/data_raw", 100.0, ("nominal", "imu_only"), ("IMU frames lost", "IMU readings refused")
+)
+ODOMETRY: Final = Stream(
+    "odom", 25.0, ("nominal",), ("Odometry frames lost", "Odometry readings refused")
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Rhythm:
+    """``steps_s``: between successive stamps, from ``at_s`` on; ``period_s``: the usual one.
+
+    Gaps: where they begin, how long they are, how many messages are missing, without those that
+    the driver's state accounts for. Leaps: wide steps that were taken back, so nothing is missing.
+    ``late_s``: arrival after the stamp, at ``arrived_s``.
+    """
+
+    at_s: Array
+    steps_s: Array
+    period_s: float
+    gap_at_s: Array
+    gap_s: Array
+    missing: Array
+    leap_at_s: Array
+    leap_s: Array
+    arrived_s: Array
+    late_s: Array
+
+
+def measure(log: Log, series: Series, stream: Stream) -> Rhythm:
+    """By stamps; what has none is left out."""
+    stamped = series.only(np.isfinite(series.stamp_s))
+    at_s, steps_s = stamped.stamp_s[:-1], np.diff(stamped.stamp_s)
+    period_s = float(np.median(steps_s)) if len(steps_s) else 1.0 / stream.rate_hz
+    wide = np.flatnonzero(steps_s > GAP * period_s)
+    missing = np.array(
+        [
+            np.rint((steps_s[row:end] - period_s).sum() / period_s)
+            for row, end in zip(wide, _ends(wide, int(RECOVERY_S / period_s)), strict=True)
+        ]
+    )
+    leaps = wide[missing < 1.0]
+    told = [
+        not log.interrupted(at_s[row], at_s[row] + steps_s[row], stream.running) for row in wide
+    ]
+    true = (missing >= 1.0) & np.array(told, dtype=bool)
+    gaps = wide[true]
+    return Rhythm(
+        at_s=at_s,
+        steps_s=steps_s,
+        period_s=period_s,
+        gap_at_s=at_s[gaps],
+        gap_s=steps_s[gaps],
+        missing=missing[true],
+        leap_at_s=at_s[leaps],
+        leap_s=steps_s[leaps],
+        arrived_s=stamped.arrived_s,
+        late_s=stamped.arrived_s - stamped.stamp_s,
+    )
+
+
+def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
+    """Until where the rows after each wide step tell whether it was taken back."""
+    ends: NDArray[np.intp] = wide + max(1, most)
+    ends[:-1] = np.minimum(ends[:-1], wide[1:])
+    return ends
+
+
+def judge(log: Log, series: Series, stream: Stream) -> Iterator[Finding]:
+    """Rate, steps, gaps, arrival."""
+    rhythm = measure(log, series, stream)
+    unstamped = int(np.isnan(series.stamp_s).sum())
+    if unstamped:
+        yield Finding(
+            Level.BAD,
+            "Timing",
+            f"{counted(unstamped, 'message')} of {stream.name} without a stamp.",
+            "Find out who publishes it: this driver stamps all.",
+        )
+    if len(rhythm.steps_s) < FEWEST:
+        yield Finding(
+            Level.BAD,
+            "Timing",
+            f"{counted(len(series), 'message')} of {stream.name}: too few to judge.",
+            "Record for longer, while the state is nominal.",
+        )
+        return
+    yield from _steps(rhythm, stream)
+    yield from _gaps(log, rhythm, stream)
+    yield from _arrival(rhythm, stream)
+
+
+def _steps(rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
+    back = int((rhythm.steps_s <= 0.0).sum())
+    if back:
+        yield Finding(
+            Level.BAD,
+            "Timing",
+            f"{counted(back, 'stamp')} of {stream.name} not later than the one before.",
+            "Was the computer's clock set back meanwhile, or do two drivers publish?",
+        )
+    if len(rhythm.leap_s):
+        yield Finding(
+            Level.WARN,
+            "Timing",
+            f"Stamps of {stream.name} leapt {counted(len(rhythm.leap_s), 'time')}, by up to"
+            f" {1e3 * (rhythm.leap_s.max() - rhythm.period_s):.0f} ms, first at"
+            f" {rhythm.leap_at_s[0]:.1f} s, and came back: nothing is missing.",
+            "The driver was kept from reading for a while: relieve the computer.",
+        )
+    even = rhythm.steps_s[(rhythm.steps_s > 0.0) & (rhythm.steps_s <= GAP * rhythm.period_s)]
+    if len(even) < FEWEST:
+        return
+    rate_hz, jitter_s = 1.0 / float(even.mean()), float(even.std())
+    off = abs(rate_hz / stream.rate_hz - 1.0) > RATE_TOLERANCE
+    uneven = jitter_s > UNEVEN * rhythm.period_s
+    yield Finding(
+        Level.WARN if off else Level.GOOD,
+        "Timing",
+        f"{stream.name} comes at {rate_hz:.2f} Hz; it should be {stream.rate_hz:g}.",
+        "Two publishers, a filter in between or a recorder that drops many would do this."
+        if off
+        else "",
+    )
+    yield Finding(
+        Level.WARN if uneven else Level.GOOD,
+        "Timing",
+        f"The steps between stamps of {stream.name} vary by {1e3 * jitter_s:.3f} ms rms.",
+        "They should be sampling times: see docs/time.md, and Time in /diagnostics."
+        if uneven
+        else "",
+    )
+
+
+def _gaps(log: Log, rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
+    if not len(rhythm.gap_s):
+        yield Finding(Level.GOOD, "Gaps", f"{stream.name} has no gap while it should come.")
+        return
+    lost = int(rhythm.missing.sum())
+    longest = int(rhythm.gap_s.argmax())
+    share = lost / (lost + len(rhythm.steps_s))
+    counted_lost = grown(log, stream.lost)
+    if counted_lost is None:
+        advice = "Whether the line or the recorder lost them, only /diagnostics of it alone tells."
+    elif counted_lost == 0:
+        advice = (
+            "The driver counts no loss, so the network, the recorder or a busy computer lost them:"
+            " record on the robot."
+        )
+    else:
+        advice = f"The driver counts {counted_lost} lost on the line: check cable, hub and ground."
+    yield Finding(
+        Level.BAD if rhythm.gap_s[longest] > LONG_GAP_S or share > MANY_LOST else Level.WARN,
+        "Gaps",
+        f"{stream.name} has {counted(len(rhythm.gap_s), 'gap')}, {counted(lost, 'message')}"
+        f" ({100 * share:.2g} %) missing; the longest is {span(rhythm.gap_s[longest])}"
+        f" at {rhythm.gap_at_s[longest]:.1f} s.",
+        advice,
+    )
+
+
+def _arrival(rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
+    least_s, middle_s, mean_s = (
+        float(figure)
+        for figure in (rhythm.late_s.min(), np.median(rhythm.late_s), rhythm.late_s.mean())
+    )
+    if abs(middle_s) > OTHER_CLOCK_S or least_s < -EARLY_S:
+        yield Finding(
+            Level.WARN,
+            "Timing",
+            f"{stream.name} arrives {middle_s:.3g} s after its stamp, at least {least_s:.3g} s.",
+            "The recorder's clock is not the driver's: synchronise them (chrony), or record there.",
+        )
+    over_s, most_s = mean_s - least_s, float(np.quantile(rhythm.late_s, 0.99)) - least_s
+    late = over_s > LATE_S
+    yield Finding(
+        Level.WARN if late else Level.GOOD,
+        "Timing",
+        f"{stream.name} arrives {1e3 * over_s:.2f} ms later than at best on average,"
+        f" and by less than {1e3 * most_s:.1f} ms in 99 of 100 cases.",
+        "Set the adapter's latency_timer to 1 (udev/99-omnibot.rules); relieve the computer."
+        if late
+        else "",
+    )
+
+
+def grown(log: Log, keys: tuple[str, ...]) -> int | None:
+    """By how much this robot's counts in /diagnostics have grown; None where they are not told.
+
+    A count that fell began anew with another driver.
+    """
+    if not log.alone:
+        return None
+    growth = [
+        later - earlier if later >= earlier else later
+        for key in keys
+        for earlier, later in pairwise(
+            int(status.values[key])
+            for status in log.diagnostics
+            if status.values.get(key, "").isdecimal()
+        )
+    ]
+    return sum(growth) if growth else None

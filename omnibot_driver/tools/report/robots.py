@@ -1,0 +1,59 @@
+"""Which robots there are among topics, known by name and type alone."""
+
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+from omnibot_driver.tools.needs import ToolError
+from omnibot_driver.tools.report.recorder import DIAGNOSTICS, EVENTS, SERIES
+
+PROOF: Final = ("imu/data_raw", "odom", "state")
+"""One of these makes a namespace a robot."""
+
+Topics = dict[str, str]
+"""By topic: the role that it plays."""
+
+
+def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
+    """By namespace ("/" for none): what each robot has, from pairs of topic and type."""
+    pairs = set(topics)
+    robots: dict[str, Topics] = {}
+    for topic, kind in sorted(pairs):
+        for role, (namespace, fits) in _roles(topic, kind, pairs).items():
+            if fits:
+                robots.setdefault(namespace, {})[topic] = role
+    robots = {name: found for name, found in robots.items() if {*found.values()} & {*PROOF}}
+    if (DIAGNOSTICS, EVENTS[DIAGNOSTICS]) in pairs:
+        for found in robots.values():
+            found[DIAGNOSTICS] = DIAGNOSTICS
+    return robots
+
+
+def _roles(topic: str, kind: str, pairs: set[tuple[str, str]]) -> Mapping[str, tuple[str, bool]]:
+    """By role that its name allows: the namespace, and whether the type allows it too."""
+    roles: dict[str, tuple[str, bool]] = {}
+    for role, series in SERIES.items():
+        if topic.endswith(f"/{role}"):
+            roles[role] = (topic[: -len(role) - 1] or "/", kind in series.read)
+    node, _, name = topic.rpartition("/")
+    other = {"state": "estop_active", "estop_active": "state"}.get(name)
+    if node and other:
+        both = (f"{node}/{other}", EVENTS[other]) in pairs
+        roles[name] = (node.rpartition("/")[0] or "/", kind == EVENTS[name] and both)
+    return roles
+
+
+def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tuple[str, Topics]:
+    """The robot that is wanted, or the only one. Raises ToolError, which names those there are."""
+    names = ", ".join(robots)
+    if not robots:
+        raise ToolError(
+            f"{where} has no topic of a driver (imu/data_raw, odom, omnibot_driver/state)"
+        )
+    if wanted is not None:
+        name = "/" + wanted.strip("/")
+        if name not in robots:
+            raise ToolError(f"{where} has no robot in the namespace {name}, but in: {names}")
+        return name, robots[name]
+    if len(robots) > 1:
+        raise ToolError(f"{where} has several robots: choose one with --namespace, of {names}")
+    return next(iter(robots.items()))

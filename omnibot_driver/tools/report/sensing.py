@@ -1,0 +1,235 @@
+"""What the IMU tells of itself: gravity and bias at rest, turning and vibration in motion."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from scipy import signal
+
+from omnibot_driver.tools.report.findings import Finding, Level, counted
+from omnibot_driver.tools.report.log import Array, Log, Mask, Series
+from omnibot_driver.tools.report.travel import moving, steps
+
+GRAVITY_MPS2: Final = 9.80665
+SLIGHT_ERROR: Final = 0.03
+GRAVE_ERROR: Final = 0.1
+"""Of gravity."""
+STUCK_READINGS: Final = 100
+REST_S: Final = 0.5
+"""Away from all motion by so much, the robot is at rest."""
+LEAST_REST_S: Final = 1.0
+BLOCK: Final = 100
+STILL_GYRO_RADPS: Final = 0.01
+STILL_FORCE_MPS2: Final = 0.3
+LARGEST_BIAS_RADPS: Final = 0.01
+LARGEST_TILT_DEG: Final = 5.0
+LEAST_TURN_RAD: Final = 1.5
+TURN_TOLERANCE: Final = 0.05
+STRONG_VIBRATION_MPS2: Final = 3.0
+VIBRATION_HZ: Final = 5.0
+"""Below, it is driving that shows."""
+SEGMENT: Final = 256
+RATE_HZ: Final = 100.0
+
+
+def at_rest(log: Log, imu: Series) -> Mask:
+    """By the wheels; where there are none, by the IMU itself, second by second."""
+    odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
+    if len(odom):
+        edges = odom.stamp_s[moving(odom)]
+        after = np.append(edges, np.inf)[np.searchsorted(edges, imu.stamp_s)]
+        before = np.insert(edges, 0, -np.inf)[np.searchsorted(edges, imu.stamp_s)]
+        known = (imu.stamp_s > odom.stamp_s[0]) & (imu.stamp_s < odom.stamp_s[-1])
+        return np.asarray(known & (after - imu.stamp_s > REST_S) & (imu.stamp_s - before > REST_S))
+    rest = np.zeros(len(imu), dtype=bool)
+    whole = len(imu) // BLOCK * BLOCK
+    spread = imu.values[:whole].reshape(-1, BLOCK, 6).std(axis=1)
+    still = (spread[:, :3] < STILL_GYRO_RADPS).all(axis=1)
+    still &= (spread[:, 3:] < STILL_FORCE_MPS2).all(axis=1)
+    rest[:whole] = np.repeat(still, BLOCK)
+    return rest
+
+
+@dataclass(frozen=True, slots=True)
+class Spectrum:
+    """Amplitude spectral densities per √Hz at these frequencies: gyro (n, 3) and force (n, 3)."""
+
+    frequency_hz: Array
+    density: Array
+
+
+def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
+    """Welch's mean over the stretches without a gap; None where none is long enough."""
+    breaks = np.flatnonzero(np.diff(imu.stamp_s) > 1.5 / RATE_HZ) + 1
+    changes = np.flatnonzero(np.diff(rows.astype(np.int8))) + 1
+    edges = np.unique(np.concatenate([[0], breaks, changes, [len(imu)]]))
+    total, weight, frequency_hz = np.zeros((SEGMENT // 2 + 1, 6)), 0, np.empty(0)
+    for first, last in pairwise(edges):
+        if rows[first] and last - first >= SEGMENT:
+            frequency_hz, power = signal.welch(
+                imu.values[first:last], RATE_HZ, nperseg=SEGMENT, axis=0
+            )
+            total, weight = total + power * (last - first), weight + int(last - first)
+    return Spectrum(frequency_hz[1:], np.sqrt(total[1:] / weight)) if weight else None
+
+
+def judge(log: Log) -> Iterator[Finding]:
+    """Numbers that are none, stuck values, rest, turning, vibration."""
+    broken = int((~log.imu.finite).sum())
+    if broken:
+        yield Finding(
+            Level.BAD,
+            "IMU",
+            f"{counted(broken, 'message')} of imu/data_raw with NaN or infinity.",
+            "This driver publishes none: find out who else publishes imu/data_raw.",
+        )
+    imu = log.imu.only(log.imu.finite & np.isfinite(log.imu.stamp_s))
+    if len(imu) < BLOCK:
+        return
+    stuck = [
+        name
+        for name, columns in (("gyro", slice(0, 3)), ("accelerometer", slice(3, 6)))
+        if longest_same(imu.values[:, columns]) >= STUCK_READINGS
+    ]
+    if stuck:
+        yield Finding(
+            Level.BAD,
+            "IMU",
+            f"The {' and the '.join(stuck)} said exactly the same {STUCK_READINGS} times and more.",
+            "Switch the board off and on; if it stays so, the sensor is broken.",
+        )
+    rest = at_rest(log, imu)
+    if rest.sum() >= LEAST_REST_S * RATE_HZ:
+        yield from _gravity(imu.values[rest, 3:].mean(axis=0))
+        if "gyro" not in stuck:
+            yield from _bias(imu.values[rest, :3])
+    else:
+        yield Finding(
+            Level.NOTE,
+            "IMU",
+            "The robot never stood still for long enough to judge gravity and bias.",
+            "Record a few seconds at rest as well.",
+        )
+    if "gyro" not in stuck:
+        yield from _turning(log, imu, rest)
+    yield from _vibration(imu, rest)
+
+
+def longest_same(values: Array) -> int:
+    """How many rows in a row are equal, at the most."""
+    changes = np.flatnonzero((np.diff(values, axis=0) != 0.0).any(axis=1)) + 1
+    return int(np.diff(np.concatenate([[0], changes, [len(values)]])).max())
+
+
+def _gravity(force: Array) -> Iterator[Finding]:
+    norm = float(np.linalg.norm(force))
+    figure = f"Gravity reads {norm:.3f} m/s² at rest; it should be {GRAVITY_MPS2:.3f}"
+    error = abs(norm / GRAVITY_MPS2 - 1.0)
+    if error < SLIGHT_ERROR:
+        yield Finding(Level.GOOD, "IMU", f"{figure}.")
+    elif error < GRAVE_ERROR:
+        yield Finding(
+            Level.NOTE, "IMU", f"{figure}.", "Set accel_bias: the accelerometer is off by a little."
+        )
+    else:
+        factor = GRAVITY_MPS2 / max(norm, 1e-3)
+        likely = [g for g in (2, 4, 8) if abs(factor / g - 1) < 0.1 or abs(factor * g - 1) < 0.1]
+        advice = (
+            f"Set accel_range to {factor:.3g} times what it is."
+            if likely
+            else "Check accel_range and accel_bias; a shaken or falling robot is not at rest."
+        )
+        yield Finding(Level.BAD, "IMU", f"{figure}.", advice)
+    if norm > 0.5 * GRAVITY_MPS2:
+        tilt_deg = float(np.degrees(np.arccos(min(1.0, abs(force[2]) / norm))))
+        figure = f"At rest the sensor is tilted by {tilt_deg:.1f}°"
+        if tilt_deg > LARGEST_TILT_DEG:
+            yield Finding(
+                Level.WARN,
+                "IMU",
+                f"{figure}.",
+                "Put the robot on level ground; if it was, set imu_rpy in the description.",
+            )
+        else:
+            yield Finding(Level.GOOD, "IMU", f"{figure}.")
+
+
+def _bias(gyro: Array) -> Iterator[Finding]:
+    bias, noise = gyro.mean(axis=0), gyro.std(axis=0)
+    axis = int(np.abs(bias).argmax())
+    figure = (
+        f"At rest the gyro reads {bias[axis]:+.4f} rad/s about {'xyz'[axis]}"
+        f" ({abs(np.degrees(bias[axis]) * 60):.0f}° a minute), with a noise of"
+        f" {noise.max():.4f} rad/s rms"
+    )
+    if abs(bias[axis]) > LARGEST_BIAS_RADPS:
+        yield Finding(
+            Level.WARN, "IMU", f"{figure}.", "Call ~/calibrate_gyro while the robot stands."
+        )
+    else:
+        yield Finding(Level.GOOD, "IMU", f"{figure}.")
+
+
+def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
+    """Gyro z over the yaw of the odometry: the ratio, and how much was turned in all, in rad."""
+    odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
+    if len(odom) < 2:
+        return None
+    rate = imu.values[:, 2] - (imu.values[rest, 2].mean() if rest.any() else 0.0)
+    steps_s = np.clip(np.diff(imu.stamp_s, prepend=imu.stamp_s[0]), 0.0, 0.1)
+    angle = np.interp(odom.stamp_s, imu.stamp_s, np.cumsum(rate * steps_s))
+    by_wheels = steps(odom).turned_rad
+    by_gyro = np.diff(angle)
+    total = float(np.abs(by_wheels).sum())
+    square = float((by_wheels**2).sum())
+    return (float((by_wheels * by_gyro).sum()) / square, total) if square else None
+
+
+def _turning(log: Log, imu: Series, rest: Mask) -> Iterator[Finding]:
+    found = turned(log, imu, rest)
+    if found is None or found[1] < LEAST_TURN_RAD:
+        return
+    ratio, total = found
+    figure = (
+        f"The gyro turned {abs(ratio):.3f} times what the wheels did, over {np.degrees(total):.0f}°"
+    )
+    if abs(abs(ratio) - 1.0) > TURN_TOLERANCE:
+        yield Finding(
+            Level.WARN,
+            "IMU",
+            f"{figure}.",
+            "Check base_radius and gyro_range, and whether the wheels slip.",
+        )
+    elif ratio > 0.0:
+        yield Finding(
+            Level.NOTE,
+            "IMU",
+            f"{figure}, in the same sense: the sensor stands upright.",
+            "The description has it upside down: set imu_rpy there.",
+        )
+    else:
+        yield Finding(Level.GOOD, "IMU", f"{figure}; the sensor hangs upside down, as described.")
+
+
+def _vibration(imu: Series, rest: Mask) -> Iterator[Finding]:
+    if (~rest).sum() < LEAST_REST_S * RATE_HZ:
+        return
+    moved = spectrum(imu, ~rest)
+    if moved is None:
+        return
+    above = moved.frequency_hz > VIBRATION_HZ
+    power = (moved.density[above, 3:] ** 2).sum(axis=1)
+    width_hz = float(moved.frequency_hz[1] - moved.frequency_hz[0])
+    rms = float(np.sqrt(power.sum() * width_hz))
+    figure = (
+        f"In motion it shakes by {rms:.2f} m/s² rms above {VIBRATION_HZ:g} Hz,"
+        f" most at {moved.frequency_hz[above][power.argmax()]:.1f} Hz"
+    )
+    if rms > STRONG_VIBRATION_MPS2:
+        yield Finding(
+            Level.WARN, "IMU", f"{figure}.", "Look for a loose roller, a bent axle or rough ground."
+        )
+    else:
+        yield Finding(Level.GOOD, "IMU", f"{figure}.")

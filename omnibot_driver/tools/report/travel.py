@@ -1,0 +1,115 @@
+"""What the odometry tells of a drive: how far, how fast, and whether it hangs together."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from omnibot_driver.tools.report.findings import Finding, Level, counted, span
+from omnibot_driver.tools.report.log import Array, Log, Mask, Series
+
+MOVING: Final = (0.005, 0.005, 0.01)
+"""m/s, m/s and rad/s, above which the robot moves."""
+LEAP_M: Final = 0.1
+LEAP_RAD: Final = 0.35
+"""Beyond the twist; the driver corrects by no more in a step (fastest_linear_speed and so on)."""
+RESET_M: Final = 0.02
+RESET_RAD: Final = 0.05
+SHORT_GAP_S: Final = 0.1
+"""Up to here a pose is compared with the twist that led to it; what is longer is a gap."""
+
+
+def moving(odom: Series) -> Mask:
+    """Whether the robot moved, by its twists."""
+    return np.asarray((np.abs(odom.values[:, 3:]) > MOVING).any(axis=1))
+
+
+@dataclass(frozen=True, slots=True)
+class Steps:
+    """From each message of odom to the next.
+
+    ``way_m`` and ``turned_rad`` without leaps, which are where the pose went and no twist leads,
+    by ``off_m`` and ``off_rad``; ``reset``: those that led to zero.
+    """
+
+    way_m: Array
+    turned_rad: Array
+    off_m: Array
+    off_rad: Array
+    leap: Mask
+    reset: Mask
+
+
+def steps(odom: Series) -> Steps:
+    """Of at least two finite messages."""
+    steps_s = np.diff(odom.stamp_s)
+    x, y, yaw = odom.values[:, :3].T
+    turned = np.remainder(np.diff(yaw) + np.pi, 2 * np.pi) - np.pi
+    vx, vy, rate = odom.values[1:, 3:].T
+    heading = yaw[:-1] + turned / 2
+    off_x = np.diff(x) - (vx * np.cos(heading) - vy * np.sin(heading)) * steps_s
+    off_y = np.diff(y) - (vx * np.sin(heading) + vy * np.cos(heading)) * steps_s
+    off_m, off_rad = np.hypot(off_x, off_y), np.abs(turned - rate * steps_s)
+    zero = (np.hypot(x[1:], y[1:]) < RESET_M) & (np.abs(yaw[1:]) < RESET_RAD)
+    far = (off_m > LEAP_M) | (off_rad > LEAP_RAD)
+    leap = far & ((steps_s < SHORT_GAP_S) | zero)
+    return Steps(
+        way_m=np.where(leap, 0.0, np.hypot(np.diff(x), np.diff(y))),
+        turned_rad=np.where(leap, 0.0, turned),
+        off_m=off_m,
+        off_rad=off_rad,
+        leap=leap,
+        reset=leap & zero,
+    )
+
+
+def judge(log: Log) -> Iterator[Finding]:
+    """Numbers that are none, the way, leaps."""
+    broken = int((~log.odom.finite).sum())
+    odom = log.odom.only(log.odom.finite)
+    if broken:
+        yield Finding(
+            Level.BAD,
+            "Odometry",
+            f"{counted(broken, 'message')} of odom with NaN or infinity.",
+            "This driver publishes none: find out who else publishes odom.",
+        )
+    if len(odom) < 2:
+        return
+    found = steps(odom)
+    speed = np.hypot(odom.values[:, 3], odom.values[:, 4])
+    moved_s = float(moving(odom).mean()) * log.duration_s
+    yield Finding(
+        Level.NOTE,
+        "Odometry",
+        f"Driven {found.way_m.sum():.2f} m and turned"
+        f" {np.degrees(np.abs(found.turned_rad).sum()):.0f}°, in motion for"
+        f" {span(moved_s)} of {span(log.duration_s)}; at the fastest {speed.max():.2f} m/s and"
+        f" {np.abs(odom.values[:, 5]).max():.2f} rad/s.",
+    )
+    yield from _leaps(odom, found)
+
+
+def _leaps(odom: Series, found: Steps) -> Iterator[Finding]:
+    at_s = odom.stamp_s[1:]
+    if found.reset.any():
+        yield Finding(
+            Level.NOTE,
+            "Odometry",
+            f"It began anew at zero {counted(int(found.reset.sum()), 'time')}, first at"
+            f" {at_s[found.reset][0]:.1f} s: ~/reset_odometry, or another driver.",
+        )
+    leap = found.leap & ~found.reset
+    if not leap.any():
+        yield Finding(Level.GOOD, "Odometry", "Pose and twist agree; no leap.")
+        return
+    worst = int(np.where(leap, found.off_m / LEAP_M + found.off_rad / LEAP_RAD, 0.0).argmax())
+    yield Finding(
+        Level.BAD,
+        "Odometry",
+        f"The pose leaps {counted(int(leap.sum()), 'time')} where the twist does not lead:"
+        f" at {at_s[worst]:.1f} s by {found.off_m[worst]:.2f} m and"
+        f" {np.degrees(found.off_rad[worst]):.0f}°.",
+        "Do two nodes publish odom? If not, look at the gaps and at fastest_linear_speed.",
+    )

@@ -1,0 +1,178 @@
+"""How a driver ends while the robot drives: asked to, by a defect, or by force.
+
+Each ending names what is run in the driver's process first, and leaves a rig without a driver.
+"""
+
+import os
+import pty
+import signal
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Final
+
+from rig import Rig
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+from stuck import OLD_COMMAND
+
+STOP: Final = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+EMERGENCY_STOP: Final = bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+LAST_WORDS: Final = bytes(8) + STOP + EMERGENCY_STOP
+
+IN_A_CALLBACK: Final = """
+import ctypes, os, sys, time, rclpy
+import omnibot_driver.node as node
+def end(self, message):
+    {}
+node.OmniBotDriver._on_estop_topic = end
+"""
+IN_THE_READER: Final = """
+import omnibot_driver.node as node
+from omnibot_driver.core.session import Session
+def end(self, message):
+    def receive(self, data, now):
+        raise ZeroDivisionError("a defect in the reader")
+    Session.receive = receive
+node.OmniBotDriver._on_estop_topic = end
+"""
+HANGS: Final = """
+import time
+from omnibot_driver.core.session import Session
+Session.farewell = lambda self, on_exit: time.sleep(60.0)
+"""
+GROUP: Final = "import os; os.setpgid(0, 0)"
+TERMINAL: Final = """
+import fcntl, os, termios
+os.setsid()
+terminal = os.open({!r}, os.O_RDWR)
+fcntl.ioctl(terminal, termios.TIOCSCTTY, 0)
+for number in (0, 1, 2):
+    os.dup2(terminal, number)
+os.close(terminal)
+"""
+
+
+@dataclass(frozen=True)
+class Ending:
+    """``exit_codes``, ``words``: what is right; the words are the last that the board heard.
+
+    ``allowed_s``, ``late_s``: how long the robot may drive on, and the process live on.
+    """
+
+    end: Callable[[Rig], object]
+    exit_codes: tuple[int, ...] = (0,)
+    words: bytes | tuple[bytes, ...] = STOP
+    before: str = ""
+    allowed_s: float = 0.0
+    late_s: float = 0.0
+
+    def __call__(self, rig: Rig) -> None:
+        """While the robot drives."""
+        rig.drive()
+        self.end(rig)
+        since = rig.line.tick
+        rig.expect_ended(*self.exit_codes, late_s=self.late_s)
+        rig.expect_still(since, "the driver ends", self.allowed_s)
+        rig.hand.leave()
+        heard = bytes(rig.line.board.received)
+        rig.findings.expect(heard.endswith(self.words), f"last it heard {heard[-26:].hex(' ')}")
+
+
+def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
+    """One after the other."""
+
+    def end(rig: Rig) -> None:
+        for number in numbers:
+            rig.driver.process.send_signal(number)
+
+    return end
+
+
+def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
+    """As a shell and a launcher do; without waiting in between."""
+
+    def end(rig: Rig) -> None:
+        for number in numbers:
+            os.killpg(rig.driver.process.pid, number)
+
+    return end
+
+
+def by_topic(rig: Rig) -> None:
+    """Whatever ``before`` has prepared."""
+    publisher = rig.probe.publisher(Bool, "estop")
+    publisher.publish(Bool(data=True))
+
+
+def by_signal_while_a_call_is_pending(rig: Rig) -> None:
+    """Nobody waits for its answer."""
+    rig.probe.call_async(Trigger, "reset")
+    rig.probe.wait_for_state("connecting")
+    rig.driver.process.send_signal(signal.SIGTERM)
+
+
+def while_full(end: Callable[[Rig], object], rig: Rig) -> None:
+    """The port takes nothing until the driver has gone."""
+    with rig.terminal.full(OLD_COMMAND):
+        end(rig)
+        rig.driver.process.wait()
+
+
+ENDINGS: Final[dict[str, Ending]] = {
+    "ctrl-C": Ending(by_signals(signal.SIGINT)),
+    "ctrl-C twice": Ending(by_signals(signal.SIGINT, signal.SIGINT)),
+    "SIGTERM": Ending(by_signals(signal.SIGTERM)),
+    "SIGHUP": Ending(by_signals(signal.SIGHUP)),
+    "SIGQUIT": Ending(by_signals(signal.SIGQUIT)),
+    "SIGTERM while a call is pending": Ending(by_signal_while_a_call_is_pending),
+    "SIGINT and SIGTERM to its process group": Ending(
+        by_signals_to_its_group(signal.SIGINT, signal.SIGTERM), before=GROUP
+    ),
+    "SIGINT, SIGTERM, SIGKILL to its process group": Ending(
+        by_signals_to_its_group(signal.SIGINT, signal.SIGTERM, signal.SIGKILL),
+        (0, -signal.SIGKILL),
+        (STOP, LAST_WORDS),
+        GROUP,
+    ),
+    "a shutdown of ROS": Ending(by_topic, before=IN_A_CALLBACK.format("rclpy.shutdown()")),
+    "an exception in a callback": Ending(by_topic, (1,), before=IN_A_CALLBACK.format("1 / 0")),
+    "an exit in a callback": Ending(by_topic, (1,), before=IN_A_CALLBACK.format("sys.exit(5)")),
+    "a callback that hangs, and ctrl-C": Ending(
+        lambda rig: (by_topic(rig), rig.wait_ticks(20), by_signals(signal.SIGINT)(rig)),
+        before=IN_A_CALLBACK.format("time.sleep(60.0)"),
+    ),
+    "a farewell that hangs, and ctrl-C": Ending(
+        by_signals(signal.SIGINT), (1,), LAST_WORDS, HANGS, allowed_s=0.5, late_s=4.0
+    ),
+    "an exception in the reader": Ending(by_topic, (1,), before=IN_THE_READER),
+    "SIGINT, the port full": Ending(
+        partial(while_full, by_signals(signal.SIGINT)), words=(STOP, LAST_WORDS)
+    ),
+    "an exception, the port full": Ending(
+        partial(while_full, by_topic),
+        (1,),
+        (STOP, LAST_WORDS),
+        IN_A_CALLBACK.format("1 / 0"),
+    ),
+    "SIGKILL": Ending(by_signals(signal.SIGKILL), (-signal.SIGKILL,), LAST_WORDS),
+    "SIGKILL, the port full": Ending(
+        partial(while_full, by_signals(signal.SIGKILL)), (-signal.SIGKILL,), (STOP, LAST_WORDS)
+    ),
+    "SIGSEGV": Ending(by_signals(signal.SIGSEGV), (-signal.SIGSEGV,), LAST_WORDS),
+    "a null pointer": Ending(
+        by_topic, (-signal.SIGSEGV,), LAST_WORDS, IN_A_CALLBACK.format("ctypes.string_at(0)")
+    ),
+    "abort": Ending(by_signals(signal.SIGABRT), (-signal.SIGABRT,), LAST_WORDS),
+    "a library that exits": Ending(by_topic, (3,), LAST_WORDS, IN_A_CALLBACK.format("os._exit(3)")),
+}
+
+
+def terminal_is_closed(
+    make_rig: Callable[[str], Rig], run: Callable[[Rig, Ending], object]
+) -> None:
+    """A session over ssh that drops: SIGHUP, and nobody who takes what is printed."""
+    master, slave = pty.openpty()
+    with make_rig(TERMINAL.format(os.ttyname(slave))) as rig:
+        os.close(slave)
+        run(rig, Ending(lambda _: os.close(master)))

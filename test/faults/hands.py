@@ -1,0 +1,82 @@
+"""Somebody who commands the robot until he lets go."""
+
+import math
+import threading
+from typing import Final, Protocol
+
+from geometry_msgs.msg import PoseStamped, Twist
+from nav_msgs.msg import Odometry
+from probe import Probe
+from std_srvs.srv import SetBool
+
+DRIVE_HZ: Final = 20.0
+FAR_M: Final = 10.0
+"""A goal that no test reaches, for each m/s that was asked for."""
+
+
+class Hand(Protocol):
+    """Whoever it is."""
+
+    def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
+        """Command about this."""
+
+    def leave(self) -> None:
+        """Let go; whatever was commanded is to end."""
+
+
+class Stick:
+    """Publishes a velocity at 20 Hz until it leaves."""
+
+    def __init__(self, probe: Probe) -> None:
+        self._publisher = probe.publisher(Twist, "cmd_vel")
+        self._left = threading.Event()
+        self._twist = Twist()
+        self._thread: threading.Thread | None = None
+
+    def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
+        twist = Twist()
+        twist.linear.x, twist.linear.y, twist.angular.z = vx, vy, yaw_rate
+        self._twist = twist
+        if self._thread is None:
+            self._left.clear()
+            self._thread = threading.Thread(target=self._publish)
+            self._thread.start()
+
+    def leave(self) -> None:
+        """The last command has been published when this returns."""
+        if self._thread is not None:
+            self._left.set()
+            self._thread.join()
+            self._thread = None
+
+    def _publish(self) -> None:
+        while not self._left.wait(1 / DRIVE_HZ):
+            self._publisher.publish(self._twist)
+
+
+class Navigator:
+    """Sends the robot to a goal far away, once, when it first holds; leaves by e-stop and release.
+
+    ``odom``: where the robot was; the newest is the last.
+    """
+
+    def __init__(self, probe: Probe, odom: list[Odometry]) -> None:
+        self._probe, self._odom = probe, odom
+        self._goals = probe.publisher(PoseStamped, "cmd_pose")
+
+    def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
+        """A goal in this direction."""
+        self._probe.wait_for(lambda: self._odom)
+        here = self._odom[-1].pose.pose
+        yaw = 2 * math.atan2(here.orientation.z, here.orientation.w) + yaw_rate
+        goal = PoseStamped()
+        goal.header.frame_id = "odom"
+        goal.pose.position.x = here.position.x + FAR_M * vx
+        goal.pose.position.y = here.position.y + FAR_M * vy
+        goal.pose.orientation.z, goal.pose.orientation.w = math.sin(yaw / 2), math.cos(yaw / 2)
+        self._goals.publish(goal)
+
+    def leave(self) -> None:
+        """A goal has no timeout."""
+        for data in (True, False):
+            self._probe.call(SetBool, "estop", data=data)

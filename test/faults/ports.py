@@ -1,0 +1,149 @@
+"""Boards whose port can be stuck, full, half-open or gone without a word.
+
+Knows descriptors and sockets; bytes only as bytes.
+"""
+
+import contextlib
+import ctypes
+import os
+import select
+import socket
+import struct
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Any, Self
+
+from terminal import fill
+
+from omnibot_driver.simulator import PtyBoard
+from omnibot_driver.simulator.running import RunningBoard
+
+SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27
+DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)
+"""A packet filter of one instruction: return zero bytes."""
+
+
+class Terminal(PtyBoard):
+    """``deaf``: the adapter takes nothing off the kernel's buffer; it goes on sending."""
+
+    deaf = False
+
+    def _receive(self, timeout_s: float) -> bytes:
+        if self.deaf:
+            time.sleep(timeout_s)
+            return b""
+        return super()._receive(timeout_s)
+
+    @contextmanager
+    def full(self, old: bytes) -> Iterator[None]:
+        """Deaf for so long that the kernel's buffer is full of these words."""
+        self.deaf = True
+        near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        fill(near, old)
+        try:
+            yield
+        finally:
+            os.close(near)
+            self.deaf = False
+
+    @contextmanager
+    def kept_full(self, old: bytes) -> Iterator[None]:
+        """Likewise, and it cannot be emptied from the driver's side: zeros take the room."""
+        over = threading.Event()
+        near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+
+        def refill() -> None:
+            while not over.wait(0.001):
+                with contextlib.suppress(BlockingIOError):
+                    while True:
+                        os.write(near, bytes(8))  # in larger pieces some room is left
+
+        refilling = threading.Thread(target=refill)
+        with self.full(old):
+            refilling.start()
+            try:
+                yield
+            finally:
+                over.set()
+                refilling.join()
+                os.close(near)
+
+
+class Server(RunningBoard):
+    """A board behind a serial-port server on the network.
+
+    ``deaf`` and ``mute``: it holds what goes to the board, or what comes from it.
+    ``accepted_at``: the board's tick at each connection.
+    """
+
+    deaf = mute = False
+
+    def __init__(self, board: Any, number: int) -> None:
+        super().__init__(board)
+        self.accepted_at: list[int] = []
+        self._listener = socket.create_server(("127.0.0.1", number))
+        self._peers: list[socket.socket] = []
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.stop()
+        for each in (self._listener, *self._peers):
+            each.close()
+
+    def close_from_here(self) -> None:
+        """Nothing more will come from the server; it still takes what is sent to it."""
+        with self.lock:
+            self._peers[-1].shutdown(socket.SHUT_WR)
+
+    def vanish(self) -> None:
+        """The network is cut: nothing comes in here, and nothing that goes out is confirmed."""
+        program = ctypes.create_string_buffer(DROP_ALL)
+        rule = struct.pack("HP", 1, ctypes.addressof(program))
+        self.deaf = self.mute = True
+        with self.lock:
+            for each in (self._listener, *self._peers):
+                each.setsockopt(socket.SOL_SOCKET, SO_ATTACH_FILTER, rule)
+
+    def come_back(self) -> None:
+        """With no memory of who was connected before."""
+        self._listener.setsockopt(socket.SOL_SOCKET, SO_DETACH_FILTER, 0)
+        self.deaf = self.mute = False
+
+    def _receive(self, timeout_s: float) -> bytes:
+        heard = [] if self.deaf else list(self._peers)
+        readable = select.select([self._listener, *heard], [], [], timeout_s)[0]
+        with self.lock:
+            if self._listener in readable:
+                peer, _ = self._listener.accept()
+                peer.setblocking(False)
+                self._peers.append(peer)
+                self.accepted_at.append(self.board.tick)
+            return b"".join(self._hear(peer) for peer in heard if peer in readable)
+
+    def _hear(self, peer: socket.socket) -> bytes:
+        data = b""
+        with contextlib.suppress(OSError):
+            data = peer.recv(4096)
+        if not data:
+            self._peers.remove(peer)
+            peer.close()
+        return data
+
+    def _send(self, data: bytes) -> int:
+        if not self._peers or self.mute:
+            return 0
+        try:
+            return self._peers[-1].send(data) if data else 0
+        except OSError:
+            return 0

@@ -1,0 +1,146 @@
+"""Ports that are open and take nothing: stuck adapters, full buffers, half-open sockets."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Final
+
+from breakable_line import cut
+from rig import TIMEOUT_S, NetworkRig, Rig
+from std_srvs.srv import SetBool
+
+OLD_COMMAND: Final = bytes.fromhex("FF FE 01 00 15 00 00 00 64")
+"""0.3 m/s and 0.2 rad/s, as the driver will have said again and again."""
+TAKES_NOTHING: Final = "lost .* while writing: it takes no more bytes"
+LOST: Final = "lost .*retrying"
+
+
+def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
+    """Somebody drives on for a while, and leaves; then the adapter says all that it has held."""
+    rig.drive()
+    rig.terminal.deaf = True
+    if mute:
+        rig.line.from_board = cut
+    rig.wait_ticks(round(seconds * 100))
+    rig.hand.leave()
+    rig.wait_ticks(100)
+    rig.heal()
+    rig.expect_still(rig.line.tick, "the adapter takes bytes again", 0.0)
+
+
+def full(rig: Rig, *, mute: bool = False) -> None:
+    """As after minutes. It takes bytes again while the driver has the port open, or has it not."""
+    rig.drive()
+    mark = len(rig.driver.lines)
+    with rig.terminal.full(OLD_COMMAND):
+        if mute:
+            rig.line.from_board = cut
+        rig.driver.wait_for_line(TAKES_NOTHING, mark)
+        rig.hand.leave()
+    rig.heal()
+    rig.expect_still(rig.line.tick, "the full port takes bytes again", 0.0)
+    rig.expect_said_once(TAKES_NOTHING, mark)
+
+
+def full_for_long(rig: Rig) -> None:
+    """Nothing helps, so it is opened again and again, and told once; then all is well."""
+    rig.drive()
+    states, mark = len(rig.states), len(rig.driver.lines)
+    with rig.terminal.kept_full(OLD_COMMAND):
+        rig.probe.wait_for(lambda: len(rig.states) >= states + 6)  # opened in vain, twice
+        rig.wait_for_diagnosis("takes no more bytes")
+        rig.hand.leave()
+    rig.probe.wait_for_state("nominal")
+    rig.expect_still(rig.line.tick, "the port takes bytes again, and is open", TIMEOUT_S)
+    rig.expect_said_once(TAKES_NOTHING, mark)
+
+
+def estop_into_a_full_port(rig: Rig) -> None:
+    """Whoever pressed it is told that it is late; then it comes before anything that moves."""
+    rig.drive()
+    rig.hand.leave()
+    rig.expect_still(rig.line.tick, "nobody drives")
+    rig.wait_ticks(100)  # the line is quiet
+    with rig.terminal.kept_full(OLD_COMMAND):
+        answer = rig.probe.call(SetBool, "estop", data=True)
+        rig.findings.expect("takes nothing" in answer.message, f"it said {answer.message!r}")
+        obeyed = len(rig.line.board.commands)
+    assert rig.wait_for_board(lambda line: line.board.estopped), "no e-stop arrived"
+    rig.expect_still(rig.line.tick, "the e-stop has arrived", 0.0)
+    kinds = [command.kind for command in list(rig.line.board.commands)[obeyed:]]
+    ours = kinds[next(n for n, kind in enumerate(kinds) if kind not in ("velocity", "reset")) :]
+    first = [kind for kind in ours if kind != "start"][:2]
+    rig.findings.expect(first == ["wheels", "estop"], f"it obeyed {ours[:5]}")
+    rig.probe.call(SetBool, "estop", data=False)
+
+
+TERMINAL: Final[dict[str, Callable[[Rig], None]]] = {
+    "an adapter that takes nothing for 3 s": partial(stuck, 2.0),
+    "an adapter that takes and sends nothing for 3 s": partial(stuck, 2.0, mute=True),
+    "the kernel's buffer is full": full,
+    "the kernel's buffer is full, and the board silent": partial(full, mute=True),
+    "full for long, and told once": full_for_long,
+    "e-stop into a full port": estop_into_a_full_port,
+}
+
+# Over the network
+
+
+def server_holds(rig: NetworkRig, *, mute: bool) -> None:
+    """What is sent to it stays there, and comes all at once."""
+    rig.drive()
+    rig.server.deaf, rig.server.mute = True, mute
+    rig.wait_ticks(200)
+    rig.hand.leave()
+    rig.wait_ticks(100)
+    rig.server.deaf = rig.server.mute = False
+    rig.expect_still(rig.line.tick, "the server forwards again", 0.0)
+
+
+def server_closes_one_direction(rig: NetworkRig) -> None:
+    """The driver hears the end, and says its Stop into the other direction."""
+    rig.drive()
+    since, mark = rig.line.tick, len(rig.driver.lines)
+    rig.server.close_from_here()
+    rig.hand.leave()
+    rig.expect_still(since, "closed in one direction", 0.0)
+    rig.probe.wait_for_state("nominal")
+    rig.expect_said_once(LOST, mark)
+
+
+def server_dies(rig: NetworkRig) -> None:
+    """Nobody listens for a while."""
+    rig.drive()
+    mark = len(rig.driver.lines)
+    rig.unplug()
+    rig.hand.leave()
+    rig.wait_for_diagnosis("Connection refused")
+    rig.plug()
+    _expect_still_once_connected(rig, 0, "the server is there again")
+    rig.expect_said_once("Connection refused.*retrying", mark)
+
+
+def server_vanishes(rig: NetworkRig) -> None:
+    """Neither an end nor a refusal, and it has forgotten everything when it is back."""
+    rig.drive()
+    before = len(rig.server.accepted_at)
+    rig.server.vanish()
+    rig.hand.leave()
+    rig.probe.wait_for_state("connecting")
+    rig.wait_for_diagnosis("nothing")
+    rig.probe.wait_for_state("disconnected")
+    rig.server.come_back()
+    _expect_still_once_connected(rig, before, "the server is back")
+
+
+def _expect_still_once_connected(rig: NetworkRig, before: int, what: str) -> None:
+    assert rig.wait_for_board(lambda _: len(rig.server.accepted_at) > before), rig.driver.output
+    rig.expect_still(rig.server.accepted_at[before], what, 0.0)
+
+
+NETWORK: Final[dict[str, Callable[[NetworkRig], None]]] = {
+    "socket: the server holds what goes to the board": partial(server_holds, mute=False),
+    "socket: the server holds everything": partial(server_holds, mute=True),
+    "socket: closed in one direction": server_closes_one_direction,
+    "socket: the server dies and comes back": server_dies,
+    "socket: the peer vanishes without a word": server_vanishes,
+}

@@ -1,0 +1,49 @@
+"""However the driver ends, the robot stands still."""
+
+from pathlib import Path
+
+import pytest
+from endings import ENDINGS, Ending, terminal_is_closed
+from goals import GOAL_ENDINGS
+from rig import GoalRig, Rig
+
+SOME = (
+    "SIGTERM while a call is pending",
+    "SIGINT, SIGTERM, SIGKILL to its process group",
+    "an exit in a callback",
+    "a callback that hangs, and ctrl-C",
+    "a farewell that hangs, and ctrl-C",
+    "an exception, the port full",
+    "SIGKILL, the port full",
+    "a null pointer",
+)
+"""Others are in test_driver_lifecycle and test_driver_guard; ``make faults`` has them all."""
+
+
+@pytest.mark.parametrize("ending", [ENDINGS[name] for name in SOME], ids=SOME)
+def test_the_robot_stands_still_however_the_driver_ends(
+    ending: Ending, tmp_path: Path, lenience: dict[str, float]
+) -> None:
+    """Stop first, then the port, with the right exit code, in time; by the guard if need be."""
+    with Rig(tmp_path, before=ending.before, **lenience) as rig:
+        ending(rig)
+        assert not rig.findings.take(), rig.driver.output
+
+
+def test_a_terminal_that_is_closed_ends_the_driver_in_order(
+    tmp_path: Path, lenience: dict[str, float]
+) -> None:
+    """It cannot even print."""
+
+    def run(rig: Rig, end: Ending) -> None:
+        end(rig)
+        assert not rig.findings.take()
+
+    terminal_is_closed(lambda before: Rig(tmp_path, before=before, **lenience), run)
+
+
+def test_a_goal_ends_with_the_driver(tmp_path: Path, lenience: dict[str, float]) -> None:
+    """The board would go on to it."""
+    with GoalRig(tmp_path, **lenience) as rig:
+        GOAL_ENDINGS["a goal, and SIGKILL"](rig)
+        assert not rig.findings.take(), rig.driver.output

@@ -1,0 +1,66 @@
+"""A board behind a network, and one whose switch stands on position."""
+
+from collections.abc import Callable, Iterator
+from random import Random
+
+import pytest
+from goals import GOALS
+from rig import GoalRig, NetworkRig
+from stuck import NETWORK
+from walk import walk
+
+SOME_GOALS = (
+    "a goal, and the cable is cut, from the board",
+    "a goal, and unplugged, plugged in",
+    "a goal, and the kernel's buffer is full",
+    "a goal, and e-stop and release",
+    "a goal, and the driver hangs and goes on",
+)
+"""The others are in test_position_control, without a port; ``make faults`` has them all."""
+
+
+@pytest.fixture(scope="module")
+def network(
+    _ros: None, tmp_path_factory: pytest.TempPathFactory, lenience: dict[str, float]
+) -> Iterator[NetworkRig]:
+    with NetworkRig(tmp_path_factory.mktemp("network"), **lenience) as rig:
+        rig.wait_ticks(100)
+        yield rig
+
+
+@pytest.mark.parametrize("case", NETWORK.values(), ids=NETWORK)
+def test_a_server_that_fails_leaves_a_robot_that_stands_and_obeys_again(
+    case: Callable[[NetworkRig], None], network: NetworkRig
+) -> None:
+    """As soon as a byte can go."""
+    case(network)
+    network.expect_obeys_again()
+    network.judge_stream()
+    assert not network.findings.take(), network.driver.output
+
+
+@pytest.fixture(scope="module")
+def goals(
+    _ros: None, tmp_path_factory: pytest.TempPathFactory, lenience: dict[str, float]
+) -> Iterator[GoalRig]:
+    with GoalRig(tmp_path_factory.mktemp("goals"), **lenience) as rig:
+        rig.wait_ticks(100)
+        yield rig
+
+
+@pytest.mark.parametrize("case", [GOALS[name] for name in SOME_GOALS], ids=SOME_GOALS)
+def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
+    case: Callable[[GoalRig], None], goals: GoalRig
+) -> None:
+    """Nobody sends a second one meanwhile."""
+    case(goals)
+    goals.expect_obeys_again()
+    goals.judge_stream()
+    assert not goals.findings.take(), goals.driver.output
+
+
+def test_goals_and_faults_in_random_order(goals: GoalRig) -> None:
+    """A short walk."""
+    walk(goals, Random(1), steps=3)
+    goals.judge_stream(damaged_bytes=True)
+    assert not goals.findings.take(), goals.driver.output

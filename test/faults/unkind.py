@@ -1,0 +1,180 @@
+"""People and programs that do what they should not, while somebody drives."""
+
+import os
+import signal
+from collections.abc import Callable
+from itertools import chain
+from typing import Final
+
+import rclpy
+from geometry_msgs.msg import Twist, TwistStamped
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from rclpy.node import Node
+from rig import TIMEOUT_S, Rig
+from std_msgs.msg import Bool, Float32MultiArray
+from std_srvs.srv import SetBool, Trigger
+from stuck import OLD_COMMAND
+
+NONSENSE: Final = (float("nan"), float("inf"), -1.0, 1e12)
+TUNING: Final = (
+    "max_linear_speed",
+    "max_angular_speed",
+    "max_wheel_speed",
+    "max_linear_acceleration",
+    "linear_scale",
+    "cmd_vel_timeout",
+    "command_rate",
+    "reconnect_interval",
+)
+
+
+def two_commanders(rig: Rig) -> None:
+    """Body velocities and wheel rates in turn, then neither."""
+    publisher = rig.probe.publisher(Float32MultiArray, "wheel_cmd")
+    rig.drive()
+    for _ in range(40):
+        publisher.publish(Float32MultiArray(data=[5.0, 5.0, 5.0]))
+        rig.wait_ticks(3)
+    rig.hand.leave()
+    rig.expect_still(rig.line.tick, "two commanders cease")
+    rig.probe.node.destroy_publisher(publisher)
+
+
+def other_type(rig: Rig) -> None:
+    """A TwistStamped on the same topic neither drives nor keeps a command alive; it is told."""
+    context = rclpy.Context()
+    context.init()
+    node = Node("other", namespace=rig.driver.namespace, context=context)
+    publisher = node.create_publisher(TwistStamped, "cmd_vel", 1)
+    stamped = TwistStamped()
+    stamped.twist.linear.x = 0.3
+    rig.drive()
+    rig.hand.leave()
+    since = rig.line.tick
+    for _ in range(30):
+        publisher.publish(stamped)
+        rig.wait_ticks(5)
+    rig.expect_still(since, "the other type goes on")
+    rig.driver.wait_for_line("TwistStamped")
+    node.destroy_node()
+    context.shutdown()
+
+
+def flood_of_releases(rig: Rig) -> None:
+    """``false`` on the topic, a thousand times a second: only the service releases."""
+    publisher = rig.probe.publisher(Bool, "estop")
+    rig.drive()
+    rig.probe.call(SetBool, "estop", data=True)
+    since = rig.line.tick
+    for _ in range(100):
+        for _ in range(10):
+            publisher.publish(Bool(data=False))
+        rig.wait_ticks(1)
+    rig.expect_still(since, "e-stop, somebody drives on and releases by topic", 0.0)
+    rig.findings.expect(rig.estops[-1].data, "the e-stop was released")
+    rig.hand.leave()
+    rig.probe.call(SetBool, "estop", data=False)
+    rig.probe.node.destroy_publisher(publisher)
+
+
+def everybody_calls_at_once(rig: Rig) -> None:
+    """Five clients, during a reconnection: each is answered, and nobody moves the robot."""
+    rig.drive()
+    rig.hand.leave()
+    rig.unplug()
+    rig.probe.wait_for_state("disconnected")
+    calls = [
+        *((Trigger, name, {}) for name in ("start", "reset", "reset_odometry")),
+        *((SetBool, name, {"data": data}) for name in ("pause", "estop") for data in (True, False)),
+    ]
+    clients = [(rig.probe.client(kind, name), kind.Request(**data)) for kind, name, data in calls]
+    rig.plug()
+    since = rig.line.tick
+    rounds = []
+    for _ in range(5):
+        rounds.append([client.call_async(request) for client, request in clients])
+        rig.wait_ticks(30)
+    for future in chain(*rounds):
+        rig.probe.wait_for_future(future)
+    rig.expect_still(since, "everybody calls", 1.0)
+    for client, _ in clients:
+        rig.probe.node.destroy_client(client)
+    rig.probe.call(SetBool, "estop", data=False)
+    rig.probe.call(Trigger, "start")
+
+
+def nonsense_for_parameters(rig: Rig) -> None:
+    """Every limit and timeout, in one call and one by one; all are refused."""
+    rig.drive()
+    parameters = [
+        Parameter(
+            name=name,
+            value=ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value),
+        )
+        for name in TUNING
+        for value in NONSENSE
+    ]
+    answer = rig.probe.call(SetParameters, "set_parameters", parameters=parameters)
+    taken = [
+        one.name
+        for one, result in zip(parameters, answer.results, strict=True)
+        if result.successful
+    ]
+    rig.findings.expect(not taken, f"nonsense was taken for {taken}")
+    rig.hand.leave()
+    rig.expect_still(rig.line.tick, "after nonsense for parameters")
+
+
+def limit_lowered(rig: Rig) -> None:
+    """To nothing, while somebody drives on."""
+    rig.drive(yaw_rate=0.0)
+    since = rig.line.tick
+    for value in (0.0, 0.5):
+        one = Parameter(name="max_linear_speed")
+        one.value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+        answer = rig.probe.call(SetParameters, "set_parameters", parameters=[one])
+        rig.findings.expect(answer.results[0].successful, "a limit was refused")
+        if value == 0.0:
+            rig.expect_still(since, "the limit is nothing")
+            rig.hand.leave()
+
+
+def flood_into_a_full_port(rig: Rig) -> None:
+    """1,000 commands a second; then the port takes bytes again, and nobody commands."""
+    publisher = rig.probe.publisher(Twist, "cmd_vel")
+    fast = Twist()
+    fast.linear.x = 0.4
+    rig.drive()
+    rig.hand.leave()
+    with rig.terminal.kept_full(OLD_COMMAND):
+        for _ in range(200):
+            for _ in range(10):
+                publisher.publish(fast)
+            rig.wait_ticks(1)
+    rig.probe.wait_for_state("nominal")
+    rig.expect_still(rig.line.tick, "a flood into a full port ends", TIMEOUT_S)
+    rig.probe.node.destroy_publisher(publisher)
+
+
+def guard_killed(rig: Rig) -> None:
+    """The driver drives on, with another one."""
+    rig.drive()
+    (first,) = rig.driver.guards()
+    os.kill(first, signal.SIGKILL)
+    assert rig.wait_for_board(lambda _: rig.driver.guards() not in ([], [first])), "no new guard"
+    rig.findings.expect(rig.line.board.driven, "the robot was stopped")
+    rig.hand.leave()
+    rig.expect_still(rig.line.tick, "with a new guard")
+
+
+UNKIND: Final[dict[str, Callable[[Rig], None]]] = {
+    "two commanders in turn": two_commanders,
+    "TwistStamped where Twist is expected": other_type,
+    "1,000 releases a second by topic": flood_of_releases,
+    "five clients call everything during a reconnection": everybody_calls_at_once,
+    "limits and timeouts of NaN, infinity, -1": nonsense_for_parameters,
+    "max_linear_speed is set to 0": limit_lowered,
+    "1,000 commands a second into a full port": flood_into_a_full_port,
+    "the guard is killed": guard_killed,
+}

@@ -1,0 +1,90 @@
+"""The documents: what is generated is current, links and commands hold, the site builds."""
+
+import re
+import runpy
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from omnibot_driver.parameters import BY_NAME
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+GENERATED: dict[str, Callable[[], str]] = runpy.run_path(str(ROOT / "docs/generate.py"))[
+    "GENERATED"
+]
+OTHERS_PARAMETERS = {"repeat_rate", "speed", "use_sim_time", "max_linear_sped"}
+SPHINX = ("sphinx", "myst_parser", "sphinx_rtd_theme")
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def anchors(page: Path) -> set[str]:
+    """The names that GitHub and the site give to the page's headings."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", text).strip().lower().replace(" ", "-") for text in headings}
+
+
+def found(pattern: str) -> Iterator[str]:
+    """What the pattern's group is, wherever a document has it."""
+    for page in PAGES:
+        yield from re.findall(pattern, page.read_text())
+
+
+@pytest.mark.parametrize("name", GENERATED)
+def test_what_is_generated_is_what_the_code_says(name: str) -> None:
+    """Parameters, driver.yaml, mode table and diagram; `make docs` writes them."""
+    assert (ROOT / name).read_text(encoding="utf-8") == GENERATED[name](), "run: make docs"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_every_link_leads_somewhere(page: Path) -> None:
+    """To a file that is there, and to a heading where one is named."""
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
+        if re.match(r"https?://|mailto:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        assert file.exists(), target
+        assert not anchor or anchor in anchors(file), target
+
+
+def test_every_page_can_be_reached_from_the_readme() -> None:
+    """Nobody has to know that a page exists."""
+    readme = (ROOT / "README.md").read_text()
+    for page in ROOT.glob("docs/*.md"):
+        assert page.name == "index.md" or f"(docs/{page.name}" in readme, page.name
+
+
+def test_every_command_exists() -> None:
+    """Executables, launch files and their arguments, make's targets, parameters, services."""
+    scripts = re.findall(r'f"(\w+) = \{NAME\}', (ROOT / "setup.py").read_text())
+    assert {*found(r"ros2 run omnibot_driver\s+([a-z_]+)")} <= set(scripts)
+    launches = {path.name for path in (ROOT / "launch").iterdir()}
+    assert {*found(r"ros2 launch omnibot_driver\s+([\w.]+)")} <= launches
+    targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert {*found(r"`make ([a-z]+)[ `]")} <= set(targets)
+    assert {*found(r" -p '?([a-z_]+):=")} - OTHERS_PARAMETERS <= set(BY_NAME)
+    code = "".join(file.read_text() for file in (ROOT / "omnibot_driver").rglob("*.py"))
+    services = re.findall(r'create_service\(\s*\w+, "~/(\w+)"', code)
+    assert {*found(r"ros2 service call /omnibot_driver/(\w+)")} <= set(services)
+    assert {*found(r"ros2 param \w+ /omnibot_driver (\w+)")} <= set(BY_NAME)
+
+
+@pytest.mark.skipif(
+    not all(map(find_spec, SPHINX)), reason="Sphinx and its theme are not installed"
+)
+def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
+    """Every page, the README and the changelog are in it."""
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "-c", "docs", ".", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    for page in [*PAGES, ROOT / "CHANGELOG.rst"]:
+        assert (tmp_path / page.relative_to(ROOT)).with_suffix(".html").is_file()
+    assert "docs/index.html" in (tmp_path / "index.html").read_text()

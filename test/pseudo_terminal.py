@@ -1,0 +1,76 @@
+"""A program on a terminal of 80x24 of its own, as a person has it: keys in, what it draws out."""
+
+import contextlib
+import fcntl
+import os
+import select
+import struct
+import subprocess
+import termios
+import threading
+from collections.abc import Sequence
+from typing import Self
+
+PATIENCE_S = 30.0
+
+
+class PseudoTerminal:
+    """Runs the command; whatever is left of it ends with the test."""
+
+    def __init__(self, command: Sequence[str]) -> None:
+        self._far, near = os.openpty()
+        fcntl.ioctl(near, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+        self.process = subprocess.Popen(
+            command,
+            stdin=near,
+            stdout=near,
+            stderr=near,
+            env={**os.environ, "TERM": "xterm-256color"},
+            start_new_session=True,
+            preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+        )
+        os.close(near)
+        self._drawn = b""
+        self._changed = threading.Condition()
+        self._hung_up = threading.Event()
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.kill()
+        self.process.wait()
+        self.hang_up()
+
+    def hang_up(self) -> None:
+        """Close the window."""
+        self._hung_up.set()
+        self._reader.join()
+
+    def type(self, keys: str) -> None:
+        """As if they were pressed one after the other."""
+        os.write(self._far, keys.encode())
+
+    def wait_for(self, text: str) -> None:
+        """Until it has drawn this, since this was last asked."""
+        with self._changed:
+            found = self._changed.wait_for(lambda: text.encode() in self._drawn, PATIENCE_S)
+            assert found, f"{text!r} is not in {self._drawn[-2000:]!r}"
+            self._drawn = self._drawn.partition(text.encode())[2]
+
+    def end(self) -> int:
+        """Wait for its end; the exit code."""
+        return self.process.wait(PATIENCE_S)
+
+    def _read(self) -> None:
+        with contextlib.suppress(OSError):  # the program has closed its end
+            while not self._hung_up.is_set():
+                if not select.select([self._far], [], [], 0.05)[0]:
+                    continue
+                data = os.read(self._far, 65536)
+                with self._changed:
+                    self._drawn += data
+                    self._changed.notify_all()
+        os.close(self._far)

@@ -1,0 +1,105 @@
+"""What a calibration is to find can be planted: it shows in what the board sends and does."""
+
+import struct
+from math import pi, radians
+
+import pytest
+
+from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.motors import Motor, MotorConstants, WheelController, WheelGains
+
+IMU, DELTA, POSE = b"\xff\xfa", b"\xff\xfb", b"\xff\xfc"
+FORWARD = bytes.fromhex("FF FE 01 00 08 00 00 00 00")
+LEFT = bytes.fromhex("FF FE 01 00 00 00 08 00 00")
+TURN = bytes.fromhex("FF FE 01 00 00 00 00 00 64")
+WHEEL_B = bytes.fromhex("FF FE 02 00 00 00 08 00 00")
+
+
+def driven(command: bytes, seconds: float = 1.0, **settings: object) -> SimulatedBoard:
+    """A running board, some time after a command."""
+    board = SimulatedBoard(BoardSettings(running=True, **settings))  # type: ignore[arg-type]
+    board.receive(command)
+    for _ in range(round(seconds * 100)):
+        board.step()
+    return board
+
+
+def last(board: SimulatedBoard, header: bytes, count: int) -> tuple[int, ...]:
+    """The words of the last frame of a kind."""
+    frame = next(sent.data for sent in reversed(board.sent) if sent.data.startswith(header))
+    return struct.unpack_from(f">{count}h", frame, 2)
+
+
+@pytest.mark.parametrize(
+    ("command", "signs", "axis"),
+    [(FORWARD, (-1, 1, 1), 0), (LEFT, (1, -1, 1), 1), (TURN, (1, 1, -1), 2)],
+)
+def test_a_reversed_axis_moves_the_robot_the_other_way_and_the_board_does_not_know(
+    command: bytes, signs: tuple[int, int, int], axis: int
+) -> None:
+    """Commands and odometry alike."""
+    straight, reversed_ = driven(command), driven(command, axis_signs=signs)
+    truth = (reversed_.truth.x_m, reversed_.truth.y_m, reversed_.truth.yaw_rad)
+    assert truth[axis] < -0.05
+    believed, expected = reversed_.odometry, straight.odometry
+    assert believed.x_mm == pytest.approx(expected.x_mm, abs=2)
+    assert believed.y_mm == pytest.approx(expected.y_mm, abs=2)
+    assert believed.theta_mrad == pytest.approx(expected.theta_mrad, abs=15)
+
+
+def test_wheel_counts_are_those_of_the_wheels() -> None:
+    """By hand: 8 / 70 m/s are 39 counts in 40 ms, of wheel B alone."""
+    a, b, c = last(driven(WHEEL_B, 2.0, frame="wheel_counts"), DELTA, 3)
+    assert (a, c) == (0, 0)
+    assert b == pytest.approx(8 / 70 * 0.04 * 1560 / (2 * pi * 0.029), abs=1.5)
+
+
+def test_each_motor_has_its_own_constants() -> None:
+    """A slow motor is behind, the others are as ever."""
+    slow = MotorConstants(time_constant_ticks=30.0)
+    board = driven(FORWARD, 0.15, motors=(slow, MotorConstants(), MotorConstants()))
+    a, b, _ = board.rim_speeds_mps
+    assert abs(a) < 0.6 * abs(b)
+
+
+def test_a_motors_delay_holds_its_effort_back() -> None:
+    """Nothing for so many ticks, then what would have been."""
+    prompt, late = Motor(), Motor(MotorConstants(delay_ticks=3))
+    turned = [prompt.advance(500.0) for _ in range(10)]
+    assert [late.advance(500.0) for _ in range(10)] == [0.0, 0.0, 0.0, *turned[:7]]
+
+
+def test_the_controllers_gains_are_those_given() -> None:
+    """By hand, one tick after a step of 10 counts: 5·10 + 2·10 + 1·10."""
+    gains = WheelGains(feed_forward=5.0, proportional=2.0, integral=1.0)
+    assert WheelController(gains).update(10.0, 0.0) == 80.0
+
+
+@pytest.mark.parametrize(
+    ("mounted", "held", "expected"),
+    [
+        ((pi, 0.0, 0.0), {"pitch_rad": radians(-30)}, (0.5, 0.0, -0.866)),
+        ((pi, 0.0, 0.0), {"roll_rad": radians(30)}, (0.0, -0.5, -0.866)),
+        ((0.0, 0.0, 0.0), {"roll_rad": radians(30)}, (0.0, 0.5, 0.866)),
+        ((0.0, 0.0, pi / 2), {"pitch_rad": radians(-30)}, (0.0, -0.5, 0.866)),
+    ],
+)
+def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
+    mounted: tuple[float, float, float],
+    held: dict[str, float],
+    expected: tuple[float, float, float],
+) -> None:
+    """Nose up is a negative pitch, left side up a positive roll (REP-103)."""
+    board = driven(b"", 0.1, imu_rpy_rad=mounted, accel_noise_g=0.0)
+    board.hold(**held)
+    board.step()
+    assert [word / 16384 for word in last(board, IMU, 6)[:3]] == pytest.approx(expected, abs=1e-3)
+
+
+def test_a_robot_that_is_turned_by_hand_feels_it_and_its_wheels_do_not() -> None:
+    """To the left is negative on a gyro that hangs upside down."""
+    board = driven(b"", 0.1, gyro_noise_dps=0.0, gyro_bias_dps=(0.0, 0.0, 0.0))
+    board.hold(yaw_rate=radians(30))
+    board.step()
+    assert last(board, IMU, 6)[5] == pytest.approx(-30 * 131, abs=1)
+    assert board.truth.yaw_rad == 0.0

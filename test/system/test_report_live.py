@@ -1,0 +1,46 @@
+"""A report of a running driver, and what is said where there is none."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from driver_process import Driver
+from probe import Probe
+
+
+def report(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "omnibot_driver.tools.report", "--output", folder, *arguments],
+        env={**os.environ, "MPLCONFIGDIR": str(folder.parent)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_a_running_robot_is_listened_to(
+    tmp_path: Path,
+    start_driver: Callable[..., Driver],
+    probe_of: Callable[[Driver], Probe],
+) -> None:
+    """Found by itself; the verdict and the pictures are those of a bag."""
+    driver = start_driver("sim://?seed=1")
+    probe_of(driver).wait_for_state("nominal")
+    done = report(tmp_path / "out", "--live", "2")
+    assert done.returncode in (0, 3), done.stderr
+    assert "imu/data_raw comes at" in done.stdout
+    assert "odom comes at" in done.stdout
+    assert "ominal for" in done.stdout
+    assert "Never latched" in done.stdout
+    assert (tmp_path / "out/path.png").is_file()
+
+
+def test_without_a_driver_it_says_so(tmp_path: Path) -> None:
+    """One sentence, and no files."""
+    done = report(tmp_path / "out", "--live", "3", "--namespace", "nobody")
+    assert done.returncode == 1
+    assert done.stderr.startswith("report: no driver was heard")
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,84 @@
+"""A robot with planted errors, a real driver, and a user who answers."""
+
+import math
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from driver_process import Driver
+
+from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
+from omnibot_driver.tools.calibrate import robot as robot_module
+from omnibot_driver.tools.calibrate.__main__ import main
+from omnibot_driver.tools.calibrate.interruption import Interruption
+from omnibot_driver.tools.calibrate.robot import connect
+
+Answer = Callable[[str], str]
+
+
+def yes(_question: str) -> str:
+    """To whatever is asked."""
+    return "y"
+
+
+@dataclass
+class Rig:
+    """``calibrate`` runs a subcommand in this process; its files are in ``folder``."""
+
+    port: PtyBoard
+    driver: Driver
+    folder: Path
+    questions: list[str] = field(default_factory=list)
+
+    @property
+    def output(self) -> Path:
+        return self.folder / "robot.yaml"
+
+    def calibrate(self, *words: str, answer: Answer = yes) -> int:
+        """Its exit code."""
+
+        def read(question: str) -> str:
+            self.questions.append(question)
+            return answer(question)
+
+        files = ("--output", str(self.output), "--plot", str(self.folder))
+        return main([*words, *files, "--namespace", self.driver.namespace], read)
+
+    def written(self) -> dict[str, Any]:
+        """What is in the file."""
+        content: dict[str, Any] = yaml.safe_load(self.output.read_text())
+        return content
+
+
+@contextmanager
+def rig(
+    folder: Path, parameters: dict[str, object] | None = None, **settings: Any
+) -> Iterator[Rig]:
+    """A simulated board with these settings and a driver with these parameters, both running."""
+    board = SimulatedBoard(BoardSettings(running=True, **settings))
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        PtyBoard(board) as port,
+        Driver(port=port.path, **parameters or {}) as driver,
+    ):
+        patch.setattr(robot_module, "LOST_S", 3.0)  # a busy machine is no lost robot
+        driver.wait_for_line("state: nominal|state: imu_only")
+        yield Rig(port, driver, folder)
+
+
+def parameters_of(driver: Driver) -> dict[str, Any]:
+    """What the driver says that its parameters are."""
+    with Interruption() as interruption, connect(driver.namespace, [], interruption) as robot:
+        return dict(robot.parameters)
+
+
+def row(table: str, name: str) -> tuple[float, float]:
+    """Value and uncertainty of the row in a printed table."""
+    found = re.search(rf"^[│ ]*{re.escape(name)} *│ *(\S+) *│ *(\S*) *│", table, re.MULTILINE)
+    assert found, f"no row {name!r} in:\n{table}"
+    return float(found[1]), float(found[2] or math.nan)

@@ -1,0 +1,134 @@
+"""``calibrate commission`` with a real driver, and a user who says what the wheels truly do."""
+
+import math
+from pathlib import Path
+from typing import Any, ClassVar
+
+import pytest
+from calibrate_rig import parameters_of, rig
+from seeing_user import User
+
+from omnibot_driver.parameters import PARAMETERS
+from omnibot_driver.tools.calibrate import commission
+from omnibot_driver.tools.calibrate.commission_result import Found, result_of
+from omnibot_driver.tools.calibrate.console import Console
+from omnibot_driver.tools.calibrate.log import Log
+from omnibot_driver.tools.needs import ToolError
+
+
+@pytest.fixture(autouse=True)
+def _quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (
+        ("JOG_S", 0.8),
+        ("HELD_S", 0.5),
+        ("TURN_BY_HAND_S", 2.0),
+        ("SETTLING_S", 0.3),
+    ):
+        monkeypatch.setattr(commission, name, value)
+
+
+def told(capsys: pytest.CaptureFixture[str]) -> str:
+    """All of it, in one line."""
+    return " ".join(capsys.readouterr().out.split())
+
+
+def test_the_whole_walk_finds_what_was_planted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Signs, frame, mounting; an impossible answer is asked again; the driver loads the file."""
+    with rig(
+        tmp_path,
+        axis_signs=(1, -1, -1),
+        frame="body",
+        imu_rpy_rad=(math.pi, 0.0, math.pi / 2),
+    ) as robot:
+        code = robot.calibrate("commission", answer=User(robot.port, "0++"))
+        said = told(capsys)
+        assert code == 0, said
+        assert "That cannot be: wheel A alone was commanded" in said
+        assert "+y is reversed" in said
+        assert "delta_frame is read at the start" in said
+        assert robot.written() == {
+            "control_method": "velocity",
+            "delta_frame": "body",
+            "axis_signs": [1, -1, -1],
+            "imu_rpy": [3.1416, 0.0, 1.5708],
+        }
+        assert "xacro_args" in said
+        assert (tmp_path / "calibrate_commission.png").stat().st_size > 10_000
+    with rig(tmp_path, {"calibration_file": str(robot.output)}) as again:
+        now = parameters_of(again.driver)
+    assert now["axis_signs"] == [1, -1, -1]
+    assert now["delta_frame"] == "body"
+
+
+@pytest.mark.parametrize(
+    ("planted", "found"),
+    [
+        ({"frame": "wheel_counts"}, {"delta_frame": "wheel_counts"}),
+        ({"control": "position"}, {"control_method": "position"}),
+    ],
+)
+def test_switch_and_deltas_are_told_by_the_data(
+    planted: dict[str, Any], found: dict[str, str], tmp_path: Path
+) -> None:
+    """Nobody has to look."""
+    with rig(tmp_path, **planted) as robot:
+        assert robot.calibrate("commission", "--only", "board") == 0
+        assert robot.written().items() >= found.items()
+
+
+class Deaf:
+    """A robot that can be told everything."""
+
+    parameters: ClassVar[dict[str, Any]] = {one.name: one.default for one in PARAMETERS}
+
+    def drive(self, *_: object, **__: object) -> Log:
+        return Log()
+
+
+def walk(*answers: str) -> Found:
+    """The wheels and axes, with these answers."""
+    left = list(answers)
+    found = Found(before=Deaf.parameters)
+    commission.Walk(Deaf(), Console(read=lambda _question: left.pop(0))).wheels(found)
+    assert not left
+    return found
+
+
+def test_an_axis_is_reversed_against_what_the_driver_has(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """r shows it again; nonsense is asked again; the signs are those seen."""
+    found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
+    assert found.axis_signs == (1, -1, 1)
+    assert "Please answer with three of + - 0" in told(capsys)
+    assert any("mirror image" in note for note in result_of(found).notes)
+
+
+def test_wheels_that_are_all_reversed_are_mended_by_the_axes() -> None:
+    """As far as axes go."""
+    found = walk("-00", "0-0", "00-", "+-0", "++-", "+++")
+    assert found.axis_signs == (-1, -1, -1)
+    assert any("wheel_cmd and joint_states stay" in note for note in result_of(found).notes)
+
+
+def test_a_single_reversed_wheel_is_nothing_that_a_parameter_mends() -> None:
+    """It is named."""
+    with pytest.raises(ToolError, match="wheel B turns the other way than the two others"):
+        walk("+00", "0-0", "00+")
+
+
+def test_who_keeps_answering_what_cannot_be_is_sent_to_read_on() -> None:
+    """After three times."""
+    with pytest.raises(ToolError, match=r"wheel B was seen to turn.*docs/commissioning.md"):
+        walk("000", "+++", "0-0")
+
+
+def test_a_board_on_positional_control_leaves_the_axes_out() -> None:
+    """The wheels have been looked at."""
+    found = Found(before=Deaf.parameters, control_method="position")
+    answers = ["+00", "0+0", "00+"]
+    commission.Walk(Deaf(), Console(read=lambda _question: answers.pop(0))).wheels(found)
+    assert found.axis_signs is None
+    assert result_of(found).parameters == {"control_method": "position"}

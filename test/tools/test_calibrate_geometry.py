@@ -1,0 +1,165 @@
+"""``calibrate geometry``: wheels and bases of the wrong size are found by tape measure."""
+
+import argparse
+import io
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from calibrate_bench import BenchRobot
+from calibrate_rig import parameters_of, rig, row
+from driver_process import Driver
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from surveyor import Surveyor
+
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.tools.calibrate import geometry
+from omnibot_driver.tools.calibrate.console import Console
+from omnibot_driver.tools.calibrate.geometry_fit import Reading, fit, rolled
+from omnibot_driver.tools.calibrate.log import Column
+from omnibot_driver.tools.calibrate.waypoints import square
+from omnibot_driver.tools.needs import ToolError
+
+BASE_M = 0.143
+PERFECT = np.ones(3)
+SIGMA = np.array([0.002, 0.002, math.radians(1.0)])
+
+
+def arguments(*words: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    geometry.add_arguments(parser)
+    return parser.parse_args(words)
+
+
+def paths() -> list[tuple[str, Column, bool]]:
+    """Of an odometry that goes exactly through the places of every drive."""
+    found = []
+    for drive in geometry.plan(1.0, 3, squares=True):
+        places = [Pose(), *drive.places]
+        path = []
+        for before, after in pairwise(places):
+            for part in np.linspace(0, 1, 60):
+                off = after - before
+                path.append(before + off.times(part, part, part))
+        rows = np.array([(one.x_m, one.y_m, one.yaw_rad) for one in path])
+        found.append((drive.name, rows, drive.heading))
+    return found
+
+
+def readings(factors: Column, base: float, random: np.random.Generator) -> list[Reading]:
+    """By a tape of SIGMA, of a robot that truly has these sizes."""
+    made = []
+    for name, path, heading in paths():
+        end = rolled(path, factors, base, BASE_M)[-1] + SIGMA * random.standard_normal(3)
+        end[[0, 1] if heading else [2]] = math.nan
+        made.append(Reading(name, path, end, SIGMA))
+    return made
+
+
+sizes = st.floats(0.93, 1.07)
+unlike = st.floats(-0.01, 0.01)
+
+
+@settings(deadline=None, max_examples=25)
+@given(sizes, sizes, unlike, unlike, st.integers(0, 10_000))
+def test_any_geometry_is_found_within_what_is_claimed(
+    wheels: float, base: float, a: float, b: float, seed: int
+) -> None:
+    """Radius, base and the differences of the wheels, through the noise of tape and eye."""
+    factors = wheels * (1 + np.array([a, b, -a - b]))
+    found = fit(readings(factors, base, np.random.default_rng(seed)), BASE_M)
+    wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance))[:2]
+    assert abs(found.wheels - wheels) < 5 * wheels_sigma < 0.01
+    assert abs(found.base - base) < 5 * base_sigma < 0.01
+    assert abs(found.turn - wheels / base) < 5 * found.turn_sigma < 0.005
+    assert (np.abs(found.unlike - [a, b, -a - b]) < 5 * found.unlike_sigma).all()
+
+
+def test_claimed_uncertainties_are_the_true_ones() -> None:
+    """Over sixty robots, errors divided by claims have a deviation near one."""
+    scores = []
+    for seed in range(60):
+        random = np.random.default_rng(seed)
+        found = fit(readings(1.03 * PERFECT, 0.98, random), BASE_M)
+        wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance))[:2]
+        scores.append(((found.wheels - 1.03) / wheels_sigma, (found.base - 0.98) / base_sigma))
+    assert 0.6 < np.std(scores) < 1.2
+
+
+@given(st.integers(0, 3))
+def test_rolling_with_the_believed_sizes_is_the_way_itself(number: int) -> None:
+    """From wherever it began."""
+    path = paths()[number + 2][1] + [3.0, -2.0, 0.0]
+    assert rolled(path, PERFECT, 1.0, BASE_M) == pytest.approx(path - path[0], abs=1e-9)
+
+
+def test_a_square_comes_back() -> None:
+    """A turn further, to the left or to the right."""
+    for sign in (1, -1):
+        last = square(1.0, sign)[-1]
+        assert (last.x_m, last.y_m, last.yaw_rad) == pytest.approx((0, 0, sign * math.tau))
+
+
+def test_readings_with_a_wrong_sign_are_turned_away() -> None:
+    """Rather than making a monster of the robot."""
+    wrong = readings(PERFECT, 1.0, np.random.default_rng(0))
+    for one in wrong[2:4]:
+        one.end[:2] *= -1
+    with pytest.raises(ToolError, match="do not fit this robot"):
+        fit(wrong, BASE_M)
+
+
+@pytest.mark.parametrize(
+    ("factors", "base", "slip"),
+    [
+        ((1.02, 1.02, 1.02), 0.97, 0.0),
+        ((0.985, 0.975, 0.98), 1.03, 0.0),
+        ((1.0, 1.0, 1.0), 1.0, 0.01),
+    ],
+)
+def test_planted_sizes_are_found_on_the_simulated_robot(
+    factors: tuple[float, float, float], base: float, slip: float
+) -> None:
+    """The whole calibration in simulated time; slip shortens every way like a smaller wheel."""
+    robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
+    console = Console(read=Surveyor(lambda: robot.bench.board), file=io.StringIO())
+    found = geometry.run(robot, console, arguments("--turns", "2", "--side", "0.7"))
+    mean = sum(factors) / 3 * (1 - slip)
+    planted = {
+        "wheel_radius": 0.029 * mean,
+        "base_radius": 0.143 * base,
+        "odom_linear_scale": mean,
+        "odom_angular_scale": mean / base,
+    }
+    for one in found.findings[:4]:
+        assert one.sigma is not None
+        assert abs(one.value - planted[one.name]) < max(4 * one.sigma, 0.002 * planted[one.name])
+        assert one.sigma < 0.006 * planted[one.name]
+        assert found.parameters[one.name] == one.value
+
+
+def test_planted_sizes_are_found_through_a_driver_and_mend_its_odometry(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Lines and turns in real time; then the odometry of a new drive is the truth."""
+    quick = {"max_angular_speed": 1.5}
+    planted: dict[str, Any] = {"wheel_radius_scale": (1.04,) * 3, "base_radius_scale": 0.97}
+    with rig(tmp_path, quick, **planted) as robot:
+        words = ("--side", "0.4", "--turns", "1", "--turning", "1.5", "--speed", "0.4")
+        surveyor = Surveyor(lambda: robot.port.board)
+        code = robot.calibrate("geometry", *words, "--without-squares", "--apply", answer=surveyor)
+        assert code == 0
+        written, table = robot.written(), capsys.readouterr().out
+    for name, value in (("wheel_radius", 0.029 * 1.04), ("base_radius", 0.143 * 0.97)):
+        found, sigma = row(table, name)
+        assert abs(found - value) < max(4 * sigma, 0.005 * value)
+        assert sigma < 0.015 * value
+    assert written["odom_angular_scale"] == pytest.approx(1.04 / 0.97, rel=0.005)
+    with Driver(port="sim://", calibration_file=str(robot.output)) as driver:
+        driver.wait_for_line("state: nominal")
+        loaded = parameters_of(driver)
+    assert {name: loaded[name] for name in written} == written

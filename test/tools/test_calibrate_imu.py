@@ -1,0 +1,153 @@
+"""``calibrate imu``: what was planted in the sensor is found, within what is claimed."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from calibrate_rig import parameters_of, rig, row
+from driver_process import Driver
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from omnibot_driver.tools.calibrate.allan import allan, noise
+from omnibot_driver.tools.calibrate.log import Imu, Log
+from omnibot_driver.tools.calibrate.rest import rest, still
+from omnibot_driver.tools.needs import ToolError
+
+PERIOD_S = 0.01
+NOISE = np.array([0.001, 0.0009, 0.0012])
+BIAS = np.array([0.02, -0.03, 0.01])
+UPSIDE_DOWN = np.array([0.0, 0.0, -9.80665])
+
+
+def sensor(seconds: float, seed: int = 0, force: np.ndarray = UPSIDE_DOWN, lost: int = 0) -> Imu:
+    """Of white noise about a bias and a force."""
+    random = np.random.default_rng(seed)
+    count = round(seconds / PERIOD_S)
+    rates = BIAS + NOISE * random.standard_normal((count, 3))
+    forces = force + 0.03 * random.standard_normal((count, 3))
+    stamps = np.arange(count + lost)[:count] * PERIOD_S
+    stamps[count // 2 :] += lost * PERIOD_S
+    return Imu(stamps, forces, rates)
+
+
+def log_of(imu: Imu, moved_m: float = 0.0) -> Log:
+    """With odometry that has moved by so much in all."""
+    rows = np.column_stack((imu.stamp_s, imu.force_mps2, imu.rate_radps))
+    way = np.linspace(0.0, moved_m, len(rows) // 4)
+    odometry = [(4 * n * PERIOD_S, x, 0.0, 0.0, 0.0, 0.0, 0.0) for n, x in enumerate(way)]
+    return Log([tuple(map(float, one)) for one in rows], odometry)
+
+
+def test_claimed_uncertainties_are_the_true_ones() -> None:
+    """Over two hundred rests, the errors divided by what is claimed have a deviation near one."""
+    rests = [rest(sensor(20.0, seed)) for seed in range(200)]
+    biases = np.array([(one.bias_radps - BIAS) / one.bias_sigma for one in rests])
+    assert 0.7 < biases.std() < 1.1
+    densities = np.array([[n.density for n in one.noises] for one in rests])
+    sigmas = np.array([[n.sigma for n in one.noises] for one in rests])
+    planted = NOISE * math.sqrt(PERIOD_S)
+    assert np.abs((densities - planted) / planted).max() < 0.1
+    assert np.abs((densities - planted) / sigmas).mean() < 3
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.sampled_from([0.0, math.pi]))
+def test_level_is_the_turn_that_makes_gravity_point_up(
+    roll: float, pitch: float, mounting: float
+) -> None:
+    """By the rotation matrix of fixed-axis angles, written out."""
+    roll += mounting
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    to_body = np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])
+    found = rest(sensor(2.0, force=to_body.T @ (0.0, 0.0, 9.8)))
+    roll_rad, pitch_rad = found.level_rad
+    assert abs(math.remainder(roll_rad - roll, math.tau)) < 0.003
+    assert abs(pitch_rad - pitch) < 0.003
+    assert np.allclose(to_body @ found.up, (0, 0, 1), atol=0.004)
+
+
+def test_allan_deviation_tells_a_wandering_bias_from_noise() -> None:
+    """An hour at 10 Hz, a random walk under white noise."""
+    random = np.random.default_rng(3)
+    walk, density = 2e-5, 5e-4
+    count, period_s = 36_000, 0.1
+    readings = density / math.sqrt(period_s) * random.standard_normal(count)
+    readings += np.cumsum(walk * math.sqrt(period_s) * random.standard_normal(count))
+    found = noise(allan(readings, period_s))
+    assert found.density == pytest.approx(density, rel=0.05)
+    assert found.walk == pytest.approx(walk, rel=0.4)
+
+
+def test_a_bias_that_walks_is_known_less_well() -> None:
+    """What is claimed covers the bias that is left at the end of ten minutes."""
+    scores = []
+    for seed in range(12):
+        imu = sensor(600.0, seed)
+        walk = np.cumsum(
+            3e-6 * np.random.default_rng(seed).standard_normal(imu.rate_radps.shape), 0
+        )
+        found = rest(Imu(imu.stamp_s, imu.force_mps2, imu.rate_radps + walk))
+        scores += list((found.bias_radps - BIAS - walk[-1]) / found.bias_sigma)
+    assert 0.5 < np.std(scores) < 2.0
+
+
+def test_readings_that_say_nothing_are_turned_away() -> None:
+    """Too few, not finite, stuck, full of gaps: each with its sentence."""
+    with pytest.raises(ToolError, match="too few"):
+        rest(sensor(0.5))
+    imu = sensor(3.0)
+    imu.rate_radps[7, 1] = math.nan
+    with pytest.raises(ToolError, match="not all finite"):
+        rest(imu)
+    imu = sensor(3.0)
+    imu.force_mps2[:, 2] = -9.8
+    with pytest.raises(ToolError, match="stuck"):
+        rest(imu)
+    with pytest.raises(ToolError, match="were lost"):
+        rest(sensor(3.0, lost=30))
+
+
+def test_a_robot_that_moves_is_not_at_rest() -> None:
+    """By its wheels, or by a gyro that turns faster than any bias; a robot at rest passes."""
+    still(np.zeros(3))(log_of(sensor(3.0)))
+    with pytest.raises(ToolError, match="its wheels turn"):
+        still(np.zeros(3))(log_of(sensor(3.0), moved_m=0.02))
+    with pytest.raises(ToolError, match="which is turning"):
+        still(np.array([0.0, 0.0, 0.5]))(log_of(sensor(3.0)))
+
+
+def test_planted_errors_are_found_and_the_driver_loads_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Bias, noise, tilt and the length of gravity, through wire and driver, in four seconds."""
+    planted = (1.2, -0.8, 0.4)
+    sensor = {
+        "gyro_bias_dps": planted,
+        "gyro_noise_dps": 0.08,
+        "accel_bias_g": (0.0, 0.0, -0.02),
+        "imu_rpy_rad": (math.radians(181.5), math.radians(-2.0), 0.0),
+    }
+    with rig(tmp_path, {"gyro_bias": [0.01, 0.0, 0.0]}, **sensor) as robot:
+        robot.output.write_text("robot: number 7\n")
+        assert robot.calibrate("imu", "--minutes", "0.066", "--apply") == 0
+        written, table = robot.written(), capsys.readouterr().out
+        assert parameters_of(robot.driver)["gyro_bias"] == written["gyro_bias"]
+    for axis, dps in zip("xyz", planted, strict=True):
+        value, sigma = row(table, f"gyro_bias {axis}")
+        assert abs(value - math.radians(dps)) < 4 * sigma < math.radians(0.05)
+    assert written["gyro_bias"] == pytest.approx([math.radians(v) for v in planted], abs=4e-4)
+    assert written["angular_velocity_stddev"] == pytest.approx(math.radians(0.08), rel=0.15)
+    assert written["accel_bias"][2] == pytest.approx(-0.02 * 9.80665, abs=0.02)
+    assert row(table, "IMU roll")[0] == pytest.approx(181.5, abs=0.1)
+    assert row(table, "IMU pitch")[0] == pytest.approx(-2.0, abs=0.1)
+    assert row(table, "gyro noise density x")[0] == pytest.approx(0.008, rel=0.15)
+    assert written["robot"] == "number 7"
+    assert (tmp_path / "calibrate_imu.png").read_bytes().startswith(b"\x89PNG")
+    with Driver(port="sim://", calibration_file=str(robot.output)) as driver:
+        driver.wait_for_line("state: nominal")
+        loaded = parameters_of(driver)
+    assert {name: loaded[name] for name in written if name != "robot"} == {
+        name: value for name, value in written.items() if name != "robot"
+    }

@@ -1,0 +1,196 @@
+"""What all calibrations have in common: bounds, questions, tables, files."""
+
+import io
+import math
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver import calibration
+from omnibot_driver.core.board import Vector3
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.parameters import BY_NAME
+from omnibot_driver.tools.calibrate.__main__ import main, split_ros_arguments
+from omnibot_driver.tools.calibrate.console import Console, digits
+from omnibot_driver.tools.calibrate.files import output_file, picture_file, write
+from omnibot_driver.tools.calibrate.log import Log
+from omnibot_driver.tools.calibrate.motion import HALT, Bounds, Obedience, Topic, stairs
+from omnibot_driver.tools.calibrate.result import Finding, Result
+from omnibot_driver.tools.needs import ToolError
+
+BOUNDS = Bounds(speed=0.3, turning=0.5, way=1.0, turn=2.0, seconds=10.0)
+speeds = st.floats(-0.3, 0.3)
+commands = st.tuples(speeds, speeds, speeds)
+
+
+def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
+    """Look at the same thing for two seconds."""
+    obedience = Obedience(topic)
+    for tick in range(200):
+        obedience.look(tick / 100, 0.01, command, measured)
+
+
+def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:
+    """That answers so, one after the other, and what it shows."""
+    shown, left = io.StringIO(), list(answers)
+    return Console(yes=yes, read=lambda _question: left.pop(0), file=shown), shown
+
+
+@given(commands, commands, st.floats(0.001, 0.1))
+def test_a_command_changes_no_faster_than_allowed(
+    now: tuple[float, float, float], wanted: tuple[float, float, float], seconds: float
+) -> None:
+    """As a vector, turning by itself; what is near is reached."""
+    then = BOUNDS.approach("cmd_vel", now, wanted, seconds)
+    assert math.dist(then[:2], now[:2]) <= 0.3 * seconds + 1e-12
+    assert abs(then[2] - now[2]) <= 0.8 * seconds + 1e-12
+    for _ in range(2000):
+        now = BOUNDS.approach("cmd_vel", now, wanted, seconds)
+    assert now == wanted
+
+
+@pytest.mark.parametrize(
+    "command", [(0.31, 0.0, 0.0), (0.25, 0.25, 0.0), (0.0, 0.0, -0.6), (math.nan, 0.0, 0.0)]
+)
+def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, float]) -> None:
+    """As a vector, too; NaN as well."""
+    with pytest.raises(ToolError, match="beyond this calibration's own bounds"):
+        BOUNDS.require_allowed("cmd_vel", command)
+    wheels = Bounds(speed=5.0, way=1.0, seconds=1.0)
+    wheels.require_allowed("wheel_cmd", (5.0, -5.0, 5.0))
+    with pytest.raises(ToolError, match="wheel_cmd"):
+        wheels.require_allowed("wheel_cmd", (5.1, 0.0, 0.0))
+
+
+def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
+    """Too far, turned too much, too long."""
+    BOUNDS.require_within(9.0, Pose(0.6, 0.6, -1.9))
+    for seconds, pose, sentence in (
+        (1.0, Pose(0.8, 0.8, 0.0), "1.13 m"),
+        (1.0, Pose(0.0, 0.0, -2.1), "2.1 rad"),
+        (11.0, Pose(), "11 s"),
+    ):
+        with pytest.raises(ToolError, match=sentence):
+            BOUNDS.require_within(seconds, pose)
+
+
+def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
+    """A fifth is enough, crawling need not show, wheels are judged by their rates."""
+    watch("cmd_vel", (0.2, 0.0, 0.4), (0.05, 0.0, 0.1))
+    watch("cmd_vel", (0.02, 0.0, 0.0), HALT)
+    with pytest.raises(ToolError, match=r"does not move when told \(wheel_cmd\)"):
+        watch("wheel_cmd", (0.0, 3.0, 0.0), (0.1, 0.1, 0.1))
+    with pytest.raises(ToolError, match=r"does not move when told \(cmd_vel\)"):
+        watch("cmd_vel", (0.2, 0.0, 0.4), (0.2, 0.0, 0.0))
+
+
+def test_stairs_are_climbed_one_by_one() -> None:
+    """And then there are none."""
+    law = stairs([(1.0, (1.0, 0.0, 0.0)), (2.0, HALT), (1.0, (0.0, 1.0, 0.0))])
+    assert [law(t, Pose()) for t in (0.0, 0.99, 1.0, 2.9, 3.5)] == [
+        (1.0, 0.0, 0.0), (1.0, 0.0, 0.0), HALT, HALT, (0.0, 1.0, 0.0),
+    ]  # fmt: skip
+    assert law(4.0, Pose()) is None
+
+
+def test_an_empty_log_has_empty_columns() -> None:
+    """Of the right shape, so that nobody needs to ask."""
+    log = Log()
+    assert log.imu.rate_radps.shape == log.odometry.pose.shape == log.wheels.angle_rad.shape
+    assert log.commands.values.shape == (0, 3)
+
+
+def test_a_question_is_repeated_until_the_answer_makes_sense() -> None:
+    """Numbers in range, with a comma too; words by their beginning; nothing but y is yes."""
+    asks, shown = console("ten", "nan", "-5", "0,25", "l", "left", "", "yes", "n")
+    assert asks.number("How far", "m", 0.0, 1.0) == 0.25
+    assert shown.getvalue().count("Please type a number of m from 0 to 1.") == 3
+    assert asks.choose("Which way", ["left", "low"]) == "left"
+    assert [asks.asks("Sure?") for _ in range(3)] == [False, True, False]
+    sure, shown = console(yes=True)
+    sure.confirm("Sure?")
+    assert "yes (--yes)" in shown.getvalue()
+
+
+def test_a_table_in_a_pipe_is_plain_text() -> None:
+    """No colours, as many figures as the uncertainty deserves."""
+    asks, shown = console()
+    findings = [
+        Finding(name="linear_scale", value=80.12345, sigma=0.0234, unit="LSB/(m/s)", before=70.0),
+        Finding(name="delta_frame", value="body", before="earth"),
+    ]
+    asks.table("Found", findings)
+    assert digits(findings[0]) == ("80.123", "0.023", "70.000")
+    assert digits(findings[1]) == ("body", "", "earth")
+    assert "\x1b" not in shown.getvalue()
+    assert "80.123" in shown.getvalue()
+
+
+def result(**parameters: object) -> Result:
+    return Result(
+        findings=[],
+        parameters=parameters,  # type: ignore[arg-type]
+        draw=lambda figure: figure.subplots().plot([1, 2]),
+    )
+
+
+def test_what_is_written_is_what_the_driver_loads(tmp_path: Path) -> None:
+    """Beside everything that was in the file before."""
+    path = tmp_path / "robot.yaml"
+    path.write_text("name: number 7\ngyro_bias: [0.0, 0.0, 0.1]\nlinear_scale: 71.0\n")
+    write(result(linear_scale=80.5, axis_signs=[1, -1, 1]), path, tmp_path / "picture.svg")
+    assert calibration.load(path) == {
+        "gyro_bias": [0.0, 0.0, 0.1], "linear_scale": 80.5, "axis_signs": [1, -1, 1],
+    }  # fmt: skip
+    assert yaml.safe_load(path.read_text())["name"] == "number 7"
+    assert "<svg" in (tmp_path / "picture.svg").read_text()
+
+
+def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
+    """The next start must not fail."""
+    path = tmp_path / "robot.yaml"
+    with pytest.raises(ToolError, match="parameter 'linear_scale' must be"):
+        write(result(linear_scale=1e9), path, tmp_path / "picture.png")
+    assert not path.exists()
+
+
+def test_everything_that_may_be_written_is_a_parameter() -> None:
+    """A name that the driver does not know would end it."""
+    assert set(calibration.NAMES) <= set(BY_NAME)
+
+
+def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -> None:
+    """Parameters of ROS, nonsense, folders that are none, pictures that cannot be drawn."""
+    ros = tmp_path / "driver.yaml"
+    ros.write_text("/**:\n  ros__parameters:\n    port: x\n")
+    with pytest.raises(ToolError, match="is a file of ROS parameters"):
+        output_file(str(ros), "")
+    (tmp_path / "bad.yaml").write_text("gyro_bias: 1")
+    with pytest.raises(ToolError, match="or name another file with --output"):
+        output_file(str(tmp_path / "bad.yaml"), "")
+    with pytest.raises(ToolError, match="cannot be written"):
+        picture_file(str(ros / "picture.png"), "imu")
+    with pytest.raises(ToolError, match=r"let it end in \.png"):
+        picture_file(str(tmp_path / "picture.doc"), "imu")
+    assert picture_file(str(tmp_path), "imu") == tmp_path / "calibrate_imu.png"
+    assert output_file(None, str(tmp_path / "own.yaml")) == tmp_path / "own.yaml"
+
+
+def test_ros_arguments_are_told_from_ours() -> None:
+    """As rclpy tells them."""
+    words = ["imu", "--yes", "--ros-args", "-r", "cmd_vel:=other", "--", "--minutes", "2"]
+    own, ros = split_ros_arguments(words)
+    assert own == ["imu", "--yes", "--minutes", "2"]
+    assert ros == ["--ros-args", "-r", "cmd_vel:=other", "--"]
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["nonsense"], ["imu", "--minutes", "0"], ["scale", "--levels", "x"]]
+)
+def test_wrong_usage_is_exit_code_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    """With a sentence."""
+    assert main(words) == 2
+    assert "calibrate" in capsys.readouterr().err

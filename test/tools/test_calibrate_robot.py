@@ -1,0 +1,184 @@
+"""A robot that is moved for a calibration stands still whatever happens, and says why."""
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from calibrate_rig import Rig, rig
+from driver_process import PATIENCE_S
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Bool
+
+from omnibot_driver.simulator import SimulatedBoard
+from omnibot_driver.tools.calibrate.__main__ import main
+from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
+from omnibot_driver.tools.calibrate.motion import Bounds, steady
+from omnibot_driver.tools.calibrate.robot import Robot, connect
+from omnibot_driver.tools.needs import ToolError
+
+SLOWLY = (0.15, 0.0, 0.0)
+BOUNDS = Bounds(speed=0.2, turning=0.5, way=0.8, turn=1.0, seconds=20.0, acceleration=1.0)
+AFTER_S = 0.4
+
+
+@pytest.fixture(scope="module")
+def rigged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    with rig(tmp_path_factory.mktemp("robot")) as robot:
+        yield robot
+
+
+@pytest.fixture
+def robot(rigged: Rig) -> Iterator[Robot]:
+    with (
+        Interruption() as interruption,
+        connect(rigged.driver.namespace, [], interruption) as robot,
+    ):
+        yield robot
+
+
+def stands(board: SimulatedBoard) -> bool:
+    return not board.driven and max(map(abs, board.rim_speeds_mps)) < 0.001
+
+
+def once(action: Callable[[], object]) -> Callable[[float], None]:
+    """To be done when the robot has been under way for a moment."""
+    left = [action]
+
+    def show(seconds: float) -> None:
+        if seconds > AFTER_S and left:
+            left.pop()()
+
+    return show
+
+
+def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: Rig) -> None:
+    """Its log has commands, measurements and the standing still at the end."""
+    before = rigged.port.board.truth
+    log = robot.drive(steady((0.0, 0.15, 0.3), 1.0), BOUNDS)
+    after = rigged.port.board.truth
+    assert rigged.port.wait_for(stands, PATIENCE_S)
+    assert after.yaw_rad - before.yaw_rad == pytest.approx(0.35, abs=0.1)
+    assert log.odometry.pose[-1, 2] - log.odometry.pose[0, 2] == pytest.approx(
+        after.yaw_rad - before.yaw_rad, abs=0.005
+    )
+    assert log.commands.values.max() == 0.3
+    assert not log.commands.values[-1].any()
+    assert len(log.imu.stamp_s) > 3 * len(log.odometry.stamp_s)
+
+
+@pytest.mark.parametrize(
+    ("what", "sentence"),
+    [
+        ("estop", "the e-stop is latched"),
+        ("reboot", "the driver's state is or was"),
+        ("other", "somebody else commands the robot on cmd_vel"),
+        ("signal", "interrupted: the robot is told to stand still"),
+    ],
+)
+def test_what_happens_on_the_way_ends_it_at_rest(
+    robot: Robot, rigged: Rig, what: str, sentence: str
+) -> None:
+    """Tripped, rebooted, commanded by others, interrupted."""
+    node = robot._node
+    estop = node.create_publisher(Bool, "estop", 10)
+    other = node.create_publisher(Twist, "cmd_vel", 1)
+    actions = {
+        "estop": lambda: estop.publish(Bool(data=True)),
+        "reboot": rigged.port.board.reboot,
+        "other": lambda: other.publish(Twist()),
+        "signal": lambda: os.kill(os.getpid(), signal.SIGINT),
+    }
+    with pytest.raises(ToolError, match=sentence) as caught:
+        robot.drive(steady(SLOWLY, 10.0), BOUNDS, show=once(actions[what]))
+    assert rigged.port.wait_for(stands, PATIENCE_S)
+    assert not robot.log.commands.values[-1].any()
+    assert isinstance(caught.value, Interrupted) is (what == "signal")
+    if what == "estop":
+        with pytest.raises(ToolError, match=sentence):
+            robot.rest(1.0)
+        robot.call("estop", False)
+    if what == "reboot":
+        robot.call("start")
+
+
+def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None:
+    """By the odometry; and commands beyond the bounds are never sent."""
+    near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
+    with pytest.raises(ToolError, match=r"it went too far \(0\.\d\d m from where it began, 0\.05"):
+        robot.drive(steady(SLOWLY, 10.0), near)
+    assert rigged.port.wait_for(stands, PATIENCE_S)
+    with pytest.raises(ToolError, match="beyond this calibration's own bounds"):
+        robot.drive(steady((0.3, 0.0, 0.0), 1.0), near)
+    assert not robot.log.commands.values.any()
+
+
+def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> None:
+    """A scale of one count per m/s makes nothing of any command."""
+    robot.set_parameters({"linear_scale": 1.0})
+    with pytest.raises(ToolError, match="does not move when told"):
+        robot.drive(steady(SLOWLY, 10.0), BOUNDS)
+    robot.set_parameters({"linear_scale": 70.0})
+
+
+def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
+    """A parameter out of range."""
+    with pytest.raises(ToolError, match="the driver refuses linear_scale: "):
+        robot.set_parameters({"linear_scale": -1.0})
+
+
+def test_a_wrong_namespace_names_the_drivers_there_are(
+    rigged: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With exit code 1."""
+    assert main(["imu", "--yes", "--namespace", "nowhere"]) == 1
+    said = capsys.readouterr().err
+    assert "no driver is running in the namespace /nowhere; there are" in said
+    assert f"/{rigged.driver.namespace}/omnibot_driver" in said
+
+
+def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nor does silence, where nobody is there to ask."""
+    commands = len(rigged.port.board.commands)
+    assert rigged.calibrate("scale", answer=lambda _question: "n") == 1
+    assert "you said no" in capsys.readouterr().err
+
+    def nobody(_question: str) -> str:
+        raise EOFError
+
+    assert rigged.calibrate("scale", answer=nobody) == 1
+    assert "nobody answered" in capsys.readouterr().err
+    assert all(one.kind != "velocity" for one in list(rigged.port.board.commands)[commands:])
+    assert not rigged.output.exists()
+
+
+def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
+    """The last one of this module; its guard stops the robot."""
+    with pytest.raises(ToolError, match="nothing came on imu/data_raw and odom"):
+        robot.drive(steady(SLOWLY, 30.0), BOUNDS, show=once(rigged.driver.process.kill))
+    assert rigged.port.wait_for(stands, PATIENCE_S)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--namespace", "no/such name!"], "is no namespace"),
+        (["--ros-args", "--nonsense"], "ROS does not understand its arguments"),
+    ],
+)
+def test_what_ros_cannot_take_is_a_sentence(
+    words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No traceback."""
+    assert main(["imu", "--plot", str(tmp_path), *words]) == 1
+    assert sentence in capsys.readouterr().err
+
+
+def test_no_driver_at_all_says_how_to_start_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a domain where nobody is."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", "101" if os.environ["ROS_DOMAIN_ID"] != "101" else "100")
+    assert main(["imu", "--plot", str(tmp_path)]) == 1
+    assert "nor any other: start it (ros2 run omnibot_driver driver)" in capsys.readouterr().err

@@ -1,0 +1,124 @@
+"""``calibrate scale``: the board's command units are found again."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from calibrate_rig import parameters_of, rig, row
+from driver_process import Driver
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from omnibot_driver.parameters import BY_NAME
+from omnibot_driver.tools.calibrate.log import Log
+from omnibot_driver.tools.calibrate.scale import result
+from omnibot_driver.tools.calibrate.speeds import SETTLE_S, plan, scale, speeds
+from omnibot_driver.tools.needs import ToolError
+
+UP, NO_BIAS = np.array([0.0, 0.0, -1.0]), np.zeros(3)
+NOW = {name: parameter.default for name, parameter in BY_NAME.items()}
+ASSUMED = (70.0, 70.0, 500.0)
+
+
+def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
+    """A robot of these scales that was told the stairs by one with the assumed ones."""
+    random = np.random.default_rng(seed)
+    log, now_s, pose = Log(), 0.0, np.zeros(3)
+    for seconds, command in plan((0.25, 0.25, 0.5), ASSUMED, 2, 1.0 + SETTLE_S):
+        speed = np.array(command) * np.array(ASSUMED) / np.array(true)
+        for tick in range(round(seconds / 0.01)):
+            now_s += 0.01
+            heading = pose[2]
+            pose[:2] += 0.01 * np.array(
+                [
+                    math.cos(heading) * speed[0] - math.sin(heading) * speed[1],
+                    math.sin(heading) * speed[0] + math.cos(heading) * speed[1],
+                ]
+            )
+            pose[2] += 0.01 * speed[2]
+            rate = -gyro * speed[2] + 0.001 * random.standard_normal()
+            log.imu_rows.append((now_s, 0.0, 0.0, -9.8, 0.0, 0.0, rate))
+            if tick % 2 == 0:
+                log.command_rows.append((now_s, *command))
+            if tick % 4 == 0:
+                seen = pose + 5e-5 * random.standard_normal(3)
+                log.odometry_rows.append((now_s, *map(float, seen), *map(float, speed)))
+    return log
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.floats(30, 150), st.floats(200, 1000), st.integers(0, 1000))
+def test_any_scale_is_found_within_what_is_claimed(
+    linear: float, angular: float, seed: int
+) -> None:
+    """From commands in whole counts, by odometry and by gyro, whatever was assumed."""
+    found = speeds(drive((linear, linear, angular), seed), ASSUMED, UP, NO_BIAS)
+    by = scale([one for one in found if one.axis < 2])
+    assert abs(by.value - linear) < max(5 * by.sigma, 1e-4 * linear)
+    assert by.sigma < 0.003 * linear
+    turns = [one for one in found if one.axis == 2]
+    for way in ("odometry", "gyro"):
+        by = scale(turns, by=way)
+        assert abs(by.value - angular) < max(5 * by.sigma, 1e-4 * angular)
+        assert by.sigma < 0.003 * angular
+
+
+@given(st.floats(10, 1000), st.floats(0.05, 0.5), st.integers(1, 5))
+def test_what_is_commanded_is_a_whole_count_of_the_board(
+    units: float, top: float, levels: int
+) -> None:
+    """And, unless one count is already more, no faster than asked for."""
+    for _seconds, command in plan((top, top, top), (units, units, units), levels, 1.0):
+        counts = [value * units for value in command]
+        assert counts == pytest.approx([round(count) for count in counts], abs=1e-9)
+        assert max(map(abs, command)) <= max(top, 1 / units) + 1e-9
+
+
+def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
+    """A computer that hangs for half a second stops the robot; what was driven then is no speed."""
+    log = drive((70.0, 70.0, 500.0))
+    held = len(speeds(log, ASSUMED, UP, NO_BIAS))
+    middle = [number for number, row in enumerate(log.command_rows) if row[1] > 0.2][70]
+    del log.command_rows[middle : middle + 20]
+    assert len(speeds(log, ASSUMED, UP, NO_BIAS)) == held - 1
+
+
+def test_a_gyro_that_contradicts_the_odometry_is_told() -> None:
+    """Beyond its tolerance; then the geometry is wrong."""
+    found = speeds(drive((70.0, 70.0, 500.0), gyro=1.05), ASSUMED, UP, NO_BIAS)
+    assert any("calibrate geometry`, load" in note for note in result(found, NOW).notes)
+    found = speeds(drive((70.0, 70.0, 500.0), gyro=1.02), ASSUMED, UP, NO_BIAS)
+    assert len(result(found, NOW).notes) == 1
+
+
+def test_axes_that_disagree_are_told() -> None:
+    """One scale serves both, so a user should hear that it does not fit."""
+    found = speeds(drive((70.0, 72.0, 500.0)), ASSUMED, UP, NO_BIAS)
+    assert "x and y differ by 2.8%" in result(found, NOW).notes[0]
+
+
+def test_what_cannot_be_measured_is_an_error() -> None:
+    """No steady speed, and a robot that drives the other way."""
+    with pytest.raises(ToolError, match="no steady speed"):
+        speeds(Log(), ASSUMED, UP, NO_BIAS)
+    with pytest.raises(ToolError, match="axis_signs"):
+        scale(speeds(drive((-70.0, -70.0, 500.0)), ASSUMED, UP, NO_BIAS)[:2])
+
+
+def test_planted_scales_are_found_and_the_driver_loads_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Through wire and driver, in half a minute."""
+    with rig(tmp_path, linear_scale=80.0, angular_scale=430.0) as robot:
+        words = ("--levels", "1", "--seconds", "1", "--speed", "0.2", "--turning", "0.4")
+        assert robot.calibrate("scale", *words) == 0
+        written, table = robot.written(), capsys.readouterr().out
+    for name, planted in (("linear_scale", 80.0), ("angular_scale", 430.0)):
+        value, sigma = row(table, name)
+        assert abs(value - planted) < max(4 * sigma, 0.002 * planted)
+        assert sigma < 0.005 * planted
+        assert written[name] == pytest.approx(value, rel=1e-3)
+    with Driver(port="sim://", calibration_file=str(robot.output)) as driver:
+        driver.wait_for_line("state: nominal")
+        assert parameters_of(driver)["linear_scale"] == written["linear_scale"]

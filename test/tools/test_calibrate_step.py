@@ -1,0 +1,77 @@
+"""``calibrate step`` with a real driver: a planted motor, found, told, drawn and written."""
+
+import argparse
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from calibrate_rig import rig, row
+
+from omnibot_driver.parameters import PARAMETERS
+from omnibot_driver.simulator.motors import MotorConstants
+from omnibot_driver.tools.calibrate import step
+from omnibot_driver.tools.calibrate.console import Console
+from omnibot_driver.tools.needs import ToolError
+
+USUAL = MotorConstants()
+SLUGGISH = MotorConstants(pwm_per_count=35.0, time_constant_ticks=10.0, delay_ticks=1)
+
+
+def test_a_planted_motor_is_found(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wheel B has another motor than the others: within 2 %, its delay within 1.5 ms."""
+    monkeypatch.setattr(step, "RUN_UP_S", 1.3)
+    with rig(tmp_path, motors=(USUAL, SLUGGISH, USUAL)) as robot:
+        code = robot.calibrate("step", "--wheels", "B", "--hold", "0.7", "--steps", "4")
+    table = capsys.readouterr().out
+    assert code == 0, table
+    for name, planted, tolerance in (
+        ("B: gain", 1.0, 0.02),
+        ("B: PWM per count", 35.0, 0.7),
+        ("B: motor time constant", 0.1, 0.002),
+        ("B: motor delay", 0.01, 0.0015),
+        ("B: overshoot", 0.25, 0.02),  # as the loop is calculated with these constants
+    ):
+        found, sigma = row(table, name)
+        assert found == pytest.approx(planted, abs=tolerance), name
+        assert 0 < sigma < tolerance
+    assert "wheels off the ground" in robot.questions[0]
+    assert "No message sets them" in table
+    written = robot.written()["step"]
+    assert written["wheels"]["B"]["motor in the manual's loop"]["PWM per count"][0] > 34
+    assert written["better_gains"][1] <= 35.0
+    assert (tmp_path / "calibrate_step.png").stat().st_size > 20_000
+
+
+def still(answer: str, *words: str) -> None:
+    """Run with a robot that can do nothing but say its parameters."""
+    parser = argparse.ArgumentParser()
+    step.add_arguments(parser)
+    parameters = {parameter.name: parameter.default for parameter in PARAMETERS}
+    robot = SimpleNamespace(parameters=parameters)
+    step.run(robot, Console(read=lambda _question: answer), parser.parse_args(words))
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--wheels", "D"], "some of ABC"),
+        (["--speeds", "12", "4"], "the first is slower"),
+        (["--speeds", "4", "40"], "max_wheel_speed of 17"),
+        (["--speeds", "4", "4.1"], "the same on the wire"),
+        (["--hold", "0.1"], "0.5 s at least"),
+    ],
+)
+def test_what_cannot_be_done_is_said_before_anything_moves(
+    words: list[str], complaint: str
+) -> None:
+    """With what would do."""
+    with pytest.raises(ToolError, match=complaint):
+        still("y", *words)
+
+
+def test_no_is_no() -> None:
+    """Nothing moves."""
+    with pytest.raises(ToolError, match="you said no"):
+        still("n")

@@ -1,0 +1,151 @@
+"""What the monitor knows of the robot: rates, latest values, the way it went."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from monitor_view import FINE, view
+
+from omnibot_driver.core.diagnosis import Level
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.tools.monitor.model import LONGEST_PATH, Flow, Model, level
+from omnibot_driver.tools.monitor.rates import HISTORY_S, WINDOW_S, Rate
+
+HALT = BodyTwist(0.0, 0.0, 0.0)
+NOTHING = Flow(0.0, None, ())
+waits_s = st.lists(st.floats(0.0, 3.0), max_size=300)
+
+
+@given(st.floats(0.5, 120.0), st.floats(2.0, 30.0), st.floats(0.0, 1e6))
+def test_a_steady_stream_has_its_own_rate(hz: float, seconds: float, began_s: float) -> None:
+    """To within one arrival in the window, wherever the window lies."""
+    rate = Rate(began_s)
+    for number in range(math.ceil(seconds * hz)):
+        rate.arrived(began_s + number / hz)
+    assert rate.hz(began_s + seconds) == pytest.approx(hz, abs=1.01 / WINDOW_S)
+
+
+@given(waits_s)
+def test_no_arrival_is_lost_or_made_up(waits: list[float]) -> None:
+    """Whole seconds of the history hold every arrival of the last minute, each once."""
+    rate, arrivals, now_s = Rate(0.0), [], 0.0
+    for wait_s in waits:
+        now_s += wait_s
+        rate.arrived(now_s)
+        arrivals.append(now_s)
+    first, end = max(0, int(now_s) - HISTORY_S), int(now_s)
+    expected = [sum(int(at) == second for at in arrivals) for second in range(first, end)]
+    assert list(rate.history(now_s)) == expected
+    assert rate.count == len(arrivals)
+    recent = sum(now_s - at < WINDOW_S for at in arrivals)
+    assert rate.hz(now_s) == (recent / min(WINDOW_S, now_s) if now_s else 0.0)
+
+
+@given(waits_s, st.floats(WINDOW_S + 0.01, 1e4))
+def test_what_has_ceased_has_no_rate(waits: list[float], silence_s: float) -> None:
+    """After a window of silence nothing comes, and the history goes on with zeros."""
+    rate, now_s = Rate(0.0), 0.0
+    for wait_s in waits:
+        now_s += wait_s
+        rate.arrived(now_s)
+    now_s += silence_s
+    assert rate.hz(now_s) == 0.0
+    assert rate.age_s(now_s) is None
+    assert rate.history(now_s)[-1:] in ((), (0,))
+    assert len(rate.history(now_s)) == min(HISTORY_S, int(now_s))
+
+
+def test_the_way_is_kept_in_steps() -> None:
+    """A robot that stands adds nothing; one that drives, a point every other centimetre."""
+    model = Model("/omnibot_driver", 0.0)
+    for tick in range(1000):
+        model.odom(Pose(min(tick, 500) * 0.001, 0.0), HALT, tick * 0.04)
+    path = model.view(40.0).path
+    assert path[0] == (0.0, 0.0)
+    assert len(path) == pytest.approx(26, abs=1)
+
+
+def test_the_way_is_bounded() -> None:
+    """Hours of driving take no more memory than the longest way."""
+    model = Model("/omnibot_driver", 0.0)
+    for tick in range(2 * LONGEST_PATH):
+        model.odom(Pose(0.03 * tick, 0.0), HALT, 0.04 * tick)
+    assert len(model.view(0.0).path) == LONGEST_PATH
+
+
+def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
+    """A leap that no robot can have made is no line across the picture."""
+    model = Model("/omnibot_driver", 0.0)
+    model.odom(Pose(2.0, 0.0), HALT, 1.0)
+    model.odom(Pose(0.0, 0.0), HALT, 1.04)
+    assert model.view(1.1).path == ((0.0, 0.0),)
+
+
+def test_a_pose_that_is_none_is_shown_but_not_followed() -> None:
+    """NaN is kept as it came, and named; the way goes on from the last pose that was one."""
+    model = Model("/omnibot_driver", 0.0)
+    for number, x_m in enumerate((0.0, math.nan, math.inf, 0.1)):
+        model.odom(Pose(x_m, 0.0), BodyTwist(x_m, 0.0, 0.0), 0.1 * number)
+        strange = [] if math.isfinite(x_m) else ["pose x", "measured x"]
+        assert model.view(0.1 * number).not_finite() == strange
+    assert model.view(1.0).path == ((0.0, 0.0), (0.1, 0.0))
+
+
+def test_a_command_that_nobody_repeats_is_none() -> None:
+    """What no longer moves the robot is not shown as commanded."""
+    model = Model("/omnibot_driver", 0.0)
+    model.commanded(BodyTwist(0.1, 0.0, 0.0), 1.0)
+    assert model.view(1.4).commanded == BodyTwist(0.1, 0.0, 0.0)
+    assert model.view(1.6).commanded is None
+
+
+def test_commands_do_not_make_a_silent_driver_look_alive() -> None:
+    """Only what the driver says counts as heard."""
+    model = Model("/omnibot_driver", 0.0)
+    model.state("nominal", 1.0)
+    model.commanded(HALT, 9.0)
+    assert model.view(10.0).silent_s == 9.0
+
+
+def test_what_was_measured_once_is_not_what_is_measured() -> None:
+    """Velocities, IMU and verdicts of a silent driver are gone; its place stays."""
+    model = Model("/omnibot_driver", 0.0)
+    model.odom(Pose(1.0, 0.0), BodyTwist(0.2, 0.0, 0.0), 1.0)
+    model.imu((0.0, 0.0, 9.8), (0.0, 0.0, 0.0), 1.0)
+    model.diagnosed(FINE, 1.0)
+    seen, later = model.view(1.5), model.view(5.0)
+    assert seen.measured
+    assert (seen.force_mps2, seen.statuses) == ((0.0, 0.0, 9.8), FINE)
+    assert (later.measured, later.force_mps2, later.rate_radps) == (None, None, None)
+    assert later.statuses == ()
+    assert later.pose == Pose(1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("state", "missing"),
+    [
+        ("nominal", ["imu/data_raw", "odom"]),
+        ("imu_only", ["imu/data_raw"]),
+        ("paused", []),
+        ("disconnected", []),
+    ],
+)
+def test_a_topic_is_missing_where_the_state_promises_it(state: str, missing: list[str]) -> None:
+    """A paused board sends nothing, so nothing is missing."""
+    assert view(state=state, imu=NOTHING, odom=NOTHING).missing(diagnostics=True) == missing
+
+
+def test_diagnostics_are_missing_where_somebody_publishes_them() -> None:
+    """A driver that replays a recording has none."""
+    assert view(statuses=()).missing(diagnostics=True) == ["/diagnostics"]
+    assert view(statuses=()).missing(diagnostics=False) == []
+
+
+def test_a_level_that_is_none_counts_as_an_error() -> None:
+    """Anybody may publish anything on /diagnostics."""
+    assert [level(byte) for byte in (0, 1, 2, 3, 4, 255)] == [
+        *(Level.OK, Level.WARN, Level.ERROR, Level.STALE),
+        *(Level.ERROR, Level.ERROR),
+    ]

@@ -1,0 +1,107 @@
+"""Steering by keys: who lets go stands still."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.tools.monitor.teleop import (
+    FIRST_S,
+    HALT,
+    MOTIONS,
+    REPEAT_S,
+    ZEROS,
+    DeadMan,
+)
+
+TICK_S = 0.05
+keys = st.sampled_from(sorted(MOTIONS))
+
+
+def commands(dead_man: DeadMan, since_s: float, ticks: int) -> list[BodyTwist | None]:
+    return [dead_man.command(since_s + tick * TICK_S) for tick in range(ticks)]
+
+
+@given(st.lists(st.tuples(keys, st.floats(0.0, 1.0)), min_size=1, max_size=20))
+def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, float]]) -> None:
+    """After FIRST_S at the latest: zeros, as many as promised, and then nothing for ever."""
+    dead_man, now_s = DeadMan(), 0.0
+    for key, wait_s in presses:
+        now_s += wait_s
+        assert dead_man.press(key, now_s)
+        assert dead_man.command(now_s) not in (None, HALT)
+    said = commands(dead_man, now_s + FIRST_S, 100)
+    assert said == [HALT] * ZEROS + [None] * (100 - ZEROS)
+
+
+@given(keys, st.floats(0.02, FIRST_S - 0.01), st.floats(0.02, REPEAT_S - 0.01))
+def test_a_held_key_moves_without_a_break(key: str, delay_s: float, every_s: float) -> None:
+    """Through the delay before a keyboard repeats, and between its repetitions."""
+    dead_man = DeadMan()
+    dead_man.press(key, 0.0)
+    assert dead_man.command(delay_s - 0.001) not in (None, HALT)
+    for number in range(20):
+        now_s = delay_s + number * every_s
+        dead_man.press(key, now_s)
+        assert dead_man.command(now_s + every_s - 0.001) not in (None, HALT)
+
+
+def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
+    """0.3 s after the last repetition, 0.6 s after a single press."""
+    dead_man = DeadMan()
+    dead_man.press("w", 0.0)
+    assert dead_man.command(0.59) != HALT
+    dead_man.press("w", 0.595)
+    assert dead_man.command(0.89) != HALT
+    assert dead_man.command(0.90) == HALT
+
+
+def test_stop_is_at_once() -> None:
+    """The very next command is to stand still."""
+    dead_man = DeadMan()
+    dead_man.press("w", 0.0)
+    assert dead_man.command(0.01) != HALT
+    dead_man.stop()
+    assert dead_man.command(0.02) == HALT
+
+
+def test_who_has_not_steered_commands_nothing() -> None:
+    """Not even to stand still: others may be driving."""
+    dead_man = DeadMan()
+    assert not dead_man.press("x", 0.0)
+    assert commands(dead_man, 0.0, 100) == [None] * 100
+    assert not dead_man.has_driven
+
+
+@pytest.mark.parametrize(
+    ("key", "signs"),
+    [
+        *((key, (1, 0, 0)) for key in ("w", "up")),
+        *((key, (-1, 0, 0)) for key in ("s", "down")),
+        *((key, (0, 1, 0)) for key in ("a", "left")),
+        *((key, (0, -1, 0)) for key in ("d", "right")),
+        ("j", (0, 0, 1)),
+        ("l", (0, 0, -1)),
+    ],
+)
+def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> None:
+    """x forward, y to the left, positive turns to the left (REP-103)."""
+    dead_man = DeadMan()
+    dead_man.press(key, 0.0)
+    command = dead_man.command(0.0)
+    assert command == BodyTwist(*(0.15 * sign for sign in signs))
+
+
+@given(st.lists(st.sampled_from([1, -1]), max_size=50), keys)
+def test_speeds_stay_within_the_drivers_limits(steps: list[int], key: str) -> None:
+    """From a tenth of them to the whole."""
+    dead_man = DeadMan()
+    dead_man.fastest = (0.4, 1.5)
+    for step in steps:
+        dead_man.change_speed(step)
+    assert 0.04 <= dead_man.speeds[0] <= 0.4
+    assert 0.15 <= dead_man.speeds[1] <= 1.5
+    dead_man.press(key, 0.0)
+    command = dead_man.command(0.0)
+    assert command
+    assert not command.faster_than(0.4, 1.5)

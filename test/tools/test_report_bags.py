@@ -1,0 +1,250 @@
+"""Bags of every kind read without ROS, and what is said of those that cannot be."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drives import TYPES, Drive, write
+from rosbags.rosbag2 import CompressionMode, StoragePlugin, Writer
+
+from omnibot_driver.tools.needs import ToolError
+from omnibot_driver.tools.report import page
+from omnibot_driver.tools.report.__main__ import main
+from omnibot_driver.tools.report.bag import read
+from omnibot_driver.tools.report.log import Log
+
+SECONDS = 10.0
+
+
+@pytest.fixture
+def drive() -> Drive:
+    return Drive(SECONDS)
+
+
+@pytest.fixture(autouse=True)
+def _no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They take their time, and have tests of their own."""
+    monkeypatch.setattr(page, "PICTURES", ())
+
+
+def log_of(path: Path, namespace: str | None = None) -> Log:
+    return read(path, namespace, lambda _done, _total: None)
+
+
+def same(ours: Log, theirs: Log) -> None:
+    for name in ("imu", "odom", "joint_states", "cmd_vel"):
+        mine, his = getattr(ours, name), getattr(theirs, name)
+        assert len(mine)
+        np.testing.assert_allclose(mine.values, his.values, atol=1e-12)
+        np.testing.assert_allclose(mine.arrived_s, his.arrived_s, atol=1e-8)
+        if name != "cmd_vel":  # a Twist has no stamp
+            np.testing.assert_allclose(mine.stamp_s, his.stamp_s, atol=1e-8)
+    assert ours.states[0].what == theirs.states[0].what
+    assert len(ours.diagnostics) == len(theirs.diagnostics)
+    assert ours.diagnostics[3].values == theirs.diagnostics[3].values
+
+
+KINDS = [
+    (plugin, mode)
+    for plugin in StoragePlugin
+    for mode in (CompressionMode.NONE, CompressionMode.FILE, CompressionMode.MESSAGE)
+] + [(StoragePlugin.MCAP, CompressionMode.STORAGE)]
+
+
+@pytest.mark.parametrize(("plugin", "mode"), KINDS, ids=lambda item: item.name)
+def test_a_bag_of_any_kind_tells_the_same(
+    drive: Drive, tmp_path: Path, plugin: StoragePlugin, mode: CompressionMode
+) -> None:
+    """Storage and compression make no difference."""
+    bag = write(tmp_path / "bag", [drive], plugin, mode)
+    same(log_of(bag), drive.log())
+
+
+@pytest.mark.parametrize("plugin", StoragePlugin)
+def test_a_single_file_of_a_bag_is_enough(
+    drive: Drive, tmp_path: Path, plugin: StoragePlugin
+) -> None:
+    """What a recorder that was killed leaves."""
+    (file,) = (
+        file
+        for file in write(tmp_path / "bag", [drive], plugin).iterdir()
+        if file.suffix != ".yaml"
+    )
+    same(log_of(file), drive.log())
+
+
+def test_stamped_commands_are_commands(drive: Drive, tmp_path: Path) -> None:
+    """TwistStamped instead of Twist."""
+    drive.stamped_commands = True
+    log = log_of(write(tmp_path / "bag", [drive]))
+    np.testing.assert_array_equal(log.cmd_vel.values, drive.cmd_vel.values)
+    assert np.isfinite(log.cmd_vel.stamp_s).all()
+
+
+def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) -> None:
+    """Then only its topics are read."""
+    one, other = Drive(SECONDS, "/robot1"), Drive(SECONDS, "/fleet/robot2", seed=2)
+    bag = write(tmp_path / "bag", [one, other])
+    with pytest.raises(ToolError, match=r"--namespace, of /fleet/robot2, /robot1"):
+        log_of(bag)
+    with pytest.raises(ToolError, match="no robot in the namespace /robot3, but in: /fleet"):
+        log_of(bag, "robot3")
+    for drive in (one, other):
+        log = log_of(bag, drive.namespace[1:])
+        np.testing.assert_array_equal(log.imu.values, drive.imu.values)
+        assert not log.alone
+
+
+def test_the_only_robot_needs_no_name(tmp_path: Path) -> None:
+    """Whatever its namespace is."""
+    log = log_of(write(tmp_path / "bag", [Drive(SECONDS, "/robot1")]))
+    assert log.robot == "/robot1"
+
+
+def refused(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """The one sentence on stderr of a call that ends with 1."""
+    assert main([str(path), "--output", str(path.parent / "out")]) == 1
+    printed = capsys.readouterr()
+    assert not printed.out
+    assert printed.err.startswith("report: ")
+    assert printed.err.count("\n") == 1
+    return printed.err
+
+
+def test_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With what to give."""
+    assert "give the folder of a bag" in refused(tmp_path / "nothing", capsys)
+
+
+def test_what_is_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A folder without one, a text, files that are broken."""
+    (tmp_path / "folder").mkdir()
+    assert "neither metadata.yaml nor" in refused(tmp_path / "folder", capsys)
+    for name, says in (("a.txt", "is no bag"), ("a.mcap", "reindex"), ("a.db3", "reindex")):
+        (tmp_path / name).write_text("nothing of the kind")
+        assert says in refused(tmp_path / name, capsys)
+
+
+@pytest.mark.parametrize("text", ["", "a: [", "rosbag2_bagfile_information: 7", "\x00"])
+def test_metadata_that_make_no_sense_are_told(
+    drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str
+) -> None:
+    """With the repair."""
+    bag = write(tmp_path / "bag", [drive])
+    (bag / "metadata.yaml").write_text(text)
+    assert "ros2 bag reindex" in refused(bag, capsys)
+
+
+def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Topics, but no message."""
+    with Writer(tmp_path / "bag", version=9) as writer:
+        writer.add_connection("/imu/data_raw", "sensor_msgs/msg/Imu", typestore=TYPES)
+    assert "is empty" in refused(tmp_path / "bag", capsys)
+
+
+def test_a_bag_of_something_else_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A topic called odom that is none included."""
+    with Writer(tmp_path / "bag", version=9) as writer:
+        kind = "std_msgs/msg/String"
+        data = TYPES.serialize_cdr(TYPES.types[kind]("hello"), kind)
+        for topic in ("/chatter", "/odom"):
+            writer.write(writer.add_connection(topic, kind, typestore=TYPES), 10**18, data)
+    assert "no topic of a driver" in refused(tmp_path / "bag", capsys)
+
+
+@pytest.mark.parametrize("plugin", StoragePlugin)
+def test_an_unfinished_bag_is_read_and_called_so(
+    drive: Drive, tmp_path: Path, plugin: StoragePlugin, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The report is written, the end is not 0, and the repair is named."""
+    bag = write(tmp_path / "bag", [drive], plugin)
+    (bag / "metadata.yaml").unlink()
+    assert main([str(bag), "--output", str(tmp_path / "out")]) == 3
+    assert "never finished" in (text := capsys.readouterr().out)
+    assert f"ros2 bag reindex {bag}" in text
+    same(log_of(bag), drive.log())
+
+
+def test_a_file_that_breaks_off_is_told(
+    drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An mcap without its end, as a power failure leaves it."""
+    bag = write(tmp_path / "bag", [drive])
+    (bag / "metadata.yaml").unlink()
+    data = (bag / "bag.mcap").read_bytes()
+    (bag / "bag.mcap").write_bytes(data[: len(data) // 2])
+    assert f"ros2 bag reindex {bag}" in refused(bag, capsys)
+
+
+def test_damaged_messages_are_counted_and_passed_over(drive: Drive, tmp_path: Path) -> None:
+    """One that is too short, in the middle."""
+    with Writer(tmp_path / "bag", version=9) as writer:
+        connections = {}
+        for number, (topic, kind, at_ns, told) in enumerate(drive.messages()):
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=TYPES)
+            data = bytes(TYPES.serialize_cdr(told, kind))
+            writer.write(connections[topic], at_ns, data[:20] if number == 500 else data)
+    assert log_of(tmp_path / "bag").troubles == ("1 message damaged, and passed over",)
+
+
+def test_a_robot_without_odometry_is_reported_on_and_is_not_healthy(
+    drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With what cannot be said of it."""
+    drive.odom.drop(0.0, SECONDS)
+    assert main([str(write(tmp_path / "bag", [drive])), "--output", str(tmp_path / "out")]) == 3
+    assert "No message of odom" in capsys.readouterr().out
+
+
+def test_nothing_but_nan_is_reported_on(
+    drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In every number there is."""
+    for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
+        topic.values[:] = np.nan
+    assert main([str(write(tmp_path / "bag", [drive])), "--output", str(tmp_path / "out")]) == 3
+    assert f"{len(drive.imu.stamp_s)} messages of imu/data_raw with NaN" in capsys.readouterr().out
+
+
+def test_a_place_that_cannot_be_written_is_told(
+    drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A file where the folder should be."""
+    (tmp_path / "out").write_text("taken")
+    assert "cannot be written" in refused(write(tmp_path / "bag", [drive]), capsys)
+
+
+@pytest.mark.parametrize("wrong", [[], ["bag", "--live", "5"], ["--live", "0"], ["--live", "nan"]])
+def test_wrong_usage_is_told(wrong: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    """A bag or a time, not both and not neither."""
+    with pytest.raises(SystemExit) as ended:
+        main(wrong)
+    assert ended.value.code == 2
+    assert "--live" in capsys.readouterr().err
+
+
+def test_a_bag_is_reported_on_where_there_is_no_ros(drive: Drive, tmp_path: Path) -> None:
+    """In a process that cannot import rclpy nor any message."""
+    bag = write(tmp_path / "bag", [drive])
+    program = (
+        "import sys\n"
+        "for name in ('rclpy', 'std_msgs', 'sensor_msgs', 'nav_msgs', 'builtin_interfaces'):\n"
+        "    sys.modules[name] = None\n"
+        "from omnibot_driver.tools.report.__main__ import main\n"
+        "sys.exit(main(sys.argv[1:]))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(bag)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("Healthy.")
+    assert (tmp_path / "bag_report/report.html").is_file()

@@ -1,0 +1,186 @@
+"""What a report says of the streams of a drive in which a trouble was planted, or none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drives import Drive
+from verdicts import said, troubles
+
+from omnibot_driver.tools.report.findings import Level, headline
+from omnibot_driver.tools.report.judge import judge
+
+
+@pytest.fixture
+def drive() -> Drive:
+    return Drive()
+
+
+def test_a_healthy_drive_is_called_healthy(drive: Drive) -> None:
+    """With figures, and nothing to do."""
+    findings = judge(drive.log())
+    assert not troubles(drive)
+    assert headline(findings) == "Healthy."
+    assert not any(finding.advice for finding in findings)
+    assert "100.00 Hz" in said(drive, "Timing", "imu/data_raw comes").text
+    assert "9.80" in said(drive, "IMU", "Gravity").text
+    assert "vx 1.0" in said(drive, "Commands", "followed").text
+
+
+def test_a_gap_is_told_with_its_place_and_what_is_missing(drive: Drive) -> None:
+    """15 readings from 6 s on."""
+    drive.imu.drop(6.0, 6.15)
+    (gap,) = troubles(drive)
+    assert gap.level is Level.WARN
+    assert "1 gap, 15 messages" in gap.text
+    assert "at 6.0 s" in gap.text
+    assert "driver counts no loss" in gap.advice
+
+
+def test_a_loss_that_the_driver_counts_is_laid_to_the_line(drive: Drive) -> None:
+    """The counts in /diagnostics grow."""
+    drive.imu.drop(6.0, 6.1)
+    for at_s, *_, values in drive.statuses:
+        values["IMU frames lost"] = "7" if at_s < 7.0 else "17"
+    assert "counts 10 lost on the line" in said(drive, "Gaps", "imu/data_raw").advice
+
+
+def test_a_long_gap_is_worse(drive: Drive) -> None:
+    """More than half a second without odometry."""
+    drive.odom.drop(8.0, 9.0)
+    assert said(drive, "Gaps", "odom", "1 gap").level is Level.BAD
+
+
+def test_a_pause_is_no_gap(drive: Drive) -> None:
+    """The state accounts for it."""
+    drive.states += [(16.9, "paused"), (18.0, "nominal")]
+    drive.imu.drop(17.0, 18.0)
+    drive.odom.drop(17.0, 18.0)
+    assert not troubles(drive)
+    assert "paused for 1.1 s" in said(drive, "State", "ominal").text
+
+
+def test_a_lost_board_is_told_and_is_no_gap_besides(drive: Drive) -> None:
+    """State and stream are two words for the same."""
+    drive.states += [(17.0, "connecting"), (18.0, "nominal")]
+    drive.imu.drop(16.9, 18.0)
+    drive.odom.drop(16.9, 18.0)
+    assert [finding.subject for finding in troubles(drive)] == ["State"]
+
+
+def test_the_end_of_the_driver_is_no_lost_board(drive: Drive) -> None:
+    """It says disconnected last, and then nothing any more."""
+    drive.states.append((19.5, "disconnected"))
+    assert not troubles(drive)
+    assert "ended at 19.5 s" in said(drive, "State", "driver").text
+
+
+def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
+    """20 ms ahead, and slowly back, as of a driver that was kept from reading."""
+    drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
+    drive.imu.late_s = drive.imu.late_s + 0.05
+    (leap,) = troubles(drive)
+    assert "leapt 1 time, by up to 20 ms, first at 8.0 s" in leap.text
+    assert "no gap" in said(drive, "Gaps", "imu/data_raw").text
+
+
+def test_uneven_stamps_are_noticed(drive: Drive) -> None:
+    """Stamps that are arrival times, say."""
+    drive.imu.stamp_s = drive.imu.stamp_s + np.random.default_rng(2).uniform(0, 4e-3, 2000)
+    (jitter,) = troubles(drive)
+    assert jitter.subject == "Timing"
+    assert "steps between stamps of imu/data_raw vary" in jitter.text
+
+
+def test_a_wrong_rate_is_no_gap_but_a_wrong_rate(drive: Drive) -> None:
+    """Every other reading."""
+    for name in ("stamp_s", "values", "late_s"):
+        setattr(drive.imu, name, getattr(drive.imu, name)[::2])
+    found = [finding.text for finding in troubles(drive) if finding.subject in ("Timing", "Gaps")]
+    assert found == ["imu/data_raw comes at 50.00 Hz; it should be 100."]
+
+
+def test_stamps_that_go_back_are_wrong(drive: Drive) -> None:
+    """Time does not."""
+    drive.odom.stamp_s[100:] -= 0.2
+    drive.odom.late_s[100:] += 0.2
+    assert said(drive, "Timing", "1 stamp of odom").level is Level.BAD
+
+
+def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
+    """A timer of 16 ms in the adapter."""
+    drive.imu.late_s = drive.imu.late_s + np.remainder(-drive.imu.stamp_s, 0.016)
+    late = said(drive, "Timing", "imu/data_raw arrives")
+    assert late.level is Level.WARN
+    assert "latency_timer" in late.advice
+
+
+def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
+    """Half a minute, for every topic."""
+    drive.imu.late_s = drive.imu.late_s + 30.0
+    (clock,) = troubles(drive)
+    assert "30 s after its stamp" in clock.text
+
+
+def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
+    """What is left is judged as ever."""
+    drive.imu.values[100:103, 4] = np.nan
+    drive.odom.values[50, 0] = np.inf
+    found = troubles(drive)
+    assert [finding.level for finding in found] == [Level.BAD, Level.BAD]
+    assert any("3 messages of imu/data_raw with NaN" in finding.text for finding in found)
+    assert any("1 message of odom with NaN" in finding.text for finding in found)
+
+
+def test_nothing_but_nan_is_told(drive: Drive) -> None:
+    """Of every topic."""
+    for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
+        topic.values[:] = np.nan
+    assert {finding.subject for finding in troubles(drive)} == {"IMU", "Odometry", "Commands"}
+
+
+def test_what_an_estop_refuses_is_no_trouble(drive: Drive) -> None:
+    """The driver warns of each; other refusals are told."""
+    why = "motion command refused: the e-stop is latched; release it with the service ~/estop"
+    drive.statuses.append((9.5, "omnibot_driver: Commands", 1, why, {}))
+    assert not troubles(drive)
+    drive.statuses.append((9.5, "omnibot_driver: Commands", 1, "cmd_vel refused: nan", {}))
+    assert "cmd_vel refused: nan" in said(drive, "Diagnostics", "Commands").text
+
+
+def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
+    """The worst word of each status."""
+    drive.statuses.append((9.5, "omnibot_driver: Time", 1, "measurements wait", {}))
+    drive.statuses.append((10.5, "omnibot_driver: Time", 1, "measurements wait", {}))
+    drive.statuses.append((10.6, "omnibot_driver: IMU", 2, "the gyro is stuck", {}))
+    first, second = troubles(drive)
+    assert first.level is Level.BAD
+    assert "the gyro is stuck" in first.text
+    assert (
+        "Time (/dev/ttyUSB0) said WARN 2 times, from 10 s on: “measurements wait” (2×)"
+        in second.text
+    )
+
+
+def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
+    """They share /diagnostics, which does not say whose is whose."""
+    drive.imu.drop(6.0, 6.1)
+    findings = judge(replace(drive.log(), alone=False))
+    (gap,) = [finding for finding in findings if finding.text.startswith("imu/data_raw has")]
+    assert "only /diagnostics of it alone tells" in gap.advice
+    assert any("of several robots, on /dev/ttyUSB0" in finding.text for finding in findings)
+
+
+def test_topics_that_are_missing_are_named(drive: Drive) -> None:
+    """With what cannot be said for want of them."""
+    drive.odom.drop(0.0, 99.0)
+    drive.cmd_vel.drop(0.0, 99.0)
+    assert said(drive, "Recording", "No message of odom").level is Level.BAD
+    assert said(drive, "Commands", "No cmd_vel").level is Level.NOTE
+
+
+def test_stamps_of_zero_are_told(drive: Drive) -> None:
+    """Somebody else publishes."""
+    log = drive.log()
+    log.imu.stamp_s[:3] = np.nan
+    assert any("3 messages of imu/data_raw without a stamp" in item.text for item in judge(log))
