@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.omnibot import evidence
-from omnibot_driver.core.omnibot.calm import LENT, Step, take_calm
+from omnibot_driver.core.omnibot.calm import LENT, Walk, take_calm
 from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Context, Expectation
 from omnibot_driver.core.omnibot.frames import (
     INCOMPLETE,
@@ -42,8 +42,6 @@ DOUBT_BYTES: Final = 170
 """100 ms of the nominal stream."""
 FRAMES_TO_SETTLE: Final = 3
 """So many sure frames behind a doubtful one, and nothing more will be learnt about it."""
-FRAMES_TO_RECONSIDER: Final = 2
-"""Where a chain of frames breaks, its last ones are in doubt."""
 
 IDLE_S: Final = 0.1
 """Longer than any adapter keeps a byte back (16 ms), and ten times the board's 10 ms tick."""
@@ -174,11 +172,11 @@ class FrameDecoder:
         held, weigh, order = self._held, self._expectation.weigh, self._pose_byte_order
         context = self._context
         at, size = 0, len(held)
-        steps: list[Step] = []
+        walk = Walk()
         idle = self._gaps[0][0] if self._gaps else size + 1
         while at < size:
             if not self._gaps or self._gaps[-1][0] <= at:  # no pause within what follows
-                at, context = take_calm(held, at, context, self._expectation, steps)
+                at, context = take_calm(held, at, context, self._expectation, walk)
                 if at == size:
                     continue
             length = measure(held, at)
@@ -187,7 +185,7 @@ class FrameDecoder:
                 break
             if length <= 0:
                 if length == INCOMPLETE and not closed:
-                    self._take(steps, context, found)
+                    self._take(walk, len(walk.frames), context, found)
                     return True
                 break
             frame = decode_measured(held[at:end], order)
@@ -200,17 +198,19 @@ class FrameDecoder:
             last = sharp and (self._arrived >= length or not _more_is_due(frame, context))
             lent = end == size and not last and _may_end_in_a_header(frame, context)
             if lent and not closed:
-                self._take(steps, context, found)
+                self._take(walk, len(walk.frames), context, found)
                 return True
-            steps.append((end, frame, context))
+            walk.add(end, frame, context)
             context = after
             at = end
         else:
-            self._take(steps, context, found)
+            self._take(walk, len(walk.frames), context, found)
             return True
-        if len(steps) > FRAMES_TO_RECONSIDER:
-            context = steps[-FRAMES_TO_RECONSIDER][2]
-            self._take(steps[:-FRAMES_TO_RECONSIDER], context, found)
+        believed = len(walk.frames) - len(
+            walk.before_last
+        )  # where it breaks, the last are in doubt
+        if believed > 0:
+            self._take(walk, believed, Context._make(walk.before_last[0]), found)
         return False
 
     def _goes_on(self, at: int, closed: bool) -> bool:
@@ -224,25 +224,24 @@ class FrameDecoder:
         at += length
         return at == len(held) or measure(held, at) != NO_FRAME
 
-    def _take(self, steps: list[Step], after: Context, found: list[Frame]) -> None:
-        """Believe these frames, which stand in a row from the first byte held."""
-        if not steps:
+    def _take(self, walk: Walk, count: int, after: Context, found: list[Frame]) -> None:
+        """Believe the first so many of these frames."""
+        if not count:
             return
-        self.statistics.frames += len(steps)
-        for _, frame, before in steps[::8]:
-            if type(frame) is ImuFrame and before.imu is not None and not before.imus & 3:
-                self._expectation.learn(frame, before.imu)
-        for _, frame, _ in steps:
-            found.append(frame)
-        self.skipped += [self._dropped] + [0] * (len(steps) - 1)
+        self.statistics.frames += count
+        for number, frame, before in walk.lessons:
+            if number < count:
+                self._expectation.learn(frame, before)
+        found += walk.frames[:count]
+        self.skipped += [self._dropped] + [0] * (count - 1)
         self._dropped = 0
         self._context = after
         if self._gaps:
             start = 0
-            for end, _, _ in steps:
+            for end in walk.ends[:count]:
                 self._compare_pauses(start, end)
                 start = end
-        self._forget(steps[-1][0])
+        self._forget(walk.ends[count - 1])
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
         """In doubt: take what is sure, drop what stays doubtful. Whether anything was settled."""
@@ -253,8 +252,9 @@ class FrameDecoder:
         for piece, sure in self._settled(pieces, len(stretch), half, closed):
             if sure:
                 self._drop(piece.start - at)
-                step = piece.end - piece.start, piece.frame, piece.before
-                self._take([step], piece.after, found)
+                walk = Walk()
+                walk.add(piece.end - piece.start, piece.frame, piece.before)
+                self._take(walk, 1, piece.after, found)
                 self._in_step = True
             else:
                 self._drop(piece.end - at)
