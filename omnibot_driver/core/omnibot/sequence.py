@@ -5,8 +5,9 @@ delta and has a counter of its own, so it can tell of losses before the next del
 knows nothing of what is in a frame.
 """
 
-from dataclasses import dataclass
 from typing import Final
+
+from omnibot_driver.core.values import value
 
 DELTA_PERIOD_S: Final = 0.04
 DELTAS_PER_POSE: Final = 5
@@ -22,7 +23,7 @@ EARLY_S: Final = 0.2
 late. To restart takes longer."""
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Step:
     """From one delta to the next: ``lost`` between them that no pose has told of.
 
