@@ -81,7 +81,8 @@ class TickLine:
             ends = sorted(self._not_before, key=self._height)
             tick, time = ends[-1 - int(LATE_PART * len(ends))]
             earliest = tick, time - LATE_S
-            if 0.0 < self._height(best) - self._height(earliest) < WIDEST * self._period_s:
+            is_near = 0.0 < self._height(best) - self._height(earliest) < WIDEST * self._period_s
+            if is_near and (not self._earliest or self._earliest[-1][0] < tick):
                 self._earliest.append(earliest)
         if not (self._earliest and self._lay_between()):
             self._lay_under()
@@ -97,16 +98,17 @@ class TickLine:
     def _lay_between(self) -> bool:
         """In the middle of all bounds, unless they contradict: then the earliest are forgotten."""
         flattest, steepest = -math.inf, math.inf
-        for latest, _ in self._latest:
-            for earliest in self._earliest:
+        above = _hull([at for at, _ in self._latest])
+        below = [(tick, -time) for tick, time in _hull([(t, -s) for t, s in self._earliest])]
+        for latest in above:
+            for earliest in below:
                 if earliest[0] < latest[0]:
                     steepest = min(steepest, _slope(earliest, latest))
                 elif earliest[0] > latest[0]:
                     flattest = max(flattest, _slope(latest, earliest))
         flattest, steepest = self._within_skew(flattest), self._within_skew(steepest)
         self.slope_s = (flattest + steepest) / 2
-        low = max(map(self._height, self._earliest))
-        high = min(self._height(latest) for latest, _ in self._latest)
+        low, high = max(map(self._height, below)), min(map(self._height, above))
         if flattest > steepest or low > high:
             self._earliest.clear()
             return False
@@ -116,17 +118,24 @@ class TickLine:
 
     def _lay_under(self) -> None:
         """Under the latest points, as high as it goes over their middle."""
-        hull: list[Point] = []
-        for point in [at for at, cut in self._latest if cut] or [at for at, _ in self._latest]:
-            while len(hull) > 1 and _slope(hull[-2], point) <= _slope(hull[-2], hull[-1]):
-                hull.pop()
-            hull.append(point)
+        cut = [at for at, was_cut in self._latest if was_cut]
+        hull = _hull(cut or [at for at, _ in self._latest])
         middle = hull[0][0] + SUPPORT * (hull[-1][0] - hull[0][0])
         for before, after in pairwise(hull):
             if after[0] >= middle:
                 self.slope_s = self._within_skew(_slope(before, after))
                 break
         self._anchor = min(hull, key=self._height)
+
+
+def _hull(points: list[Point]) -> list[Point]:
+    """The lower convex hull of points in the order of their ticks."""
+    hull: list[Point] = []
+    for point in points:
+        while len(hull) > 1 and _slope(hull[-2], point) <= _slope(hull[-2], hull[-1]):
+            hull.pop()
+        hull.append(point)
+    return hull
 
 
 def _slope(before: Point, after: Point) -> float:
