@@ -49,7 +49,7 @@ pictures: $(VENV)/.test  ## make the pictures of README and documents anew (5 mi
 integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), into docs/integrity.md
 	$(PY) test/integrity/report.py
 
-faults: $(VENV)/.test  ## break everything, with the real node (15 minutes), into docs/safety.md
+faults: $(VENV)/.test  ## break everything, with the real node (16 minutes), into docs/safety.md
 	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py
 
 soak: $(VENV)/.test  ## random faults for MINUTES (10)
