@@ -24,6 +24,8 @@ Case = Callable[[R], object]
 NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
 HANGS_S: Final = 1.0
 """So long the guard waits for a sign of life."""
+NEXT_ATTEMPT_S: Final = 2.0
+"""At the latest after so long a lost port is opened again."""
 SILENCE_S: Final = 1.5
 """So long a board may say nothing before the driver holds it for lost."""
 
@@ -60,7 +62,7 @@ def wheel_commands_of_the_wrong_size(rig: Rig) -> None:
         publisher.publish(Float32MultiArray(data=data))
         rig.wait_ticks(10)
     rig.expect_still(since, "wheel commands of the wrong size")
-    rig.probe.node.destroy_publisher(publisher)
+    rig.probe.remove(publisher)
 
 
 def flood_of_commands(rig: Rig) -> None:
@@ -77,7 +79,7 @@ def flood_of_commands(rig: Rig) -> None:
     rig.expect_still(rig.line.tick, "1,000 commands a second, then none")
     imus = sum(frame[:2] == b"\xff\xfa" for frame in rig.line.sent[sent:])
     rig.probe.wait_for(lambda: len(rig.imu) - heard >= imus)
-    rig.probe.node.destroy_publisher(publisher)
+    rig.probe.remove(publisher)
 
 
 # The line and the board
@@ -148,7 +150,7 @@ def unplugged(rig: Rig) -> None:
     rig.plug()
     mark = len(rig.line.board.received)
     since = rig.line.tick
-    rig.expect_still(since, "unplugged while driving, plugged in again", 1.0)
+    rig.expect_still(since, "unplugged while driving, plugged in again", NEXT_ATTEMPT_S)
     opening = bytes(rig.line.board.received[mark : mark + 17])
     stop = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
     rig.findings.expect(opening == bytes(8) + stop, f"the first bytes were {opening.hex(' ')}")
@@ -198,7 +200,7 @@ def estop_by_topic(rig: Rig) -> None:
     rig.expect_still(since, "e-stop by topic, with somebody driving on", 0.0)
     rig.hand.leave()
     rig.probe.call(SetBool, "estop", data=False)
-    rig.probe.node.destroy_publisher(publisher)
+    rig.probe.remove(publisher)
 
 
 def service_discards_the_command(service: str, rig: Rig) -> None:

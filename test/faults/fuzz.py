@@ -113,9 +113,9 @@ def fuzz(rig: Rig, count: int, random: Random) -> None:
     probe.call(SetBool, "estop", data=False)
     probe.call(Trigger, "start")
     for publisher, _ in publishers:
-        probe.node.destroy_publisher(publisher)
+        probe.remove(publisher)
     for client, _ in calls:
-        probe.node.destroy_client(client)
+        probe.remove(client)
     rig.findings.expect(rig.driver.process.poll() is None, "the node has died")
     heard, sent = len(rig.imu), len(rig.line.sent)
     rig.wait_ticks(200)

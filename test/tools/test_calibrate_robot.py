@@ -93,6 +93,7 @@ def test_what_happens_on_the_way_ends_it_at_rest(
     with pytest.raises(ToolError, match=sentence) as caught:
         robot.drive(steady(SLOWLY, 10.0), BOUNDS, show=once(actions[what]))
     assert rigged.port.wait_for(stands, PATIENCE_S)
+    assert not robot.log.commands.values[-1].any()
     assert isinstance(caught.value, Interrupted) is (what == "signal")
     if what == "estop":
         with pytest.raises(ToolError, match=sentence):

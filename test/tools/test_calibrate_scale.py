@@ -75,6 +75,15 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
         assert max(map(abs, command)) <= max(top, 1 / units) + 1e-9
 
 
+def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
+    """A computer that hangs for half a second stops the robot; what was driven then is no speed."""
+    log = drive((70.0, 70.0, 500.0))
+    held = len(speeds(log, ASSUMED, UP, NO_BIAS))
+    middle = [number for number, row in enumerate(log.command_rows) if row[1] > 0.2][70]
+    del log.command_rows[middle : middle + 20]
+    assert len(speeds(log, ASSUMED, UP, NO_BIAS)) == held - 1
+
+
 def test_a_gyro_that_contradicts_the_odometry_is_told() -> None:
     """Beyond its tolerance; then the geometry is wrong."""
     found = speeds(drive((70.0, 70.0, 500.0), gyro=1.05), ASSUMED, UP, NO_BIAS)

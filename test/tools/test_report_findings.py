@@ -1,25 +1,14 @@
-"""What a report says of drives in which a trouble was planted, and of one without."""
+"""What a report says of the streams of a drive in which a trouble was planted, or none."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from drives import DELAY_S, Drive
+from drives import Drive
+from verdicts import said, troubles
 
-from omnibot_driver.tools.report.findings import Finding, Level, headline
+from omnibot_driver.tools.report.findings import Level, headline
 from omnibot_driver.tools.report.judge import judge
-
-
-def said(drive: Drive, subject: str, *words: str) -> Finding:
-    """The one finding of this subject that has these words."""
-    (found,) = [
-        finding
-        for finding in judge(drive.log())
-        if finding.subject == subject and all(word in finding.text for word in words)
-    ]
-    return found
-
-
-def troubles(drive: Drive) -> list[Finding]:
-    return [finding for finding in judge(drive.log()) if finding.level > Level.NOTE]
 
 
 @pytest.fixture
@@ -133,68 +122,6 @@ def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
     assert "30 s after its stamp" in clock.text
 
 
-@pytest.mark.parametrize(
-    ("factor", "advice"), [(0.5, "2 times"), (0.25, "4 times"), (0.8, "Check")]
-)
-def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
-    drive: Drive, factor: float, advice: str
-) -> None:
-    """An accelerometer set to another range reads a half or a quarter."""
-    drive.imu.values[:, 3:] *= factor
-    gravity = said(drive, "IMU", "Gravity")
-    assert gravity.level is Level.BAD
-    assert advice in gravity.advice
-
-
-def test_a_tilt_at_rest_is_told(drive: Drive) -> None:
-    """Ten degrees."""
-    tilt = np.radians(10.0)
-    force = drive.imu.values[:, 3:].copy()
-    drive.imu.values[:, 3] = force[:, 0] * np.cos(tilt) + force[:, 2] * np.sin(tilt)
-    drive.imu.values[:, 5] = force[:, 2] * np.cos(tilt) - force[:, 0] * np.sin(tilt)
-    assert "10.0°" in troubles(drive)[0].text
-
-
-def test_a_biased_gyro_is_told_with_the_service_that_mends_it(drive: Drive) -> None:
-    """0.05 rad/s about y."""
-    drive.imu.values[:, 1] += 0.05
-    (bias,) = troubles(drive)
-    assert "+0.05" in bias.text
-    assert "about y" in bias.text
-    assert "~/calibrate_gyro" in bias.advice
-
-
-def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
-    """While the accelerometer is alive."""
-    drive.imu.values[500:700, :3] = drive.imu.values[500, :3]
-    stuck = said(drive, "IMU", "exactly the same")
-    assert stuck.level is Level.BAD
-    assert "gyro" in stuck.text
-    assert "accelerometer" not in stuck.text
-
-
-def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
-    """A wrong radius, or slip."""
-    drive.imu.values[:, 2] *= 1.2
-    assert "base_radius" in said(drive, "IMU", "gyro turned 1.2").advice
-
-
-def test_a_sensor_that_stands_upright_is_noted(drive: Drive) -> None:
-    """It turns as the wheels do."""
-    drive.imu.values[:, 2] *= -1.0
-    assert "imu_rpy" in said(drive, "IMU", "upright").advice
-
-
-def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
-    """20 Hz while driving."""
-    times_s = drive.imu.stamp_s
-    on = (times_s > 5.0) & (times_s < 15.0)
-    drive.imu.values[:, 3] += 6.0 * np.sin(2 * np.pi * 20.0 * times_s) * on
-    (shakes,) = troubles(drive)
-    frequency_hz = float(shakes.text.split("most at ")[1].split(" Hz")[0])
-    assert frequency_hz == pytest.approx(20.0, abs=0.4)
-
-
 def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
     """What is left is judged as ever."""
     drive.imu.values[100:103, 4] = np.nan
@@ -212,86 +139,13 @@ def test_nothing_but_nan_is_told(drive: Drive) -> None:
     assert {finding.subject for finding in troubles(drive)} == {"IMU", "Odometry", "Commands"}
 
 
-def test_the_lag_of_the_robot_is_found(drive: Drive) -> None:
-    """Within a step of the search, and half a step of the odometry."""
-    text = said(drive, "Commands", "followed").text
-    lag_s = float(text.split("followed ")[1].split(" ms")[0]) / 1e3
-    assert lag_s == pytest.approx(DELAY_S, abs=0.041)
-
-
-def test_a_robot_that_is_too_slow_is_told_with_the_scale_to_set(drive: Drive) -> None:
-    """70 % in x and y, all of the yaw rate."""
-    drive.odom.values[:, :2] *= 0.7
-    drive.odom.values[:, 3:5] *= 0.7
-    (slow,) = troubles(drive)
-    assert "vx 0.70" in slow.text
-    assert "divide linear_scale by" in slow.advice
-
-
-def test_a_robot_that_goes_the_wrong_way_is_told_with_the_signs(drive: Drive) -> None:
-    """Yaw alone."""
-    drive.odom.values[:, 2] *= -1.0
-    drive.odom.values[:, 5] *= -1.0
-    assert "axis_signs" in said(drive, "Commands", "followed").advice
-
-
-def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
-    """For the last four seconds of the drive."""
-    rows = drive.odom.stamp_s > 12.0
-    drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]
-    drive.odom.values[rows, 3:] = 0.0
-    stands = said(drive, "Commands", "stood 1 time")
-    assert stands.level is Level.BAD
-    assert "first at 12.0 s" in stands.text
-
-
-def test_commands_that_ceased_are_noted(drive: Drive) -> None:
-    """The driver stops the robot, so this says why it stood."""
-    drive.cmd_vel.drop(10.0, 10.8)
-    assert "1 time in motion" in said(drive, "Commands", "ceased").text
-
-
-def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:
-    """No command for two seconds, and no rest."""
-    drive.cmd_vel.drop(10.0, 14.0)
-    assert said(drive, "Commands", "without a command").level is Level.WARN
-
-
-def test_an_estop_is_noted_and_what_it_stops_is_no_trouble(drive: Drive) -> None:
-    """Commands go on; the robot stands."""
-    drive.estops += [(10.0, True), (19.0, False)]
-    rows = drive.odom.stamp_s > 10.1
-    drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]
-    drive.odom.values[rows, 3:] = 0.0
-    drive.imu.values[drive.imu.stamp_s > 10.1, 2] = 0.001
-    assert "1 time, 9 s in all, first at 10.0 s" in said(drive, "E-stop", "Latched").text
+def test_what_an_estop_refuses_is_no_trouble(drive: Drive) -> None:
+    """The driver warns of each; other refusals are told."""
+    why = "motion command refused: the e-stop is latched; release it with the service ~/estop"
+    drive.statuses.append((9.5, "omnibot_driver: Commands", 1, why, {}))
     assert not troubles(drive)
-
-
-def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
-    """Nothing is worse."""
-    drive.estops += [(10.0, True)]
-    moved = said(drive, "E-stop", "moved while")
-    assert moved.level is Level.BAD
-    assert "still latched at the end" in said(drive, "E-stop", "Latched").text
-
-
-def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
-    """Half a metre that no twist tells of."""
-    drive.odom.values[300:, 0] += 0.5
-    (leap,) = troubles(drive)
-    assert leap.level is Level.BAD
-    assert "1 time" in leap.text
-    assert "by 0.50 m" in leap.text
-
-
-def test_a_reset_of_the_odometry_is_noted_and_is_no_way(drive: Drive) -> None:
-    """It begins anew at zero."""
-    way = said(drive, "Odometry", "Driven").text.split(",")[0]
-    drive.odom.values[450:, :3] = 0.0
-    assert not troubles(drive)
-    assert "1 time" in said(drive, "Odometry", "anew").text
-    assert said(drive, "Odometry", "Driven").text.startswith(way)
+    drive.statuses.append((9.5, "omnibot_driver: Commands", 1, "cmd_vel refused: nan", {}))
+    assert "cmd_vel refused: nan" in said(drive, "Diagnostics", "Commands").text
 
 
 def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
@@ -306,6 +160,15 @@ def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
         "Time (/dev/ttyUSB0) said WARN 2 times, from 10 s on: “measurements wait” (2×)"
         in second.text
     )
+
+
+def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
+    """They share /diagnostics, which does not say whose is whose."""
+    drive.imu.drop(6.0, 6.1)
+    findings = judge(replace(drive.log(), alone=False))
+    (gap,) = [finding for finding in findings if finding.text.startswith("imu/data_raw has")]
+    assert "only /diagnostics of it alone tells" in gap.advice
+    assert any("of several robots, on /dev/ttyUSB0" in finding.text for finding in findings)
 
 
 def test_topics_that_are_missing_are_named(drive: Drive) -> None:

@@ -140,7 +140,7 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
 @given(wheel_motors)
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
     """Whatever the motor: robust, hardly overshooting, not nervous, closer to command and load."""
-    gains = better_gains(motor)
+    gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)
     assert after.ms <= LARGEST_MS
     assert after.overshoot <= LARGEST_OVERSHOOT
@@ -152,10 +152,20 @@ def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
     )
 
 
+def test_gains_for_three_motors_keep_within_the_limits_on_each() -> None:
+    """Also on the one that they suit least."""
+    motors = [Motor(46.0, 6.0, 0.0), Motor(35.0, 10.0, 1.0), Motor(60.0, 4.0, 3.0)]
+    gains = better_gains(motors)
+    for motor in motors:
+        behaves = behaviour(motor, gains)
+        assert behaves.ms <= LARGEST_MS
+        assert behaves.overshoot <= LARGEST_OVERSHOOT
+
+
 def test_what_is_predicted_comes_about() -> None:
     """The gains that are proposed, in the simulated board's controller, do what was said."""
     motor = Motor(46.0, 6.0, 2.0)
-    gains = better_gains(motor)
+    gains = better_gains([motor])
     speeds = np.array(simulated_answer(motor, gains, 200))
     said = behaviour(motor, gains)
     assert max(0.0, speeds.max() - 1) == pytest.approx(float(said.overshoot), abs=1e-3)

@@ -31,7 +31,7 @@ def draw(
     left.plot([], [], "x", color="grey", label="by the tape")
     left.set(title="Drives, with the geometry found", xlabel="forward, m", ylabel="left, m")
     left.set_aspect("equal")
-    left.legend(fontsize="small")
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     labels, before, after = [], [], []
     for one in readings:
         was = rolled(one.path, np.ones(3), 1.0, base_radius_m)[-1]

@@ -18,6 +18,7 @@ from omnibot_driver.tools.needs import ToolError
 
 SETTLE_S: Final = 1.2
 """From a new speed to a steady one: the board's integrator leaves 0.1 % after a second."""
+REPEATED_WITHIN_S: Final = 0.2
 FEWEST: Final = 5
 LEAST_SIGMA: Final = 1e-4
 """m and rad: no odometry is better, in m/s and rad/s after a second."""
@@ -111,12 +112,16 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
 
 
 def _held(log: Log) -> list[tuple[float, float, Column]]:
-    """From when to when the robot had settled in one command other than zero."""
+    """From when to when the robot had settled in one command other than zero.
+
+    A command that was not repeated in time may have been forgotten by the driver: it begins anew.
+    """
     commands = log.commands
     if not len(commands.stamp_s):
         return []
-    changes = np.flatnonzero(np.any(np.diff(commands.values, axis=0), axis=1)) + 1
-    firsts, lasts = [0, *changes], [*changes, len(commands.stamp_s) - 1]
+    other = np.any(np.diff(commands.values, axis=0), axis=1)
+    changes = np.flatnonzero(other | (np.diff(commands.stamp_s) > REPEATED_WITHIN_S)) + 1
+    firsts, lasts = [0, *changes], [*changes - 1, len(commands.stamp_s) - 1]
     return [
         (commands.stamp_s[first] + SETTLE_S, commands.stamp_s[last], commands.values[first])
         for first, last in zip(firsts, lasts, strict=True)

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from omnibot_driver.core.board import Vector3
+from omnibot_driver.tools.calibrate.arguments import positive, whole
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.motion import Bounds, Law, stairs
 from omnibot_driver.tools.calibrate.result import Result
@@ -34,14 +35,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of a wheel, in rad/s (default 4 12)",
     )
     parser.add_argument(
-        "--hold", type=float, default=1.5, help="seconds at each speed (default 1.5)"
+        "--hold", type=positive, default=1.5, help="seconds at each speed (default 1.5)"
     )
     parser.add_argument(
-        "--steps", type=int, default=8, help="up and down together, each direction (default 8)"
+        "--steps", type=whole, default=8, help="up and down together, each direction (default 8)"
     )
     parser.add_argument(
         "--gains",
-        type=float,
+        type=positive,
         nargs=3,
         default=(MANUAL.feed_forward, MANUAL.proportional, MANUAL.integral),
         metavar=("K_FF", "K_VP", "K_VI"),

@@ -18,9 +18,7 @@ SHOWN_S: Final = 0.8
 PREDICTED_TICKS: Final = 60
 
 
-def draw(
-    figure: "Figure", wheels: "Sequence[WheelFound]", motor: Motor, now: Gains, better: Gains
-) -> None:
+def draw(figure: "Figure", wheels: "Sequence[WheelFound]", now: Gains, better: Gains) -> None:
     """Left the wheels, right what is predicted."""
     halves: Any = figure.subfigures(1, 2)
     left, right = halves
@@ -31,11 +29,12 @@ def draw(
     measured[-1, 0].legend(fontsize=7, loc="lower right")
     measured[-1, 0].set_xlabel("middle of the delta, ms after the control tick")
     command, load = right.subplots(2, 1, sharex=True)
-    _draw_prediction(command, motor, now, better, command=1.0, load=0.0)
+    motors = [wheel.motor for wheel in wheels]
+    _draw_predictions(command, motors, now, better, command=1.0, load=0.0)
     command.set_title("Predicted: a step of command", fontsize=10)
     command.set_ylabel("part of the step")
     command.legend(fontsize=7, loc="lower right")
-    _draw_prediction(load, motor, now, better, command=0.0, load=motor.pwm_per_count)
+    _draw_predictions(load, motors, now, better, command=0.0, load=1.0)
     load.set_title("Predicted: a load worth 1 count per tick", fontsize=10)
     load.set_ylabel("counts per tick")
     load.set_xlabel("ms after the control tick")
@@ -59,15 +58,26 @@ def _middles_ms(end_s: Any) -> Any:
     return 1000 * (end_s - SPAN_S / 2)
 
 
-def _draw_prediction(
-    axes: "Axes", motor: Motor, now: Gains, better: Gains, *, command: float, load: float
+def _draw_predictions(
+    axes: "Axes",
+    motors: Sequence[Motor],
+    now: Gains,
+    better: Gains,
+    *,
+    command: float,
+    load: float,
 ) -> None:
-    for name, gains in (("now", now), ("better", better)):
-        speed = answer(motor, gains, PREDICTED_TICKS, command=command, load=load).speed
-        label = (
+    """One line for each wheel; ``load`` in counts per tick's worth of effort."""
+    times_ms = 1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5)
+    for name, gains, colour in (("now", now, "C0"), ("better", better, "C1")):
+        label: str | None = (
             f"{name}: K_ff {gains.feed_forward:.1f}, K_VP {gains.proportional:.1f},"
             f" K_VI {gains.integral:.1f}"
         )
-        axes.plot(1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5), speed, label=label)
+        for motor in motors:
+            effort = load * motor.pwm_per_count
+            speed = answer(motor, gains, PREDICTED_TICKS, command=command, load=effort).speed
+            axes.plot(times_ms, speed, color=colour, linewidth=1, label=label)
+            label = None
     axes.axhline(command, color="0.5", linewidth=0.5)
     axes.grid(alpha=0.3)

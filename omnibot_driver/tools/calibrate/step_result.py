@@ -2,13 +2,11 @@
 
 from typing import Any, Final
 
-import numpy as np
-
 from omnibot_driver.tools.calibrate.result import Finding, Result
 from omnibot_driver.tools.calibrate.step_figure import draw
 from omnibot_driver.tools.calibrate.step_fit import Fit, WheelFound
 from omnibot_driver.tools.calibrate.tuning import Behaviour, behaviour, better_gains
-from omnibot_driver.tools.calibrate.wheel_loop import Gains, Motor
+from omnibot_driver.tools.calibrate.wheel_loop import Gains
 
 UNLIKE_ONE: Final = 0.02
 """A gain that differs more from 1 is the scale's affair."""
@@ -20,13 +18,9 @@ UNEXPLAINED: Final = 1.2
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:
-    """Gains are the same for all wheels, so they are chosen for the mean of the motors."""
+    """Gains are the same for all wheels, so they are chosen for all of them."""
     motors = [wheel.motor for wheel in found]
-    means = np.mean(
-        [(one.pwm_per_count, one.time_constant_ticks, one.delay_ticks) for one in motors], axis=0
-    )
-    motor = Motor(*(float(mean) for mean in means))
-    better = better_gains(motor, now)
+    better = better_gains(motors, now)
     findings = [row for wheel in found for row in _rows(wheel)]
     findings += [
         Finding(name=name, value=round(value, 1), unit=unit, before=before)
@@ -36,7 +30,6 @@ def result_of(found: list[WheelFound], now: Gains) -> Result:
             ("better K_VI", "PWM/count", better.integral, now.integral),
         )
     ]
-    worst = max(float(behaviour(one, better).ms) for one in motors)
     record = {
         "step": {
             "wheels": {wheel.name: _recorded(wheel) for wheel in found},
@@ -49,9 +42,8 @@ def result_of(found: list[WheelFound], now: Gains) -> Result:
     }
     notes = [sentence for wheel in found for sentence in _remarks(wheel)]
     notes += [
-        f"With the gains that it has, {_told(behaviour(motor, now))}.",
-        f"With the better ones, {_told(behaviour(motor, better))} (on the wheel that they suit"
-        f" least, {worst:.2f}).",
+        f"With the gains that it has, {_told([behaviour(motor, now) for motor in motors])}.",
+        f"With the better ones, {_told([behaviour(motor, better) for motor in motors])}.",
         "No message sets them: they are constants of the firmware.",
     ]
     return Result(
@@ -59,7 +51,7 @@ def result_of(found: list[WheelFound], now: Gains) -> Result:
         parameters={},
         record=record,
         notes=notes,
-        draw=lambda figure: draw(figure, found, motor, now, better),
+        draw=lambda figure: draw(figure, found, now, better),
     )
 
 
@@ -135,13 +127,22 @@ def _remarks(wheel: WheelFound) -> list[str]:
     return remarks
 
 
-def _told(behaves: Behaviour) -> str:
-    command_ms, load_ms = (
-        1000 * float(error_s) for error_s in (behaves.command_error_s, behaves.load_error_s)
+def _told(wheels: list[Behaviour]) -> str:
+    """Of the worst wheel, each figure by itself."""
+    rise_ms, command_ms, load_ms = (
+        1000 * max(float(value) for value in values)
+        for values in (
+            [wheel.rise_s for wheel in wheels],
+            [wheel.command_error_s for wheel in wheels],
+            [wheel.load_error_s for wheel in wheels],
+        )
+    )
+    overshoot, ms = (
+        max(float(value) for value in values)
+        for values in ([wheel.overshoot for wheel in wheels], [wheel.ms for wheel in wheels])
     )
     return (
-        f"a step of command rises within {1000 * float(behaves.rise_s):.0f} ms, overshoots by"
-        f" {100 * float(behaves.overshoot):.0f} % and leaves {command_ms:.0f} ms of it as error; a"
-        f" load leaves {load_ms:.0f} ms; Ms is"
-        f" {float(behaves.ms):.2f}"
+        f"a step of command rises within {rise_ms:.0f} ms at the most, overshoots by"
+        f" {100 * overshoot:.0f} % and leaves {command_ms:.0f} ms of itself as error, a load"
+        f" {load_ms:.0f} ms; Ms is {ms:.2f}"
     )

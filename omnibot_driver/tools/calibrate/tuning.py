@@ -7,6 +7,7 @@ factor 2.6 in gain or of 36° in phase; the speed overshoots a command by 5 % at
 count of the encoder, its smallest step, moves the effort by no more than a count of speed needs.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -68,10 +69,13 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
         )
 
 
-def better_gains(motor: Motor, now: Gains = MANUAL) -> Gains:
-    """The best within the limits, by a search that narrows down; compared with those of ``now``."""
-    reference = behaviour(motor, now)
-    need = motor.pwm_per_count
+def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
+    """The best for all of these alike within the limits, by a search that narrows down.
+
+    ``now`` is what they are compared with.
+    """
+    references = [behaviour(motor, now) for motor in motors]
+    need = min(motor.pwm_per_count for motor in motors)
     forward, proportional, integral = (0.0, 1.0), (0.02, 1.0), (1e-3, 1.0)
     best = Gains(need, 0.02 * need, 1e-3 * need)
     for _ in range(ROUNDS):
@@ -83,8 +87,11 @@ def better_gains(motor: Motor, now: Gains = MANUAL) -> Gains:
             sparse=True,
         )
         gains = Gains(*grid)
-        cost = _cost(behaviour(motor, gains), reference)
-        place = np.unravel_index(np.argmin(cost), cost.shape)
+        cost = sum(
+            _cost(behaviour(motor, gains), reference)
+            for motor, reference in zip(motors, references, strict=True)
+        )
+        place = np.unravel_index(np.argmin(cost), np.shape(cost))
         best = Gains(*(float(axis.flat[n]) for axis, n in zip(grid, place, strict=True)))
         forward = _around(best.feed_forward / need, 1.0 / CANDIDATES, 0.0, 1.2)
         proportional = _near(proportional, best.proportional / need)
@@ -93,10 +100,11 @@ def better_gains(motor: Motor, now: Gains = MANUAL) -> Gains:
 
 
 def _cost(behaves: Behaviour, reference: Behaviour) -> Array:
+    """Infinite beyond the limits."""
     cost = (
         behaves.command_error_s / reference.command_error_s
         + behaves.load_error_s / reference.load_error_s
-    ) / 2
+    )
     allowed = behaves.stable & (behaves.ms <= LARGEST_MS) & (behaves.overshoot <= LARGEST_OVERSHOOT)
     return np.where(allowed, cost, np.inf)
 
