@@ -52,7 +52,7 @@ integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), in
 bench: $(VENV)/.test  ## measure speed against a floor (15 minutes), into docs/performance.md
 	$(PY) test/bench/report.py
 
-faults: $(VENV)/.test  ## break everything, with the real node (15 minutes), into docs/safety.md
+faults: $(VENV)/.test  ## break everything, with the real node (16 minutes), into docs/safety.md
 	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py
 
 soak: $(VENV)/.test  ## random faults for MINUTES (10)

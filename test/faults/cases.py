@@ -24,6 +24,8 @@ Case = Callable[[R], object]
 NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
 HANGS_S: Final = 1.0
 """So long the guard waits for a sign of life."""
+NEXT_ATTEMPT_S: Final = 2.0
+"""At the latest after so long a lost port is opened again."""
 SILENCE_S: Final = 1.5
 """So long a board may say nothing before the driver holds it for lost."""
 
@@ -148,7 +150,7 @@ def unplugged(rig: Rig) -> None:
     rig.plug()
     mark = len(rig.line.board.received)
     since = rig.line.tick
-    rig.expect_still(since, "unplugged while driving, plugged in again", 1.0)
+    rig.expect_still(since, "unplugged while driving, plugged in again", NEXT_ATTEMPT_S)
     opening = bytes(rig.line.board.received[mark : mark + 17])
     stop = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
     rig.findings.expect(opening == bytes(8) + stop, f"the first bytes were {opening.hex(' ')}")

@@ -108,7 +108,7 @@ GOALS: Final[dict[str, Callable[[GoalRig], None]]] = {
     for name, event, allowed_s in (
         ("the cable is cut, from the board", cut_from_the_board, UNHEARD_S),
         ("the cable is cut, both ways", cut_both_ways, TIMEOUT_S),
-        ("unplugged, plugged in", unplugged, 1.0),
+        ("unplugged, plugged in", unplugged, 2.0),
         ("the kernel's buffer is full", full_port, 0.0),
         ("the board reboots", reboot, 0.0),
         ("e-stop and release", estop, 0.0),
