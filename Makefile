@@ -26,7 +26,7 @@ unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WH
 ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export ROS_AUTOMATIC_DISCOVERY_RANGE
 
-.PHONY: help demo test docs pictures integrity faults soak lint format clean
+.PHONY: help demo test docs pictures integrity bench faults soak lint format clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1: /p' Makefile | while IFS= read -r line; do \
@@ -48,6 +48,9 @@ pictures: $(VENV)/.test  ## make the pictures of README and documents anew (10 m
 
 integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), into docs/integrity.md
 	$(PY) test/integrity/report.py
+
+bench: $(VENV)/.test  ## measure speed against a floor (15 minutes), into docs/performance.md
+	$(PY) test/bench/report.py
 
 faults: $(VENV)/.test  ## break everything, with the real node (15 minutes), into docs/safety.md
 	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py

@@ -66,7 +66,8 @@ class Link:
         self._report = report
         self._failed = failed
         self._on_read, self._on_write = on_read, on_write
-        self._changed = threading.Condition(threading.Lock())
+        self._lock = threading.Lock()
+        self._changed = threading.Condition(self._lock)
         self._closing = threading.Event()
         self._port: Port | None = None
         self._write_error: LinkError | None = None
@@ -193,7 +194,7 @@ class Link:
         while not self._closing.is_set():
             if data := port.read():
                 self._on_read(data)
-            with self._changed:
+            with self._lock:
                 if self._write_error is not None:
                     raise self._write_error
                 if not data:

@@ -138,8 +138,8 @@ class Port:
         self._is_terminal = descriptor is not None and os.isatty(descriptor)
         if type(self._serial) is serial.Serial:  # what its URLs are made of may look at each read
             self._arrivals = select.poll()
-            for waited_for in (self._serial.fd, self._serial.pipe_abort_read_r):
-                self._arrivals.register(waited_for, select.POLLIN)
+            self._arrivals.register(self._serial.fileno(), select.POLLIN)
+            self._arrivals.register(self._serial.pipe_abort_read_r or -1, select.POLLIN)
         if descriptor is not None and self._is_terminal:
             attributes = termios.tcgetattr(descriptor)
             attributes[2] &= ~termios.HUPCL
@@ -161,11 +161,13 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
         if ready != port.fd:
             os.read(ready, 1000)  # pyserial's ``cancel_read``
             return b""
-        with contextlib.suppress(BlockingIOError):
+        try:
             data = os.read(ready, MOST_AT_ONCE)
-            if not data:
-                raise OSError("the device hung up")
-            return data
+        except BlockingIOError:
+            return b""
+        if not data:
+            raise OSError("the device hung up")
+        return data
     return b""
 
 

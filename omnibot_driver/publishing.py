@@ -52,6 +52,9 @@ class Publishing:
             )
         self.settings = settings
         self._port = values["port"]
+        self._clock = node.get_clock()
+        self._over = False
+        node.context.on_shutdown(self._end)
         self._imu = node.create_publisher(Imu, "imu/data_raw", 10)
         self._odometry = node.create_publisher(Odometry, "odom", 10)
         self._joints = node.create_publisher(JointState, "joint_states", 10)
@@ -88,10 +91,10 @@ class Publishing:
 
     def deliver(self, events: Sequence[Event]) -> None:
         """Publish events whose stamps are of the steady clock, now."""
-        if not events or not self._node.context.ok():
+        if not events or self._over:
             return
         before_ns = time.monotonic_ns()
-        wall_ns = self._node.get_clock().now().nanoseconds
+        wall_ns = self._now_ns()
         self._clock_offset_ns = messages.clock_offset(
             self._clock_offset_ns, before_ns, wall_ns, time.monotonic_ns()
         )
@@ -99,7 +102,7 @@ class Publishing:
 
     def publish(self, events: Sequence[Event], clock_offset_ns: int) -> None:
         """Publish events whose stamps are so far behind ROS time."""
-        if not self._node.context.ok():
+        if self._over:
             return
         for event in events:
             self._handlers[type(event)](event, clock_offset_ns)
@@ -129,6 +132,16 @@ class Publishing:
                 self._node.get_logger().warning(advice)
         elif self._is_news(trouble):
             self._node.get_logger().error(f"{trouble} (retrying)")
+
+    def _end(self) -> None:
+        """ROS is being shut down; to ask it each time costs more than an Imu."""
+        self._over = True
+
+    def _now_ns(self) -> int:
+        """ROS time. Where nobody simulates it, it is the system's, which costs a tenth."""
+        if self._clock.ros_time_is_active:
+            return int(self._clock.now().nanoseconds)
+        return time.time_ns()
 
     def _raw_publisher(self, topic: str) -> Callable[[bytes], None]:
         publisher = self._node.create_publisher(UInt8MultiArray, topic, RAW_DEPTH)

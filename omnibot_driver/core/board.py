@@ -11,6 +11,7 @@ from typing import Literal, Protocol
 
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.values import value
 
 Vector3 = tuple[float, float, float]
 
@@ -23,13 +24,14 @@ class Mode(Enum):
     NOMINAL = "nominal"
     IMU_ONLY = "imu_only"
 
-    @property
-    def running(self) -> bool:
-        """True in the modes in which the board sends data and obeys motion commands."""
-        return self in (Mode.NOMINAL, Mode.IMU_ONLY)
+    running: bool
+    """True in the modes in which the board sends data and obeys motion commands."""
+
+    def __init__(self, name: str) -> None:
+        self.running = name in ("nominal", "imu_only")
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class ImuReading:
     """Specific force in m/s² and angular velocity in rad/s, in the sensor's own axes.
 
@@ -41,7 +43,7 @@ class ImuReading:
     lost: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class DisplacementReading:
     """Motion during the last ``duration_s``; ``lost`` frames of this kind are missing before it.
 
@@ -58,7 +60,7 @@ class DisplacementReading:
     restarted: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class PoseReading:
     """The board's own dead reckoning, in the earth frame it has chosen for itself.
 

@@ -77,18 +77,18 @@ class DeviceClock:
         line = self._line = self._line or TickLine(self._period_s, (self._tick, now))
         short = 0
         if edge is not None:
-            came = edge.ahead + sum(isinstance(reading, ImuReading) for reading in readings)
+            kinds = [type(reading) for reading in readings]
+            came = edge.ahead + kinds.count(ImuReading)
             if came:
-                counted = any(isinstance(reading, DisplacementReading) for reading in readings)
                 self._single_reads = self._single_reads + 1 if came == 1 else 0
-                short = self._compare(line, edge, now, counted=counted)
+                short = self._compare(line, edge, now, counted=DisplacementReading in kinds)
         # Where a counter took ticks back, the order of the readings must still find room.
-        least_s = 0.0 if ticks == sorted(ticks) else SMALLEST_STEP_S
+        least_s = 0.0 if len(ticks) < 2 or ticks == sorted(ticks) else SMALLEST_STEP_S
         stamps = []
         for left, tick, reading in zip(range(len(ticks), 0, -1), ticks, readings, strict=True):
             is_new = tick + short != self._stamped_tick
-            is_displacement = isinstance(reading, DisplacementReading)
-            if isinstance(reading, ImuReading) or (is_displacement and is_new):
+            kind = type(reading)
+            if kind is ImuReading or (kind is DisplacementReading and is_new):
                 later_s = max((ticks[-1] - tick) * self._period_s, left * least_s)
                 self._stamp(tick + short, now - later_s, (now - self._stamp_s) / (left + 1))
             stamps.append(self._stamp_s)

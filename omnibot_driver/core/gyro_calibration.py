@@ -40,18 +40,19 @@ class Moments:
     def __init__(self) -> None:
         self.count = 0
         self._first: Vector3 = (0.0, 0.0, 0.0)
-        self._sum = [0.0, 0.0, 0.0]
-        self._squares = [0.0, 0.0, 0.0]
+        self._sum: Vector3 = (0.0, 0.0, 0.0)
+        self._squares: Vector3 = (0.0, 0.0, 0.0)
 
     def add(self, vector: Vector3) -> None:
         """One more."""
         if not self.count:
             self._first = vector
         self.count += 1
-        for axis in range(3):
-            part = vector[axis] - self._first[axis]
-            self._sum[axis] += part
-            self._squares[axis] += part * part
+        (x, y, z), (first_x, first_y, first_z) = vector, self._first
+        (sum_x, sum_y, sum_z), (xx, yy, zz) = self._sum, self._squares
+        x, y, z = x - first_x, y - first_y, z - first_z
+        self._sum = sum_x + x, sum_y + y, sum_z + z
+        self._squares = xx + x * x, yy + y * y, zz + z * z
 
     @property
     def mean(self) -> Vector3:
@@ -163,10 +164,13 @@ class GyroCalibration:
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
         """A reading of the IMU, as the sensor gave it, but for the accelerometer's bias."""
-        if stamp_s - self._look.last_s > GAP_S:
-            self._look = Look()
-        self._look.hear(rate, force, stamp_s)
-        if self._look.length_s >= (MEASURE_S if self.measuring else BLOCK_S):
+        look = self._look
+        if stamp_s - look.last_s > GAP_S:
+            look = self._look = Look()
+        look.hear(rate, force, stamp_s)
+        if stamp_s - look.began_s >= BLOCK_S and (
+            not self.measuring or stamp_s - look.began_s >= MEASURE_S
+        ):
             self._conclude()
 
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:

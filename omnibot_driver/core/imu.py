@@ -5,6 +5,7 @@ Source: MPU-6050 product specification, sections 6.1 and 6.2 (sensitivity scale 
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Final
 
 STANDARD_GRAVITY: Final = 9.80665
@@ -42,10 +43,20 @@ class ImuScale:
 
     def specific_force(self, counts: Counts) -> Vector3:
         """Counts to m/s²."""
-        unit = STANDARD_GRAVITY / ACCEL_COUNTS_PER_G[self.accel_range_g]
+        unit = _count_mps2(self.accel_range_g)
         return counts[0] * unit, counts[1] * unit, counts[2] * unit
 
     def angular_velocity(self, counts: Counts) -> Vector3:
         """Counts to rad/s."""
-        unit = math.radians(1.0 / GYRO_COUNTS_PER_DPS[self.gyro_range_dps])
+        unit = _count_radps(self.gyro_range_dps)
         return counts[0] * unit, counts[1] * unit, counts[2] * unit
+
+
+@cache
+def _count_mps2(range_g: int) -> float:
+    return STANDARD_GRAVITY / ACCEL_COUNTS_PER_G[range_g]
+
+
+@cache
+def _count_radps(range_dps: int) -> float:
+    return math.radians(1.0 / GYRO_COUNTS_PER_DPS[range_dps])

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from omnibot_driver.core.board import Board, DisplacementReading, ImuReading, Vector3
 from omnibot_driver.core.gyro_calibration import GyroCalibration
 from omnibot_driver.core.snapshot import ImuFigures
+from omnibot_driver.core.values import value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -16,7 +17,7 @@ class ImuCorrection:
     auto_gyro_bias: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class ImuEstimate:
     """At ``stamp_s``: specific force in m/s², angular velocity in rad/s, in the sensor's axes."""
 
@@ -42,10 +43,12 @@ class Inertial:
 
     def estimate(self, reading: ImuReading, stamp_s: float) -> ImuEstimate:
         """The reading without biases."""
-        force = _less(reading.specific_force, self._correction.accel_bias)
-        rate = reading.angular_velocity
+        (x, y, z), (bias_x, bias_y, bias_z) = reading.specific_force, self._correction.accel_bias
+        force = x - bias_x, y - bias_y, z - bias_z
+        (u, v, w) = rate = reading.angular_velocity
         self.calibration.hear(rate, force, stamp_s)
-        return ImuEstimate(stamp_s, force, _less(rate, self.calibration.bias))
+        bias_u, bias_v, bias_w = self.calibration.bias
+        return ImuEstimate(stamp_s, force, (u - bias_u, v - bias_v, w - bias_w))
 
     def displaced(self, reading: DisplacementReading) -> None:
         """What the wheels tell of rest and motion."""
@@ -66,7 +69,3 @@ class Inertial:
             noise_radps=self.calibration.noise,
             advice=self.advice,
         )
-
-
-def _less(vector: Vector3, bias: Vector3) -> Vector3:
-    return vector[0] - bias[0], vector[1] - bias[1], vector[2] - bias[2]

@@ -9,11 +9,13 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from omnibot_driver.core.values import value
+
 COS30: Final = math.cos(math.radians(30))
 SIN30: Final = math.sin(math.radians(30))
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class BodyTwist:
     """Velocity of the body in its own frame: m/s forward, m/s to the left, rad/s to the left."""
 

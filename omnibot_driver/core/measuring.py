@@ -16,7 +16,7 @@ from omnibot_driver.core.board import (
 from omnibot_driver.core.device_clock import DeviceClock
 from omnibot_driver.core.inertial import ImuCorrection, ImuEstimate, Inertial
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
-from omnibot_driver.core.plausibility import MotionLimits, Plausibility, Refused, Stamped
+from omnibot_driver.core.plausibility import MotionLimits, Plausibility, Refused
 from omnibot_driver.core.se2 import Signs
 from omnibot_driver.core.tally import Tally
 
@@ -76,15 +76,14 @@ class Measuring:
         measured: list[Measured] = []
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
             self.tally.hear(reading)
-            measured += self._measure(self._plausibility.admit(reading, stamp_s))
+            for sure, at_s in self._plausibility.admit(reading, stamp_s):
+                measured.append((sure, self._estimates(sure, at_s)))
         return measured
 
     def release(self) -> list[Measured]:
         """What waited for readings that will not come."""
-        return self._measure(self._plausibility.release())
-
-    def _measure(self, admitted: Sequence[Stamped]) -> list[Measured]:
-        return [(reading, self._estimates(reading, stamp_s)) for reading, stamp_s in admitted]
+        released = self._plausibility.release()
+        return [(reading, self._estimates(reading, stamp_s)) for reading, stamp_s in released]
 
     def _estimates(self, reading: Reading, stamp_s: float) -> Sequence[Estimate]:
         match reading:

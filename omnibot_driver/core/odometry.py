@@ -16,6 +16,7 @@ from omnibot_driver.core.follower import Follower
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose, Signs, roll, unroll
 from omnibot_driver.core.uncertainty import NOTHING, Covariance, OdometryNoise, Uncertainty
+from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0
 """Board time without any pose after which heading 0 is assumed."""
@@ -46,7 +47,7 @@ class OdometrySettings:
     angular_scale: float = 1.0
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class OdometryEstimate:
     """At ``stamp_s``: pose and covariance in the odometry frame, twist in the body's.
 
@@ -263,7 +264,8 @@ class Odometry:
             seconds = max(0.0, stamp_s - (stamp_s if last_stamp_s is None else last_stamp_s))
         elif reading.lost:
             self._miss((reading.lost + 1) * seconds)
-        self._bridge(bridge, reading.lost * seconds)
+        if reading.lost:
+            self._bridge(bridge, reading.lost * seconds)
         if self._board is not None:
             self._board = advanced(self._board, reading)
         self._move(tangent, seconds)
@@ -309,6 +311,10 @@ class Odometry:
         if reading.duration_s is None:
             self._last = None
             return Pose(), self._tangent(reading, 0.0)
+        if not reading.lost:
+            tangent = self._tangent(reading, 0.0)
+            self._last = (tangent, reading.duration_s)
+            return Pose(), tangent
         half = min(reading.lost, LONGEST_BRIDGE) / 2
         last_turn_rad = self._last[0].yaw_rad if self._last else reading.dyaw_rad
         tangent = self._tangent(reading, half * (last_turn_rad + reading.dyaw_rad))

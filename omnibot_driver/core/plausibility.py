@@ -16,6 +16,7 @@ robot's limits; it knows no bytes and no clock.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import hypot
+from operator import sub
 from typing import Final
 
 from omnibot_driver.core.board import (
@@ -25,6 +26,7 @@ from omnibot_driver.core.board import (
     PoseReading,
     Reading,
 )
+from omnibot_driver.core.values import value
 
 Stamped = tuple[Reading, float]
 """A reading and its time in s."""
@@ -34,8 +36,7 @@ OUT_OF_PROPORTION: Final = 3.0
 CALMING: Final = 0.95
 """What a reading leaves of the largest step before it: after 20 of them a third."""
 STILL: Final = 0.08
-"""Part of a leap by which the sensor's other words may move, and all of them when it is over. A
-knock, however short, moves more."""
+"""Part of a leap by which the sensor's other words may move, and all of them when it is over."""
 END_OF_SCALE: Final = 0.99996
 """Part of full scale, just below the largest positive word."""
 BACK: Final = 0.25
@@ -58,7 +59,7 @@ class MotionLimits:
     full_scale_mps2: float = 19.6133
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Refused:
     """How many readings that cannot be true were not believed since the driver began."""
 
@@ -107,11 +108,13 @@ class Plausibility:
         return released
 
     def _admit_imu(self, reading: ImuReading, stamp_s: float) -> list[Stamped]:
+        force = self.limits.force_step_mps2
         turn = self.limits.fastest_radps2 * self._tick_s
-        values = [value / self.limits.force_step_mps2 for value in reading.specific_force]
-        values += [value / turn for value in reading.angular_velocity]
-        bit = self.limits.full_scale_mps2 / self.limits.force_step_mps2
-        was_flip, leaps = self._imu_leaps.judge(values, topmost_bit=bit)
+        (x, y, z), (u, v, w) = reading.specific_force, reading.angular_velocity
+        values = (x / force, y / force, z / force, u / turn, v / turn, w / turn)
+        was_flip, leaps = self._imu_leaps.judge(
+            values, topmost_bit=self.limits.full_scale_mps2 / force
+        )
         held, self._held_imu = self._held_imu, []
         if was_flip:
             self.refused_imu += 1
@@ -223,13 +226,14 @@ class _Leaps:
             return False, False
         steps = _steps(self._sure, values)
         least = max(periods, OUT_OF_PROPORTION * self._restless)
-        *others, largest = sorted(steps)
-        alone = others[-1] <= self._left * largest
-        value = abs(values[steps.index(largest)])
-        flipped = alone and largest > least and self._is_a_bit(largest, value, topmost_bit)
-        if flipped or max(steps[self._knocked :]) > least:
-            self._leaping = values
-            return was_single, True
+        largest = max(steps)
+        if largest > least:
+            alone = sorted(steps)[-2] <= self._left * largest
+            value = abs(values[steps.index(largest)])
+            flipped = alone and self._is_a_bit(largest, value, topmost_bit)
+            if flipped or max(steps[self._knocked :]) > least:
+                self._leaping = values
+                return was_single, True
         self._restless = max(CALMING * self._restless, largest)
         self._sure = values
         return was_single, False
@@ -237,7 +241,7 @@ class _Leaps:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """As far as can be told from values that move by themselves. What ends at the end of the
         scale was knocked."""
-        slack = 1.5 * self._restless
+        slack = OUT_OF_PROPORTION * self._restless
         bit = topmost if value < END_OF_SCALE * topmost else 0.0
         while bit > step + slack:
             bit /= 2
@@ -246,4 +250,4 @@ class _Leaps:
 
 def _steps(before: Sequence[float], after: Sequence[float]) -> list[float]:
     """How far each value moved."""
-    return [abs(new - old) for old, new in zip(before, after, strict=True)]
+    return list(map(abs, map(sub, after, before)))

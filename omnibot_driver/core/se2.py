@@ -1,14 +1,14 @@
 """The plane: poses, and the way from one to another. Knows geometry, nothing that moves in it."""
 
 import math
-from dataclasses import dataclass
 
 from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.values import value
 
 Signs = tuple[int, int, int]
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Pose:
     """Position in m and unwrapped yaw in rad; also a displacement, or a tangent (twist x time)."""
 
@@ -22,7 +22,7 @@ class Pose:
 
     def __sub__(self, other: "Pose") -> "Pose":
         """Component by component."""
-        return self + other.times(-1.0, -1.0, -1.0)
+        return Pose(self.x_m - other.x_m, self.y_m - other.y_m, self.yaw_rad - other.yaw_rad)
 
     def times(self, x: float, y: float, yaw: float) -> "Pose":
         """Component by component."""
@@ -50,7 +50,13 @@ class Pose:
 
     def moved(self, displacement: "Pose") -> "Pose":
         """The pose after a displacement given in this pose's own axes."""
-        return self + displacement.turned(self.yaw_rad)
+        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        dx_m, dy_m = displacement.x_m, displacement.y_m
+        return Pose(
+            self.x_m + cos * dx_m - sin * dy_m,
+            self.y_m + sin * dx_m + cos * dy_m,
+            self.yaw_rad + displacement.yaw_rad,
+        )
 
     def way_to(self, other: "Pose") -> "Pose":
         """The displacement in this pose's own axes that leads there, the shorter turn of both."""

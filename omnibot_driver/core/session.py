@@ -40,6 +40,8 @@ SILENCE_S: Final = 1.5
 """The board says something at least once a second; after this it is not known to be there."""
 UNHEARD_S: Final = 0.3
 """A robot that is not heard for so long is driven no further: it may be restarting."""
+TELL_EVERY_S: Final = 0.1
+"""News need not be looked for with every read."""
 DISCONNECTED: Final = "disconnected"
 
 
@@ -89,9 +91,12 @@ class Session:
         self._commands = self._driving.stream
         self._heard_at = self._came_at = -math.inf
         self._silent = False
+        self._tell_at = -math.inf
         self._bulletin = Bulletin()
         self._events: list[Event] = []
         self._shown = (self.state, self.estop_active)
+        self._beneath: tuple[Phase, Mode, bool] | None = None
+        """What that is made of, which is quicker to look at."""
 
     # What is so
 
@@ -101,7 +106,7 @@ class Session:
         if self._closed:
             return DISCONNECTED
         resetting = self._supervisor.phase is Phase.RESETTING
-        return (Mode.UNKNOWN if resetting else self._board.mode).value
+        return str((Mode.UNKNOWN if resetting else self._board.mode).value)
 
     @property
     def estop_active(self) -> bool:
@@ -138,7 +143,7 @@ class Session:
     @property
     def wake_at(self) -> float:
         """When ``tick`` must be called at the latest; infinity when nothing is due."""
-        if self._closed:
+        if self._supervisor.phase is Phase.CLOSED:
             return math.inf
         silent_at = math.inf if self._silent else self._heard_at + SILENCE_S
         unheard_at = self._heard_at + UNHEARD_S if self._commands.current else math.inf
@@ -278,7 +283,7 @@ class Session:
 
     def take_output(self, now: float) -> bytes:
         """The bytes to write now; they count as written."""
-        if self._closed:
+        if self._supervisor.phase is Phase.CLOSED:
             return b""
         data = self._supervisor.take_output()
         if data:
@@ -290,10 +295,13 @@ class Session:
         for answers in (self._supervisor.answers, self._inertial.calibration.answers):
             self._events += answers
             answers.clear()
-        shown = (self.state, self.estop_active)
-        if shown != self._shown:
-            self._shown = shown
-            self._events.append(StateChanged())
+        beneath = (self._supervisor.phase, self._board.mode, self._commands.latched)
+        if beneath != self._beneath:
+            self._beneath = beneath
+            shown = (self.state, self.estop_active)
+            if shown != self._shown:
+                self._shown = shown
+                self._events.append(StateChanged())
         events, self._events = self._events, []
         return events
 
@@ -324,9 +332,13 @@ class Session:
                 case PausedReading(continues):
                     self._driving.begin()
                     self._supervisor.heard_paused(now, continues=continues)
-        self._notify(self._driving.check_goal([], now))
+        if self._commands.current is not None:
+            self._notify(self._driving.check_goal([], now))
 
     def _tell(self, now: float) -> None:
+        if now < self._tell_at:
+            return
+        self._tell_at = now + TELL_EVERY_S
         bulletin, board, odometry = self._bulletin, self._board, self._odometry
         once = [board.advice] if board.advice is not None else []
         once += [HEADING_ASSUMED] if odometry.heading_assumed else []

@@ -1,13 +1,14 @@
 """Another process's callback: notes when which Imu came, until its standard input ends.
 
-Arguments: namespaces. Prints one JSON array per namespace: pairs of the steady clock's time in s and
-the acceleration along x; and how many odometries came.
+Arguments: namespaces. Prints one JSON object with an array per namespace: ``heard`` has pairs of
+the steady clock's time in s and the acceleration along x, ``odometries`` the times alone.
 """
 
 import json
 import sys
 import threading
 import time
+from contextlib import suppress
 from functools import partial
 
 import rclpy
@@ -23,13 +24,13 @@ def main() -> None:
     rclpy.init()
     node = Node("ear", start_parameter_services=False, enable_rosout=False)
     heard: list[list[tuple[float, float]]] = [[] for _ in namespaces]
-    odometries = [0] * len(namespaces)
+    odometries: list[list[tuple[float]]] = [[] for _ in namespaces]
 
     def hear(number: int, imu: Imu) -> None:
         heard[number].append((time.monotonic(), imu.linear_acceleration.x))
 
     def count(number: int, _odometry: Odometry) -> None:
-        odometries[number] += 1
+        odometries[number].append((time.monotonic(),))
 
     for number, namespace in enumerate(namespaces):
         node.create_subscription(Imu, f"{namespace}/imu/data_raw", partial(hear, number), 100)
@@ -37,10 +38,8 @@ def main() -> None:
         node.create_subscription(JointState, f"{namespace}/joint_states", lambda _joints: None, 100)
     threading.Thread(target=lambda: (sys.stdin.read(), rclpy.shutdown()), daemon=True).start()
     print("listening", flush=True)
-    try:
+    with suppress(ExternalShutdownException):
         rclpy.spin(node)
-    except ExternalShutdownException:
-        pass
     print(json.dumps({"heard": heard, "odometries": odometries}), flush=True)
 
 

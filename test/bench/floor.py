@@ -1,8 +1,8 @@
 """The floor: the smallest program that does the same without looking at what it does.
 
-``measurements PORT NAMESPACE`` publishes an Imu for every IMU frame, an Odometry and a JointState for
-every delta, trusting the first byte it reads to begin a frame; ``commands PORT NAMESPACE`` writes a frame for
-every cmd_vel. Each fills in one number, by which a message is known again.
+``measurements PORT NAMESPACE`` publishes an Imu for every IMU frame, an Odometry and a JointState
+for every delta, trusting the first byte it reads to begin a frame; ``commands PORT NAMESPACE``
+writes a frame for every cmd_vel. Each fills in one number, by which a message is known again.
 """
 
 import os

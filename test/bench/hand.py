@@ -1,7 +1,7 @@
 """Commands two robots in turn, 40 times a second each, for so many seconds.
 
-Arguments: seconds, namespaces. Prints one JSON array per namespace: pairs of the steady clock's time
-in s at which a command was published, and its forward speed in the board's units.
+Arguments: seconds, namespaces. Prints one JSON array per namespace: pairs of the steady clock's
+time in s at which a command was published, and its forward speed in the board's units.
 """
 
 import json

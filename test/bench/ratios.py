@@ -7,7 +7,7 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """``ours[n]`` and ``floor[n]`` were measured one right after the other; ``goal``: of the ratio."""
+    """``ours[n]`` and ``floor[n]`` were measured together; ``goal``: the ratio's upper bound."""
 
     name: str
     unit: str

@@ -10,6 +10,7 @@ import struct
 import threading
 import time
 import tty
+from contextlib import suppress
 from random import Random
 from typing import Self
 
@@ -71,10 +72,8 @@ class Stage:
             for board, (near, _) in enumerate(self._ends):
                 time.sleep(max(0.0, at + board * TICK_S / boards - time.monotonic()))
                 self.said[board].append(time.monotonic())
-                try:
+                with suppress(BlockingIOError):  # nobody reads it yet
                     os.write(near, data)
-                except BlockingIOError:  # nobody reads it yet
-                    pass
             tick, at = tick + 1, at + TICK_S
 
     def _hear(self) -> None:

@@ -1,16 +1,23 @@
-"""The driver as a process on a pseudo-terminal, beside the floor: latency, processor time, scale."""
+"""The driver as a process on a pseudo-terminal, beside the floor."""
 
 import bisect
+import json
 import math
 import struct
+import subprocess
+import sys
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
 from statistics import median, quantiles
+from tempfile import TemporaryDirectory
 
 from processes import HERE, Program, driver, ear, floor
-from ratios import Figure
-from stage import Stage, number_of
+from ratios import Figure, alternate
+from stage import TICK_S, Stage, number_of
 
 WINDOW_S = 10.0
 SETTLING_S = 5.0
@@ -39,7 +46,7 @@ def measurements(windows: int) -> tuple[list[Figure], str]:
     late = [_latencies(*each) for each in zip(stage.said, heard, units, strict=True)]
     windowed = [
         [[us for at, us in each if start <= at < end] for each in late]
-        for start, end in zip(marks, marks[1:], strict=False)
+        for start, end in pairwise(marks)
     ]
     figures = [
         Figure(f"IMU frame to callback, {name}", "µs", *zip(*values, strict=True), goal=goal)
@@ -55,9 +62,9 @@ def measurements(windows: int) -> tuple[list[Figure], str]:
     delivered = [sum(map(len, column)) for column in zip(*windowed, strict=True)]
     minutes = (marks[-1] - marks[0]) / 60
     memory = (
-        f"Node: resident {resident_mb[0]:.1f} MB, {resident_mb[-1]:.1f} MB after {minutes:.1f} minutes"
-        f" of stream. IMU frames that came through: {delivered[0]:,} (floor {delivered[1]:,}) of"
-        f" {100 * (marks[-1] - marks[0]):,.0f}."
+        f"Node: resident {resident_mb[0]:.1f} MB at first, {resident_mb[-1]:.1f} MB after"
+        f" {minutes:.1f} minutes of stream, in which {delivered[0]:,} IMU frames came through"
+        f" (floor: {delivered[1]:,}) of {100 * (marks[-1] - marks[0]):,.0f}."
     )
     return figures, memory
 
@@ -75,6 +82,19 @@ def commands(windows: int) -> Figure:
     size = min(map(len, late)) // windows
     parts = [[median(each[n * size : (n + 1) * size]) for n in range(windows)] for each in late]
     return Figure("cmd_vel to the board's side, median", "µs", *parts, goal=1.10)
+
+
+def imports(times: int) -> Figure:
+    """Importing the driver, against importing what no such node can do without."""
+    floor_names = "rclpy, geometry_msgs.msg, nav_msgs.msg, sensor_msgs.msg, std_srvs.srv"
+
+    def seconds(names: str) -> float:
+        begun = time.monotonic()
+        subprocess.run([sys.executable, "-c", f"import {names}"], check=True)
+        return time.monotonic() - begun
+
+    ours, least = partial(seconds, "omnibot_driver.driver"), partial(seconds, floor_names)
+    return alternate("importing", "s", ours, least, times=times)
 
 
 def starts(times: int) -> Figure:
@@ -95,9 +115,10 @@ def starts(times: int) -> Figure:
 def scale(counts: Sequence[int], seconds: float) -> list[str]:
     """Many drivers, each with a board of its own; rows of a table."""
     rows = [
-        "| drivers | ms per robot and second | IMU Hz, least | odom Hz, least |",
-        "|---" * 4 + "|",
+        "| drivers | ms per robot and second | of one alone | IMU Hz, least | odom Hz, least |",
+        "|---" * 5 + "|",
     ]
+    alone_ms = 0.0
     for count in counts:
         names = [f"robot{number}" for number in range(count)]
         with Stage(count) as stage, ExitStack() as stack:
@@ -111,13 +132,40 @@ def scale(counts: Sequence[int], seconds: float) -> list[str]:
             time.sleep(seconds)
             after, end = [each.busy_s for each in drivers], time.monotonic()
             result = listener.result()
-        spent = sum(after) - sum(before)
-        imu = min(sum(start <= at < end for at, _ in each) for each in result["heard"])
+        each_ms = 1e3 * (sum(after) - sum(before)) / count / (end - start)
+        alone_ms = alone_ms or each_ms
+        imu, odometry = (
+            min(sum(start <= at < end for at, *_ in each) for each in heard) / (end - start)
+            for heard in (result["heard"], result["odometries"])
+        )
         rows.append(
-            f"| {count} | {1e3 * spent / count / (end - start):.1f} "
-            f"| {imu / (end - start):.1f} | {min(result['odometries'])} |"
+            f"| {count} | {each_ms:.1f} | {each_ms / alone_ms:.2f} | {imu:.1f} | {odometry:.1f} |"
         )
     return rows
+
+
+def split(seconds: float) -> list[str]:
+    """Where the processor time goes; rows of a table."""
+    with TemporaryDirectory() as folder, Stage(1) as stage, ear("ours") as listener:
+        told = Path(folder) / "split"
+        before = f"import sys; sys.path.insert(0, {str(HERE)!r}); import split"
+        with driver(stage.paths[0], "ours", before, SPLIT=str(told)) as program:
+            time.sleep(SETTLING_S)
+            busy_s = program.busy_s
+            time.sleep(seconds)
+            spent_s = program.busy_s - busy_s
+            listener.result()
+        stages = json.loads(told.read_text())
+    rows = ["| stage | ms per second of stream | part |", "|---|---|---|"]
+    stream_s = stages.pop("count") * TICK_S
+    per_second = {name: 1e3 * value / stream_s for name, value in stages.items()}
+    total = 1e3 * spent_s / seconds
+    per_second["everything else (executor, pacer, guard, DDS threads)"] = total - sum(
+        per_second.values()
+    )
+    for name, value in per_second.items():
+        rows.append(f"| {name} | {value:.2f} | {value / total:.0%} |")
+    return [*rows, f"| all | {total:.2f} | |"]
 
 
 def _latencies(

@@ -133,10 +133,10 @@ def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> N
     """Between two such reads the counter wrapped, and three deltas were lost with all around."""
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]
-    board.receive(b"".join(periods[:56]), 10.0)
-    came = board.receive(b"".join(periods[59:]), 12.5)
+    board.receive(b"".join(periods[:58]), 10.0)
+    came = board.receive(b"".join(periods[61:]), 12.5)
     deltas = [reading for reading in came if isinstance(reading, DisplacementReading)]
-    assert [delta.lost for delta in deltas] == [3] + [0] * 60
+    assert [delta.lost for delta in deltas] == [3] + [0] * 58
     assert not any(delta.restarted for delta in deltas)
 
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.omnibot import evidence
+from omnibot_driver.core.omnibot.calm import LENT, Walk, take_calm
 from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Context, Expectation
 from omnibot_driver.core.omnibot.frames import (
     INCOMPLETE,
@@ -41,8 +42,6 @@ DOUBT_BYTES: Final = 170
 """100 ms of the nominal stream."""
 FRAMES_TO_SETTLE: Final = 3
 """So many sure frames behind a doubtful one, and nothing more will be learnt about it."""
-FRAMES_TO_RECONSIDER: Final = 2
-"""Where a chain of frames breaks, its last ones are in doubt."""
 
 IDLE_S: Final = 0.1
 """Longer than any adapter keeps a byte back (16 ms), and ten times the board's 10 ms tick."""
@@ -59,8 +58,6 @@ PAUSES_TO_TRUST: Final = 16
 
 IMUS_ONLY: Final = 8
 """So many IMU frames without a delta, and none is expected."""
-
-LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
 
 
 @dataclass(slots=True)
@@ -175,16 +172,20 @@ class FrameDecoder:
         held, weigh, order = self._held, self._expectation.weigh, self._pose_byte_order
         context = self._context
         at, size = 0, len(held)
-        steps: list[tuple[int, Frame, Context]] = []
+        walk = Walk()
         idle = self._gaps[0][0] if self._gaps else size + 1
         while at < size:
+            if not self._gaps or self._gaps[-1][0] <= at:  # no pause within what follows
+                at, context = take_calm(held, at, context, self._expectation, walk)
+                if at == size:
+                    continue
             length = measure(held, at)
             end = at + length
             if idle < size and self._idle_within(at, end if length > 0 else size):
                 break
             if length <= 0:
                 if length == INCOMPLETE and not closed:
-                    self._take(steps, context, found)
+                    self._take(walk, len(walk.frames), context, found)
                     return True
                 break
             frame = decode_measured(held[at:end], order)
@@ -197,17 +198,19 @@ class FrameDecoder:
             last = sharp and (self._arrived >= length or not _more_is_due(frame, context))
             lent = end == size and not last and _may_end_in_a_header(frame, context)
             if lent and not closed:
-                self._take(steps, context, found)
+                self._take(walk, len(walk.frames), context, found)
                 return True
-            steps.append((end, frame, context))
+            walk.add(end, frame, context)
             context = after
             at = end
         else:
-            self._take(steps, context, found)
+            self._take(walk, len(walk.frames), context, found)
             return True
-        if len(steps) > FRAMES_TO_RECONSIDER:
-            context = steps[-FRAMES_TO_RECONSIDER][2]
-            self._take(steps[:-FRAMES_TO_RECONSIDER], context, found)
+        believed = len(walk.frames) - len(
+            walk.before_last
+        )  # where it breaks, the last are in doubt
+        if believed > 0:
+            self._take(walk, believed, Context._make(walk.before_last[0]), found)
         return False
 
     def _goes_on(self, at: int, closed: bool) -> bool:
@@ -221,26 +224,24 @@ class FrameDecoder:
         at += length
         return at == len(held) or measure(held, at) != NO_FRAME
 
-    def _take(
-        self, steps: list[tuple[int, Frame, Context]], after: Context, found: list[Frame]
-    ) -> None:
-        """Believe these frames, which stand in a row from the first byte held."""
-        if not steps:
+    def _take(self, walk: Walk, count: int, after: Context, found: list[Frame]) -> None:
+        """Believe the first so many of these frames."""
+        if not count:
             return
-        self.statistics.frames += len(steps)
-        for _, frame, before in steps[::8]:
-            if type(frame) is ImuFrame and before.imu is not None and not before.imus & 3:
-                self._expectation.learn(frame, before.imu)
-        found += [frame for _, frame, _ in steps]
-        self.skipped += [self._dropped] + [0] * (len(steps) - 1)
+        self.statistics.frames += count
+        for number, frame, before in walk.lessons:
+            if number < count:
+                self._expectation.learn(frame, before)
+        found += walk.frames[:count]
+        self.skipped += [self._dropped] + [0] * (count - 1)
         self._dropped = 0
         self._context = after
         if self._gaps:
             start = 0
-            for end, _, _ in steps:
+            for end in walk.ends[:count]:
                 self._compare_pauses(start, end)
                 start = end
-        self._forget(steps[-1][0])
+        self._forget(walk.ends[count - 1])
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
         """In doubt: take what is sure, drop what stays doubtful. Whether anything was settled."""
@@ -251,8 +252,9 @@ class FrameDecoder:
         for piece, sure in self._settled(pieces, len(stretch), half, closed):
             if sure:
                 self._drop(piece.start - at)
-                step = piece.end - piece.start, piece.frame, piece.before
-                self._take([step], piece.after, found)
+                walk = Walk()
+                walk.add(piece.end - piece.start, piece.frame, piece.before)
+                self._take(walk, 1, piece.after, found)
                 self._in_step = True
             else:
                 self._drop(piece.end - at)
@@ -302,7 +304,9 @@ class FrameDecoder:
     def _forget(self, count: int) -> None:
         del self._held[:count]
         self._wait_for = 0
-        if self._gaps:
+        if self._gaps and self._gaps[-1][0] < count:
+            self._gaps = []
+        elif self._gaps:
             self._gaps = [(a - count, b - count, p) for a, b, p in self._gaps if a >= count]
 
     def _idle_within(self, start: int, end: int) -> bool:

@@ -111,6 +111,9 @@ class Expectation:
         self._gyro_scatter = 100.0
         self._accel_limit = 2400.0
         self._gyro_limit = 800.0
+        self.calm = self._lightest, self._heaviest, self._accel_limit, self._gyro_limit
+        """Between the first two the squared norm of an acceleration costs nothing; nor does a step
+        of less than the third in one of its words, or than the fourth in one of the gyro's."""
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
         """The cost of a whole frame's content, and what is known after it."""
@@ -188,6 +191,7 @@ class Expectation:
         self._gyro_scatter += (d_gyro - self._gyro_scatter) / 8
         self._accel_limit = 6 * self._accel_scatter + 100
         self._gyro_limit = 6 * self._gyro_scatter + 30
+        self.calm = self._lightest, self._heaviest, self._accel_limit, self._gyro_limit
 
 
 def _leaps(now: Words, before: Words, limit: float) -> int:

@@ -35,6 +35,7 @@ _PAUSED_COUNT_BEGUN: Final = re.compile(rb"\d{0,3} ?\r?")
 _HEADER_BEGIN: Final = IMU_HEADER[0]
 _TEXT_BEGIN: Final = _PAUSED_WORD[0]
 IMU_LENGTH: Final = _IMU.size
+DELTA_LENGTH: Final = _DELTA.size
 _LENGTH_BY_TYPE: Final[dict[int, int]] = {
     IMU_HEADER[1]: _IMU.size,
     DELTA_HEADER[1]: _DELTA.size,

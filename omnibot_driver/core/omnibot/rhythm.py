@@ -35,19 +35,17 @@ class Rhythm:
             passed = self._cycle[self._next]
             skipped -= LENGTH[passed]
             self._lost += passed is ImuFrame
-            self._advance()
+            self._next = (self._next + 1) % len(self._cycle)
         self._imus = self._imus + 1 if kind is ImuFrame else 0
         if kind is not ImuFrame:
             self._cycle = NOMINAL
         elif self._imus >= IMU_FRAMES_ALONE:
             self._cycle, self._next = IMU_ONLY, 0
-        while self._cycle[self._next] is not kind:
-            self._advance()
-        self._advance()
+        cycle, at = self._cycle, self._next
+        while cycle[at] is not kind:
+            at = (at + 1) % len(cycle)
+        self._next = (at + 1) % len(cycle)
         if kind is PoseFrame:
             return 0
         lost, self._lost = self._lost, 0
         return lost
-
-    def _advance(self) -> None:
-        self._next = (self._next + 1) % len(self._cycle)

@@ -5,8 +5,9 @@ delta and has a counter of its own, so it can tell of losses before the next del
 knows nothing of what is in a frame.
 """
 
-from dataclasses import dataclass
 from typing import Final
+
+from omnibot_driver.core.values import value
 
 DELTA_PERIOD_S: Final = 0.04
 DELTAS_PER_POSE: Final = 5
@@ -18,11 +19,11 @@ LATE_S: Final = 0.5
 buffer of the host's (4096 bytes, 2.4 s) that lacks one byte in ten is told 0.24 s wrong; this is
 twice as much."""
 EARLY_S: Final = 0.2
-"""A count from zero may be by so much ahead of the time since the last delta: that one was told late
-by a full buffer. A restart alone takes longer."""
+"""A count from zero may be so much ahead of the time since the last delta, which was told as
+late. To restart takes longer."""
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Step:
     """From one delta to the next: ``lost`` between them that no pose has told of.
 

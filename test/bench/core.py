@@ -1,0 +1,152 @@
+"""The core alone: decoding against a trusting loop, linearity, memory over an hour of stream."""
+
+import gc
+import os
+import struct
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from random import Random
+
+from ratios import Figure, alternate, short
+from truth import FAULTS, SCENARIOS, generate, receive
+
+from omnibot_driver import parameters
+from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, OmniBot, PoseFrame
+from omnibot_driver.core.omnibot.frames import Frame
+from omnibot_driver.core.session import Session
+
+BYTES_PER_S = 1700.0
+CHUNKS = (1, 14, 64, 4096)
+SECONDS = 120.0
+GOALS = {"clean": 1.5, "1 byte in 100 lost": 4.0}
+
+_IMU, _DELTA, _POSE = (struct.Struct(form).unpack_from for form in (">6h", ">3hB", ">3fB"))
+
+
+def trust(data: bytes) -> list[Frame]:
+    """The floor: every header is one, and a frame follows it."""
+    frames: list[Frame] = []
+    at, size = 0, len(data) - 15
+    while at < size:
+        kind = data[at + 1]
+        if kind == 0xFA:
+            ax, ay, az, gx, gy, gz = _IMU(data, at + 2)
+            frames.append(ImuFrame((ax, ay, az), (gx, gy, gz)))
+            at += 14
+        elif kind == 0xFB:
+            frames.append(DeltaFrame(*_DELTA(data, at + 2)))
+            at += 9
+        elif kind == 0xFC:
+            frames.append(PoseFrame(*_POSE(data, at + 2)))
+            at += 15
+        else:
+            at += 1
+    return frames
+
+
+def decode(chunks: Sequence[bytes]) -> int:
+    """With arrival times of a line that is never idle; how many frames there were."""
+    decoder, now, frames = FrameDecoder(), 0.0, 0
+    for chunk in chunks:
+        now += len(chunk) / BYTES_PER_S
+        frames += len(decoder.feed(chunk, now))
+    return frames
+
+
+def stream(seconds: float, fault: str = "") -> bytes:
+    """Of a robot that drives; whole, or with this fault."""
+    truth = generate(SCENARIOS["driving"], 1, seconds)
+    return receive(truth, FAULTS[fault], Random(1)).data if fault else bytes(truth.data)
+
+
+def decoding(times: int) -> list[Figure]:
+    """Per frame, clean and faulty, in all chunkings."""
+    figures = []
+    for name, fault in (("clean", ""), ("1 byte in 100 lost", "1 byte in 100 lost")):
+        data = stream(SECONDS if not fault else SECONDS / 4, fault)
+        frames = len(trust(data))
+        for size in CHUNKS:
+            chunks = [data[at : at + size] for at in range(0, len(data), size)]
+            figures.append(
+                alternate(
+                    f"decoding one frame, {name}, {size} byte{'s' * (size > 1)} at a time",
+                    "µs",
+                    partial(_us_per_frame, decode, chunks, frames),
+                    partial(_us_per_frame, trust, data, frames),
+                    times=times,
+                    goal=GOALS[name] if size == CHUNKS[-1] else None,
+                )
+            )
+    return figures
+
+
+def linearity() -> list[str]:
+    """Time per megabyte over three orders of magnitude; rows of a table."""
+    rows = ["| stream | 1 MB | 10 MB | 100 MB |", "|---|---|---|---|"]
+    for name, fault, most in (("clean", "", 100), ("1 byte in 100 lost", FAULTY, 10)):
+        block = stream(600.0, fault)[: 1 << 20]
+        cells = []
+        for megabytes in (1, 10, 100):
+            if megabytes > most:
+                cells.append("—")
+                continue
+            chunks = [block[at : at + 4096] for at in range(0, len(block), 4096)] * megabytes
+            cells.append(f"{_seconds(decode, chunks) / megabytes:.3f} s/MB")
+        rows.append(f"| {name} | {' | '.join(cells)} |")
+    return rows
+
+
+def memory(hours: float = 1.0) -> str:
+    """Bytes through decoder and session as fast as it goes; resident memory meanwhile."""
+    settings = parameters.check_all({})
+    session = Session(
+        OmniBot(parameters.board_settings(settings)),
+        parameters.session_settings(settings),
+        run=True,
+    )
+    session.opened(0.0)
+    data, now, events = stream(SECONDS), 0.0, 0
+    resident_mb = []
+    ends = [*range(38, len(data), 38), len(data)]
+    begun = time.perf_counter()
+    while now < hours * 3600:
+        if now >= len(resident_mb) * hours * 600:
+            gc.collect()
+            resident_mb.append(_resident_mb())
+        start = 0
+        for end in ends:
+            now += (end - start) / BYTES_PER_S
+            session.receive(data[start:end], now)
+            session.take_output(now)
+            events += len(session.take_events())
+            start = end
+    resident_mb.append(_resident_mb())
+    figures = ", ".join(f"{each:.1f}" for each in resident_mb)
+    return (
+        f"Core: {short(hours)} hour of stream ({events:,} events) through decoder and session in"
+        f" {time.perf_counter() - begun:.0f} s; resident at the start and every sixth of it:"
+        f" {figures} MB."
+    )
+
+
+FAULTY = "1 byte in 100 lost"
+
+
+def _us_per_frame(work: object, data: object, frames: int) -> float:
+    return 1e6 * _seconds(work, data) / frames
+
+
+def _seconds(work: object, data: object) -> float:
+    """Processor time of one call, so that others on the machine count little."""
+    assert callable(work)
+    gc.collect()
+    begun = time.process_time()
+    work(data)
+    return time.process_time() - begun
+
+
+def _resident_mb() -> float:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

@@ -1,0 +1,74 @@
+"""The performance report: ``make bench`` prints it and writes it into docs/performance.md.
+
+Every figure is measured beside its floor on the same machine in the same minutes. ``--quick`` makes
+everything short, to see whether it runs. Ends with 1 when a goal is missed.
+"""
+
+import argparse
+import os
+import platform
+import sys
+from pathlib import Path
+
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # users have their bytecode
+os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+sys.path.insert(0, str(Path(__file__).parents[1] / "integrity"))  # its generator of streams
+
+import core
+import system
+from ratios import Figure, table
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "performance.md"
+BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
+SCALES = (1, 2, 4, 8, 16)
+
+
+def say(what: str) -> None:
+    """What is under way."""
+    print(f"... {what}", file=sys.stderr, flush=True)
+
+
+def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
+    """All figures with a floor, and the sections behind their table."""
+    windows = 2 if quick else 12
+    say("latency and processor time")
+    figures, node_memory = system.measurements(windows)
+    figures.append(system.commands(windows))
+    say("start")
+    figures += [system.starts(1 if quick else 5), system.imports(2 if quick else 7)]
+    say("decoding")
+    figures += core.decoding(1 if quick else 7)
+    say("split")
+    sections = ["", "Processor time of the driver by stage:", "", *system.split(5 if quick else 30)]
+    say("many drivers")
+    scale = system.scale(SCALES[:2] if quick else SCALES, 3 if quick else 15)
+    sections += ["", "Drivers side by side on this machine, each with a board:", "", *scale]
+    say("linearity")
+    sections += ["", "Time to decode, by the length of the stream:", "", *core.linearity()]
+    say("memory")
+    sections += ["", f"{core.memory(0.1 if quick else 1.0)} {node_memory}"]
+    return figures, sections
+
+
+def main() -> int:
+    """Run, print, write."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--quick", action="store_true")
+    chosen = arguments.parse_args()
+    figures, sections = measure(quick=chosen.quick)
+    machine = (
+        f"{os.cpu_count()} processors, load {os.getloadavg()[2]:.1f} over the last 15 minutes,"
+        f" Linux {platform.release()}, Python {platform.python_version()}:"
+    )
+    text = "\n".join([machine, "", *table(figures), *sections])
+    print(text)
+    if not chosen.quick:
+        document = DOCUMENT.read_text()
+        before, rest = document.split(BEGIN)
+        after = rest.split(END)[1]
+        DOCUMENT.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}")
+    return 0 if all(each.goal is None or each.ratio <= each.goal for each in figures) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,56 @@
+"""Where the driver's processor time goes: timers of its reader's own time, around the stages.
+
+Run in the driver's process before it starts; at its end it writes a JSON object of seconds per
+stage, and how many reads there were, to the file that SPLIT names.
+"""
+
+import atexit
+import json
+import os
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from rclpy.publisher import Publisher
+
+from omnibot_driver.core.omnibot.decoder import FrameDecoder
+from omnibot_driver.core.session import Session
+from omnibot_driver.port import Port
+from omnibot_driver.publishing import Publishing
+
+spent: dict[str, float] = {}
+within: list[float] = []
+reads = {"count": 0}
+
+
+def timed(owner: type, name: str, stage: str) -> None:
+    """Count the time of this method for its stage, without that of the stages called from it."""
+    method: Callable[..., Any] = getattr(owner, name)
+
+    def measured(*arguments: Any) -> Any:
+        if threading.current_thread().name != "omnibot-reader":
+            return method(*arguments)
+        within.append(0.0)
+        begun = time.thread_time()
+        try:
+            return method(*arguments)
+        finally:
+            passed = time.thread_time() - begun
+            reads["count"] += stage == "read"
+            spent[stage] = spent.get(stage, 0.0) + passed - within.pop()
+            if within:
+                within[-1] += passed
+
+    setattr(owner, name, measured)
+
+
+timed(Port, "read", "read")
+timed(FrameDecoder, "feed", "decode")
+timed(Session, "receive", "measure (clock, plausibility, odometry, IMU)")
+timed(Publishing, "deliver", "convert (stamps, serialising)")
+timed(Publisher, "publish", "publish")
+timed(threading.Thread, "run", "the rest of the reader (lock, commands due, state)")
+
+atexit.register(lambda: Path(os.environ["SPLIT"]).write_text(json.dumps(spent | reads)))

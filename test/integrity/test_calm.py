@@ -1,0 +1,84 @@
+"""The quick loop for calm frames takes exactly what the decoder's own loop takes."""
+
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from truth import CHUNKERS, FAULTS, SCENARIOS, generate, receive
+
+from omnibot_driver.core.omnibot import FrameDecoder, decoder
+from omnibot_driver.core.omnibot.decoder import DecoderStatistics
+from omnibot_driver.core.omnibot.frames import Frame
+
+SECONDS = 6.0
+Outcome = list[tuple[list[Frame], list[int], DecoderStatistics]]
+Chunks = list[tuple[bytes, float]]
+
+TRUTHS = {name: generate(scenario, 11, SECONDS) for name, scenario in SCENARIOS.items()}
+
+
+def outcome(chunks: Chunks, *, quick: bool) -> Outcome:
+    """What comes out of each call, and what is counted."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not quick:
+            patch.setattr(decoder, "take_calm", lambda _held, at, context, *_: (at, context))
+        tested = FrameDecoder()
+        found: Outcome = []
+        for data, now in chunks:
+            frames = tested.feed(data, now)
+            found.append((frames, tested.skipped, tested.statistics))
+        found.append((tested.flush(now + 1.0), tested.skipped, tested.statistics))
+    return found
+
+
+def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
+    """A damaged stream as it arrives."""
+    random = Random(f"{scenario} {fault} {chunker} {seed}")
+    received = receive(TRUTHS[scenario], FAULTS[fault], random)
+    chunks, start = [], 0
+    for end, now in CHUNKERS[chunker](received, random):
+        chunks.append((received.data[start:end], now))
+        start = end
+    return chunks
+
+
+@pytest.mark.parametrize("chunker", CHUNKERS)
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_streams_come_out_alike(scenario: str, fault: str, chunker: str) -> None:
+    """Damaged or not, call by call, with the same counts."""
+    chunks = chunks_of(scenario, fault, chunker, 1)
+    assert outcome(chunks, quick=True) == outcome(chunks, quick=False)
+
+
+pieces = st.sampled_from(
+    [bytes(TRUTHS["at rest, noisy gyro"].data[at : at + 42]) for at in range(0, 1700, 13)]
+) | st.binary(max_size=20)
+
+
+@settings(deadline=None, max_examples=200)
+@given(st.lists(st.tuples(pieces, st.sampled_from([0.0, 0.001, 0.01, 0.2])), min_size=1))
+def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, float]]) -> None:
+    """In any order, with any pauses."""
+    now, chunks = 0.0, []
+    for data, pause_s in arrivals:
+        now += pause_s
+        chunks.append((data, now))
+    assert outcome(chunks, quick=True) == outcome(chunks, quick=False)
+
+
+def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Or the tests above would compare nothing: hardly an IMU frame is weighed."""
+    weighed = []
+    weigh = decoder.Expectation.weigh
+
+    def count(self: decoder.Expectation, frame: Frame, before: decoder.Context) -> object:
+        weighed.append(type(frame))
+        return weigh(self, frame, before)
+
+    monkeypatch.setattr(decoder.Expectation, "weigh", count)
+    chunks = chunks_of("driving", "none, starting anywhere", "whole bursts", 1)
+    found = outcome(chunks, quick=True)
+    imus = sum(type(frame) is decoder.ImuFrame for frames, _, _ in found for frame in frames)
+    assert weighed.count(decoder.ImuFrame) < 0.1 * imus

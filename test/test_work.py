@@ -1,0 +1,94 @@
+"""How much Python is called for each tick of the nominal stream: a guard that counts, not times.
+
+A bound is a little above what was counted when it was set. Whoever makes the path longer raises it,
+and says in docs/performance.md what for.
+"""
+
+import sys
+from collections.abc import Callable
+from types import FrameType
+
+import pytest
+
+from omnibot_driver import parameters
+from omnibot_driver.cdr import Serializer
+from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.omnibot import FrameDecoder, OmniBot
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.session import Session
+from omnibot_driver.core.uncertainty import Covariance
+from omnibot_driver.messages import MessageSettings
+from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+
+TICK_S = 0.01
+SETTLED = 400
+TICKS = 400
+IMU, DELTA, POSE = 14, 14 + 9, 14 + 9 + 15
+"""What a tick brings, by its length in bytes."""
+
+
+def calls(work: Callable[[], object]) -> int:
+    """How many functions in Python this calls."""
+    count = 0
+
+    def see(_frame: FrameType, event: str, _argument: object) -> None:
+        nonlocal count
+        count += event == "call"
+
+    before = sys.getprofile()
+    sys.setprofile(see)
+    try:
+        work()
+    finally:
+        sys.setprofile(before)
+    return count
+
+
+def most_calls(work: Callable[[bytes, float], object]) -> dict[int, float]:
+    """For each kind of tick of a running board, the mean over many of them."""
+    board = SimulatedBoard(BoardSettings(seed=3, running=True))
+    counted: dict[int, list[int]] = {}
+    for tick in range(SETTLED + TICKS):
+        data, now = board.step(), tick * TICK_S
+        if tick < SETTLED:
+            work(data, now)
+        else:
+            counted.setdefault(len(data), []).append(calls(lambda: work(data, now)))  # noqa: B023
+    return {length: sum(each) / len(each) for length, each in counted.items()}
+
+
+@pytest.mark.parametrize(("kind", "bound"), [(IMU, 20), (DELTA, 26), (POSE, 38)])
+def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
+    """One read of one tick."""
+    assert most_calls(FrameDecoder().feed)[kind] <= bound
+
+
+@pytest.mark.parametrize(("kind", "bound"), [(IMU, 97), (DELTA, 245), (POSE, 475)])
+def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
+    """From the bytes of one read to its events, and what the link asks after each."""
+    values = parameters.check_all({})
+    session = Session(
+        OmniBot(parameters.board_settings(values)), parameters.session_settings(values), run=True
+    )
+    session.opened(0.0)
+    session.take_output(0.0)
+
+    def work(data: bytes, now: float) -> None:
+        session.receive(data, now)
+        session.take_output(now)
+        assert session.wake_at > now
+        session.take_events()
+
+    assert most_calls(work)[kind] <= bound
+
+
+def test_a_serialised_tick_calls_no_more_than_it_did() -> None:
+    """An Imu, an Odometry and a JointState from their estimates."""
+    make = Serializer(MessageSettings.from_parameters(parameters.check_all({})))
+    imu = ImuEstimate(0.0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
+    pose, twist = Pose(1.0, 2.0, 3.0), BodyTwist(0.1, 0.2, 0.3)
+    odometry = OdometryEstimate(0.0, pose, twist, Covariance(), pose, twist)
+    assert calls(lambda: make.imu(imu, 0)) <= 2
+    assert calls(lambda: (make.odometry(odometry, 0), make.joint_state(odometry, 0))) <= 8
