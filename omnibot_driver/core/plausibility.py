@@ -5,6 +5,10 @@ reading, away from all before it and back again with the next. A leap that lasts
 leaping, is a shock, and true. So what leaps waits for the next reading of its kind, and comes out
 with it unless it is refused; nothing else ever waits.
 
+A knock may move one axis of an accelerometer for one reading, and then it is true. There a leap is
+impossible only if it has the size of a bit: a changed bit moves a word by its full scale, a half
+of it, a quarter, and by nothing in between.
+
 A refused displacement is as if it had been lost on the line. This module knows readings and the
 robot's limits; it knows no bytes and no clock.
 """
@@ -32,8 +36,9 @@ OUT_OF_PROPORTION: Final = 3.0
 CALMING: Final = 0.95
 """What a reading leaves of the largest step before it: after 20 of them a third."""
 STILL: Final = 0.08
-"""Part of a leap by which the sensor's other words may move, and all of them when it is over. A
-knock, however short, moves more."""
+"""Part of a leap by which the sensor's other words may move, and all of them when it is over."""
+END_OF_SCALE: Final = 0.99996
+"""Part of full scale, just below the largest positive word."""
 BACK: Final = 0.25
 """Part of a leap that may be left when a robot that drives is back where it was."""
 
@@ -43,7 +48,7 @@ class MotionLimits:
     """What the robot can never exceed, pushed by hand too.
 
     ``force_step_mps2``: the least change of specific force, from one reading to the next, that is
-    looked at twice.
+    looked at twice; ``full_scale_mps2``: of the accelerometer.
     """
 
     fastest_mps: float = 2.0
@@ -51,6 +56,7 @@ class MotionLimits:
     fastest_mps2: float = 15.0
     fastest_radps2: float = 50.0
     force_step_mps2: float = 4.0
+    full_scale_mps2: float = 19.6133
 
 
 @value(frozen=True, slots=True)
@@ -106,7 +112,9 @@ class Plausibility:
         turn = self.limits.fastest_radps2 * self._tick_s
         (x, y, z), (u, v, w) = reading.specific_force, reading.angular_velocity
         values = (x / force, y / force, z / force, u / turn, v / turn, w / turn)
-        was_flip, leaps = self._imu_leaps.judge(values)
+        was_flip, leaps = self._imu_leaps.judge(
+            values, topmost_bit=self.limits.full_scale_mps2 / force
+        )
         held, self._held_imu = self._held_imu, []
         if was_flip:
             self.refused_imu += 1
@@ -182,7 +190,7 @@ class _Leaps:
     """Finds single leaps in a row of values, each in units of what it may change by at once.
 
     ``left``: what may be left of a leap that is over, as a part of it; ``knocked``: so many of the
-    first values may leap in a knock and be back, and then others move too; the rest never can.
+    first values may leap in a knock and be back; the rest never can.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -196,8 +204,13 @@ class _Leaps:
         self._leaping: Sequence[float] | None = None
         self._restless = 0.0
 
-    def judge(self, values: Sequence[float], periods: int = 1) -> tuple[bool, bool]:
-        """Whether the leap before was a single one, and whether these values leap themselves."""
+    def judge(
+        self, values: Sequence[float], periods: int = 1, topmost_bit: float = 0.0
+    ) -> tuple[bool, bool]:
+        """Whether the leap before was a single one, and whether these values leap themselves.
+
+        ``topmost_bit``: what it is worth in those that may be knocked.
+        """
         leaping, self._leaping = self._leaping, None
         was_single = False
         if leaping is not None and self._sure is not None:
@@ -216,12 +229,23 @@ class _Leaps:
         largest = max(steps)
         if largest > least:
             alone = sorted(steps)[-2] <= self._left * largest
-            if alone or max(steps[self._knocked :]) > least:
+            value = abs(values[steps.index(largest)])
+            flipped = alone and self._is_a_bit(largest, value, topmost_bit)
+            if flipped or max(steps[self._knocked :]) > least:
                 self._leaping = values
                 return was_single, True
         self._restless = max(CALMING * self._restless, largest)
         self._sure = values
         return was_single, False
+
+    def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
+        """As far as can be told from values that move by themselves. What ends at the end of the
+        scale was knocked."""
+        slack = OUT_OF_PROPORTION * self._restless
+        bit = topmost if value < END_OF_SCALE * topmost else 0.0
+        while bit > step + slack:
+            bit /= 2
+        return abs(step - bit) <= slack
 
 
 def _steps(before: Sequence[float], after: Sequence[float]) -> list[float]:

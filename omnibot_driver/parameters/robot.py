@@ -116,8 +116,8 @@ ROBOT: Final = (
         "largest_force_step",
         4.0,
         "m/s²",
-        "A single leap of one axis of the accelerometer that is larger, and back with the next"
-        " reading, is refused; a shock lasts longer, or shows in other axes.",
+        "A single leap of one axis of the accelerometer that is larger, of the size of a changed"
+        " bit, and back with the next reading, is refused.",
         low=0.1,
         high=1000.0,
     ),

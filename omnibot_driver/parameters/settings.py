@@ -5,7 +5,7 @@ from typing import Any
 
 from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.commands import CommandSettings
-from omnibot_driver.core.imu import ImuScale
+from omnibot_driver.core.imu import STANDARD_GRAVITY, ImuScale
 from omnibot_driver.core.inertial import ImuCorrection
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometrySettings
@@ -66,6 +66,7 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
             fastest_mps2=values["fastest_linear_acceleration"],
             fastest_radps2=values["fastest_angular_acceleration"],
             force_step_mps2=values["largest_force_step"],
+            full_scale_mps2=values["accel_range"] * STANDARD_GRAVITY,
         ),
         imu=ImuCorrection(
             gyro_bias=_vector(values["gyro_bias"]),

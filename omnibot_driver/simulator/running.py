@@ -90,9 +90,19 @@ class RunningBoard(ABC):
             if data := self._receive(max(0.0, remaining_s)):
                 with self.lock:
                     self.board.receive(data)
-            if time.monotonic() >= due_s:
-                due_s += TICK_S
+            ticks, due_s = self._due(due_s)
+            if ticks:
                 with self._ticked:
-                    data = self.line.carry(self.board.step())
+                    data = b"".join(self.line.carry(self.board.step()) for _ in range(ticks))
                     self.dropped += len(data) - self._send(data)
                     self._ticked.notify_all()
+
+    @staticmethod
+    def _due(due_s: float) -> tuple[int, float]:
+        """Ticks to be made up for, and when the next is due.
+
+        What is late comes together, as it does over a line that runs on while a machine is busy.
+        """
+        late_s = time.monotonic() - due_s
+        ticks = 0 if late_s < 0 else 1 + int(late_s / TICK_S)
+        return ticks, due_s + ticks * TICK_S

@@ -1,64 +1,25 @@
-"""Odometry over losses, pauses and restarts: against the simulated board, and as properties."""
+"""Odometry over lost frames and false poses, against the simulated board."""
 
 import math
-import struct
-from itertools import pairwise
 from random import Random
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from line import DELTA, POSE, TEXT, Line, loses_nothing
+from line import DELTA, POSE, loses_nothing
+from underway import (
+    PERIOD_S,
+    ROUNDING_M,
+    attached,
+    line,
+    lose,
+    settled,
+    steps,
+)
 
 from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
-from omnibot_driver.core.omnibot import DeltaFrame, ImuFrame, OmniBot, OmniBotSettings, encode
 from omnibot_driver.core.se2 import Pose
-from omnibot_driver.core.uncertainty import OdometryNoise
-from omnibot_driver.simulator import BoardPose, BoardSettings
-
-PERIOD_S = 0.04
-ROUNDING_M = 1.5e-3
-ROUNDING_RAD = 1.5e-3
-"""Of the deltas since the last pose."""
-DRIVEN = BoardPose(3000.0, -2000.0, 700.0)
-
-
-def line(seed: int, settings_: OdometrySettings | None = None, frame: str = "earth") -> Line:
-    """Two seconds under way, on a board that has driven before."""
-    board = BoardSettings(seed=seed, frame=frame, running=True, initial_pose=DRIVEN)
-    found = Line(board, settings_, seed=seed)
-    found.run(2.0 + seed % 5 * PERIOD_S)
-    return found
-
-
-def lose(on: Line, seconds: float, *headers: bytes) -> None:
-    """Lose everything, or what begins so, for a while."""
-    on.loses = lambda data, _now: not headers or data[:2] in headers
-    on.run(seconds)
-    on.loses = loses_nothing
-
-
-def settled(on: Line) -> bool:
-    off = on.error
-    return off.way_m < ROUNDING_M and abs(off.yaw_rad) < ROUNDING_RAD
-
-
-def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
-    """Time from one to the next, and what the pose did in it."""
-    return [
-        (after.stamp_s - before.stamp_s, after.pose - before.pose)
-        for before, after in pairwise(estimates)
-    ]
-
-
-def attached(settings_: OdometrySettings | None = None) -> Odometry:
-    """A board that stands at zero and has said so twice."""
-    odometry = Odometry(settings_ or OdometrySettings())
-    odometry.settle(PoseReading(0.0, 0.0, 0.0))
-    odometry.settle(PoseReading(0.0, 0.0, 0.0))
-    return odometry
-
 
 # Gaps
 
@@ -269,149 +230,8 @@ def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
     assert ways == pytest.approx([0.04, 0.03, 0.02, 0.01, 0.0], abs=1e-9)
 
 
-# Pauses and restarts
-
-
-@pytest.mark.parametrize("hidden", [False, True])
-@pytest.mark.parametrize("seed", range(6))
-def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
-    """P, 1.3 s, P: the robot rolls out meanwhile; with nothing of it heard, too."""
-    on = line(seed)
-    if hidden:
-        on.loses = lambda _data, _now: True
-    on.board.receive(b"P")
-    on.run(1.32)
-    on.board.receive(b"P")
-    on.run(0.2)
-    on.loses = loses_nothing
-    on.run(1.0)
-    assert settled(on), on.error
-
-
-@pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
-@pytest.mark.parametrize("seed", range(6))
-def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
-    """Text, SEQ and pose from zero; also when text or first frames are lost."""
-    on = line(seed)
-    on.drives = False
-    on.run(1.0)
-    before, true = on.estimates[-1].pose, on.board.truth
-    on.loses = lambda data, _now: data[:2] in hidden
-    on.board.receive(b"R")
-    on.run(0.9 + seed / 10)
-    on.board.receive(bytes(3) + b"S")
-    on.run(0.1)
-    on.drives, on.loses = True, loses_nothing
-    on.run(2.0)
-    was, now = Pose(true.x_m, true.y_m, true.yaw_rad), on.board.truth
-    way = was.way_to(Pose(now.x_m, now.y_m, now.yaw_rad))
-    odom_way = before.way_to(on.estimates[-1].pose)
-    assert way.way_m > 0.1
-    assert math.hypot(way.x_m - odom_way.x_m, way.y_m - odom_way.y_m) < 0.025  # one delta's age
-    assert way.yaw_rad == pytest.approx(odom_way.yaw_rad, abs=0.025)
-
-
-def test_a_restart_leaves_its_doubt_in_the_covariance_for_good() -> None:
-    """Nobody will ever know how the robot rolled out."""
-    on = line(1)
-    before = on.estimates[-1].covariance
-    on.board.receive(b"R")
-    on.run(1.0)
-    on.board.receive(bytes(3) + b"S")
-    after = on.run(2.0)[-1].covariance
-    assert after.xx > before.xx + 0.003
-    assert after.yaw_yaw > before.yaw_yaw + 0.01
-
-
-def test_a_driver_that_restarts_begins_at_the_identity() -> None:
-    """Whatever the board's pose is, and follows it from there."""
-    on = line(1)
-    on.bot, on.odometry = OmniBot(OmniBotSettings()), Odometry(OdometrySettings())
-    on.attached = on.told
-    first = on.run(0.44)[0].pose
-    assert first.way_m < 0.03
-    on.run(3.0)
-    assert settled(on)
-
-
-def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """The robot is at zero where it stood when it was asked for."""
-    on = line(4)
-    on.drives = False
-    lose(on, 1.0)
-    on.run(PERIOD_S)
-    on.odometry.reset()
-    on.run(2.0)
-    assert on.estimates[-1].pose.way_m < ROUNDING_M
-
-
-def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
-    """It drove on for three seconds unheard."""
-    on = line(2)
-    on.loses = lambda _data, _now: True
-    on.run(3.0)
-    on.bot.connect()
-    on.loses = loses_nothing
-    on.run(1.0)
-    assert settled(on), on.error
-
-
-# Rounding
-
-
-@pytest.mark.parametrize(("frame", "count"), [("earth", 90_000), ("body", 15_000)])
-def test_an_hour_of_rounded_displacements_stays_within_2_mm_and_2_mrad(
-    frame: str, count: int
-) -> None:
-    """90,000 of them, each rounded by itself to 0.1 mm and 0.1 mrad, and a pose after every 5."""
-    odometry = attached()
-    x = y = yaw = worst_m = worst_rad = 0.0
-    for number in range(1, count + 1):
-        t = number * PERIOD_S
-        speed, turn = 0.012 * math.sin(0.11 * t) + 0.006, 0.02 * math.sin(0.037 * t) + 0.003
-        dx, dy = speed * math.cos(yaw + turn / 2), speed * math.sin(yaw + turn / 2)
-        told = (dx, dy) if frame == "earth" else (speed * (turn / 2) / math.sin(turn / 2), 0.0)
-        x, y, yaw = x + dx, y + dy, yaw + turn
-        rounded = (round(value * 1e4) / 1e4 for value in (*told, turn))
-        (estimate,) = odometry.displace(DisplacementReading(*rounded, frame, PERIOD_S, 0), t)
-        if number % 5 == 0:
-            odometry.settle(PoseReading(*(float32(value * 1000) / 1000 for value in (x, y, yaw))))
-        worst_m = max(worst_m, math.hypot(estimate.pose.x_m - x, estimate.pose.y_m - y))
-        worst_rad = max(worst_rad, abs(estimate.pose.yaw_rad - yaw))
-    assert worst_m < 0.002
-    assert worst_rad < 0.002
-
-
-def float32(value: float) -> float:
-    (rounded,) = struct.unpack(">f", struct.pack(">f", value))
-    assert isinstance(rounded, float)
-    return rounded
-
-
-# Wheel counts
-
-
-def test_wheel_counts_go_through_the_kinematics() -> None:
-    """A turn of every wheel by -1/8 turns the robot by 2πr/8L; B against A drives it ahead."""
-    bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
-    bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)
-    odometry = Odometry(OdometrySettings())
-    frames = [DeltaFrame(-195, -195, -195, 254), DeltaFrame(-100, 100, 0, 255)]
-    rim = math.tau * 0.029 / 1560
-    expected = [
-        Pose(0.0, 0.0, 195 * rim / 0.143),
-        Pose(0.0, 0.0, 195 * rim / 0.143).moved(Pose(200 * rim / math.sqrt(3), 0.0, 0.0)),
-    ]
-    for frame, pose in zip(frames, expected, strict=True):
-        found = bot.receive(encode(frame), 0.0) + bot.flush(0.0)
-        (reading,) = found
-        assert isinstance(reading, DisplacementReading)
-        (estimate,) = odometry.displace(reading, 0.0)
-        assert estimate.pose.way_to(pose).way_m < 1e-12
-        assert estimate.pose.yaw_rad == pytest.approx(pose.yaw_rad)
-
-
 # Whatever is lost
+
 
 losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
 """How many frames come, then how many are lost, deltas and poses alike."""
@@ -464,75 +284,3 @@ def test_any_readings_give_finite_estimates_and_never_a_certain_one(
             c = estimate.covariance
             assert min(c.xx, c.yy, c.yaw_yaw) >= 1e-6
             assert math.isfinite(c.xx + c.yy + c.yaw_yaw)
-
-
-# The covariance against the truth
-
-
-def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None:
-    """Wheels of wrong size (1 %) that slip (2 %): 80 drives, squared errors by their covariance.
-
-    Their mean is 3 (x, y, yaw) for a true covariance, and with 80 of them within 2.49 and 3.56
-    nineteen times out of twenty (chi-squared of 240).
-    """
-    total = 0.0
-    for seed in range(80):
-        random = Random(seed)
-        a, b, c = (1 + random.gauss(0.0, 0.01) for _ in range(3))
-        board = BoardSettings(seed=seed, running=True, slip=0.02, wheel_radius_scale=(a, b, c))
-        on = Line(board, seed=seed)
-        estimate = on.run(12.0)[-1]
-        true = on.board.truth
-        off = estimate.pose - Pose(true.x_m, true.y_m, true.yaw_rad)
-        total += squared(off, estimate)
-    assert 2.49 < total / 80 < 3.56
-
-
-def squared(off: Pose, estimate: OdometryEstimate) -> float:
-    """The error squared over its covariance, by elimination."""
-    c = estimate.covariance
-    rows = [
-        [c.xx, c.xy, c.x_yaw, off.x_m],
-        [c.xy, c.yy, c.y_yaw, off.y_m],
-        [c.x_yaw, c.y_yaw, c.yaw_yaw, off.yaw_rad],
-    ]
-    total = 0.0
-    for pivot in range(3):
-        head = rows[pivot]
-        total += head[3] ** 2 / head[pivot]
-        for row in rows[pivot + 1 :]:
-            factor = row[pivot] / head[pivot]
-            row[:] = [value - factor * above for value, above in zip(row, head, strict=True)]
-    return total
-
-
-def test_settling_removes_nothing_but_the_gap() -> None:
-    """Drift is what the wheels do not tell, and the board's pose tells no more than they do."""
-    odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
-    ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)
-    for number in range(50):
-        (before,) = odometry.displace(ahead, 0.0)
-        odometry.settle(PoseReading(0.02 * (number + 1), 0.0, 0.0))
-    still = DisplacementReading(0.0, 0.0, 0.0, "earth", PERIOD_S, 0)
-    (after,) = odometry.displace(still, 0.0)
-    assert after.covariance.xx == pytest.approx(before.covariance.xx)
-    assert after.covariance.yaw_yaw == pytest.approx(before.covariance.yaw_yaw)
-
-
-def test_the_twist_is_as_good_as_its_default_covariance_says() -> None:
-    """Against the true velocity of robots that slip, speed up and brake: 0.02 m/s, 0.025 rad/s."""
-    linear, angular, n = 0.0, 0.0, 0
-    for seed in range(8):
-        random = Random(seed)
-        a, b, c = (1 + random.gauss(0.0, 0.01) for _ in range(3))
-        board = BoardSettings(seed=seed, running=True, slip=0.02, wheel_radius_scale=(a, b, c))
-        on = Line(board, seed=seed)
-        on.run(1.0)
-        for _ in range(100):
-            twist, true = on.run(PERIOD_S)[-1].twist, on.board.truth
-            assert twist is not None
-            linear += ((twist.vx_mps - true.vx_mps) ** 2 + (twist.vy_mps - true.vy_mps) ** 2) / 2
-            angular += (twist.yaw_rate_radps - true.yaw_rate) ** 2
-            n += 1
-    assert 0.2 * 0.02 < math.sqrt(linear / n) < 0.02
-    assert 0.2 * 0.025 < math.sqrt(angular / n) < 0.025

@@ -129,6 +129,17 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
     assert (reading.lost, reading.duration_s, reading.restarted) == (gap, 0.04, False)
 
 
+def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
+    """Between two such reads the counter wrapped, and three deltas were lost with all around."""
+    board = bot()
+    periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]
+    board.receive(b"".join(periods[:58]), 10.0)
+    came = board.receive(b"".join(periods[61:]), 12.5)
+    deltas = [reading for reading in came if isinstance(reading, DisplacementReading)]
+    assert [delta.lost for delta in deltas] == [3] + [0] * 58
+    assert not any(delta.restarted for delta in deltas)
+
+
 def test_a_regular_sequence_has_no_losses() -> None:
     """Over more than one wrap."""
     assert sum(lost(bot(), *[moved(n % 256) for n in range(600)])) == 0

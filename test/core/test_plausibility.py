@@ -63,7 +63,7 @@ def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[R
 
 
 @pytest.mark.parametrize(
-    ("word", "leap"), [(0, 4.903), (1, -9.807), (2, -39.2), (3, 0.545), (4, -1.09), (5, 8.7)]
+    ("word", "leap"), [(0, 4.903), (1, -9.807), (2, -19.613), (3, 0.545), (4, -1.09), (5, 8.7)]
 )
 def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
     word: int, leap: float
@@ -79,7 +79,7 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 
 def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
     """A robot that is set down on a slope."""
-    readings, through = row(60, {number: {0: 6.0} for number in range(50, 60)}), gate()
+    readings, through = row(60, {number: {0: 4.9} for number in range(50, 60)}), gate()
     came = admitted(readings, through)
     assert came[50] == []
     assert came[51] == readings[50:52]
@@ -96,11 +96,30 @@ def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> 
     assert through.refused_imu == 1
 
 
-@pytest.mark.parametrize("across", [0.1, -0.1, 0.3])
-def test_a_knock_of_one_reading_shows_in_other_axes_and_comes_out_at_once(across: float) -> None:
-    """However short it is."""
-    readings, through = row(60, {50: {2: 12.0, 0: 12.0 * across}}), gate()
+@pytest.mark.parametrize("across", [0.0, 0.05, -0.3])
+@pytest.mark.parametrize("knock", [12.0, -7.0, 5.6, -4.2])
+def test_a_knock_of_one_reading_that_is_no_bit_comes_out_at_once(
+    knock: float, across: float
+) -> None:
+    """However short it is, and in one axis alone."""
+    readings, through = row(60, {50: {1: knock, 0: knock * across}}), gate()
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
+
+
+def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
+    """From 1 g upwards to the end of the scale it is 1 g, but for the noise."""
+    readings, through = row(60, {}), gate()
+    readings[50] = imu(0.0, 0.0, 2 * G)
+    assert [len(found) for found in admitted(readings, through)] == [1] * 60
+
+
+@pytest.mark.parametrize(("scale_g", "leap"), [(4, 19.613), (16, 4.903), (16, 78.45)])
+def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
+    """``full_scale_mps2`` says how much."""
+    through = Plausibility(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
+    came = admitted(row(60, {50: {1: leap}}), through)
+    assert came[50] == []
+    assert through.refused_imu == 1
 
 
 @pytest.mark.parametrize("ring", [[15, -12, 9, -6, 3], [15, 14, -9, 5], [8, 15, 20, 3], [15, 5]])

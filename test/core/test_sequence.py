@@ -109,12 +109,21 @@ def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
     assert sequence.delta(200, 103.0) == Step(0, None, restarted=True)
 
 
-def test_a_read_that_comes_late_with_much_at_once_is_no_restart() -> None:
-    """Right after the counter wrapped, with one delta lost: the IMU frames came for both."""
-    sequence = Sequence()
-    sequence.delta(2, 10.0, imus=4)
-    assert sequence.delta(4, 12.4, imus=8) == Step(1)
-    assert sequence.delta(5, 12.4, imus=4) == Step(0)
+def test_a_count_that_comes_again_is_no_wrap() -> None:
+    """Framing made a delta up, ahead of its time; the true one has the same count."""
+    sequence = begun(9)
+    assert sequence.delta(10, 100.02, imus=2) == Step(0)
+    assert sequence.delta(10, 100.04, imus=2) == Step(0)
+    assert sequence.delta(11, 100.08, imus=4) == Step(0)
+    assert sequence.delta(12, 100.12, imus=4) == Step(0)
+
+
+def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it() -> None:
+    """A clock that slept while the line did not."""
+    sequence = begun(9)
+    assert sequence.delta(110, 100.04, imus=4) == Step(0)
+    assert sequence.delta(111, 100.08, imus=4) == Step(100)
+    assert sequence.delta(112, 100.12, imus=4) == Step(0)
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:

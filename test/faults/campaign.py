@@ -75,6 +75,8 @@ class Campaign:
         row.complaints += len(complaints)
         self.complaints += complaints
         print(row, *complaints, sep="\n  ", flush=True)
+        if complaints:
+            print("the log ends:", *rig.driver.lines[-20:], sep="\n    ", flush=True)
 
     def judge(self, rig: Rig, *, damaged_bytes: bool = True) -> None:
         """What one rig published."""

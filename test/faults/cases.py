@@ -60,7 +60,7 @@ def wheel_commands_of_the_wrong_size(rig: Rig) -> None:
         publisher.publish(Float32MultiArray(data=data))
         rig.wait_ticks(10)
     rig.expect_still(since, "wheel commands of the wrong size")
-    rig.probe.node.destroy_publisher(publisher)
+    rig.probe.remove(publisher)
 
 
 def flood_of_commands(rig: Rig) -> None:
@@ -77,7 +77,7 @@ def flood_of_commands(rig: Rig) -> None:
     rig.expect_still(rig.line.tick, "1,000 commands a second, then none")
     imus = sum(frame[:2] == b"\xff\xfa" for frame in rig.line.sent[sent:])
     rig.probe.wait_for(lambda: len(rig.imu) - heard >= imus)
-    rig.probe.node.destroy_publisher(publisher)
+    rig.probe.remove(publisher)
 
 
 # The line and the board
@@ -198,7 +198,7 @@ def estop_by_topic(rig: Rig) -> None:
     rig.expect_still(since, "e-stop by topic, with somebody driving on", 0.0)
     rig.hand.leave()
     rig.probe.call(SetBool, "estop", data=False)
-    rig.probe.node.destroy_publisher(publisher)
+    rig.probe.remove(publisher)
 
 
 def service_discards_the_command(service: str, rig: Rig) -> None:

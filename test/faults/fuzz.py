@@ -5,7 +5,7 @@ from collections.abc import Callable
 from random import Random
 from typing import Any, Final
 
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import PoseStamped, Twist
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy._rclpy_pybind11 import RCLError
@@ -39,6 +39,15 @@ def wheels(random: Random) -> Float32MultiArray:
     return Float32MultiArray(data=[random.choice(fitting) for _ in range(size)])
 
 
+def pose(random: Random) -> PoseStamped:
+    message = PoseStamped()
+    message.header.frame_id = random.choice(("", "odom", "map", "x" * 1000))
+    position, turn = message.pose.position, message.pose.orientation
+    position.x, position.y, position.z = (odd_float(random) for _ in range(3))
+    turn.x, turn.y, turn.z, turn.w = (odd_float(random) for _ in range(4))
+    return message
+
+
 def no_message(random: Random) -> bytes:
     """Bytes on the wire that are no message of this type, or hardly one."""
     return CDR_LITTLE_ENDIAN + random.randbytes(random.randrange(64))
@@ -68,10 +77,12 @@ def fuzz(rig: Rig, count: int, random: Random) -> None:
     publishers = [
         (probe.publisher(Twist, "cmd_vel"), twist),
         (probe.publisher(Float32MultiArray, "wheel_cmd"), wheels),
+        (probe.publisher(PoseStamped, "cmd_pose"), pose),
         (probe.publisher(Bool, "estop"), lambda random: Bool(data=random.random() < 0.1)),
     ]
     calls: list[tuple[Any, Callable[[Random], Any]]] = [
         (probe.client(Trigger, "start"), lambda _: Trigger.Request()),
+        (probe.client(Trigger, "reset"), lambda _: Trigger.Request()),
         (probe.client(Trigger, "reset_odometry"), lambda _: Trigger.Request()),
         (
             probe.client(SetBool, "pause"),
@@ -102,9 +113,9 @@ def fuzz(rig: Rig, count: int, random: Random) -> None:
     probe.call(SetBool, "estop", data=False)
     probe.call(Trigger, "start")
     for publisher, _ in publishers:
-        probe.node.destroy_publisher(publisher)
+        probe.remove(publisher)
     for client, _ in calls:
-        probe.node.destroy_client(client)
+        probe.remove(client)
     rig.findings.expect(rig.driver.process.poll() is None, "the node has died")
     heard, sent = len(rig.imu), len(rig.line.sent)
     rig.wait_ticks(200)

@@ -90,6 +90,14 @@ class Rig:
         self._terminal: Terminal | Server | None = None
 
     def __enter__(self) -> Self:
+        try:
+            self._begin()
+        except BaseException:
+            self._stack.close()
+            raise
+        return self
+
+    def _begin(self) -> None:
         self.plug()
         self._stack.callback(self.unplug)
         self.driver = self._stack.enter_context(
@@ -103,7 +111,6 @@ class Rig:
         self._diagnostics = self.probe.listen(DiagnosticArray, "/diagnostics")
         self.probe.wait_for_state("nominal")
         self.hand = self.make_hand()
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()

@@ -38,7 +38,7 @@ def two_commanders(rig: Rig) -> None:
         rig.wait_ticks(3)
     rig.hand.leave()
     rig.expect_still(rig.line.tick, "two commanders cease")
-    rig.probe.node.destroy_publisher(publisher)
+    rig.probe.remove(publisher)
 
 
 def other_type(rig: Rig) -> None:
@@ -75,7 +75,7 @@ def flood_of_releases(rig: Rig) -> None:
     rig.findings.expect(rig.estops[-1].data, "the e-stop was released")
     rig.hand.leave()
     rig.probe.call(SetBool, "estop", data=False)
-    rig.probe.node.destroy_publisher(publisher)
+    rig.probe.remove(publisher)
 
 
 def everybody_calls_at_once(rig: Rig) -> None:
@@ -99,7 +99,7 @@ def everybody_calls_at_once(rig: Rig) -> None:
         rig.probe.wait_for_future(future)
     rig.expect_still(since, "everybody calls", 1.0)
     for client, _ in clients:
-        rig.probe.node.destroy_client(client)
+        rig.probe.remove(client)
     rig.probe.call(SetBool, "estop", data=False)
     rig.probe.call(Trigger, "start")
 
@@ -154,7 +154,7 @@ def flood_into_a_full_port(rig: Rig) -> None:
             rig.wait_ticks(1)
     rig.probe.wait_for_state("nominal")
     rig.expect_still(rig.line.tick, "a flood into a full port ends", TIMEOUT_S)
-    rig.probe.node.destroy_publisher(publisher)
+    rig.probe.remove(publisher)
 
 
 def guard_killed(rig: Rig) -> None:

@@ -11,10 +11,11 @@ import threading
 from pathlib import Path
 from typing import Self
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 """How long an event is awaited before a test gives up; nobody asserts how long it took."""
 
-_namespaces = (f"robot{number}" for number in itertools.count())
+_namespaces = (f"robot{os.getpid()}_{number}" for number in itertools.count())
+"""Of their own also beside another run of the tests that has come by the same ROS domain."""
 
 
 class Driver:

@@ -98,7 +98,12 @@ class Probe:
         timer = self.node.create_timer(0.02, look)
         self._executor.wake()
         assert held.wait(PATIENCE_S), "the graph does not come to look like that"
-        self.node.destroy_timer(timer)
+        self.remove(timer)
+
+    def remove(self, entity: Any) -> None:
+        """A publisher, client or timer; by the executor, which must not wait for one that goes."""
+        destroy = getattr(self.node, f"destroy_{type(entity).__name__.lower()}")
+        self.wait_for_future(self._executor.create_task(destroy, entity))
 
     def client(self, kind: type, service: str) -> Any:
         client = self.node.create_client(kind, f"omnibot_driver/{service}")

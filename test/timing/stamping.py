@@ -6,7 +6,7 @@ decoder and clock as a session uses them. What is true of every stamp is asserte
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -15,15 +15,21 @@ from statistics import fmean
 
 sys.path.append(str(Path(__file__).parents[1] / "integrity"))
 
-from truth import CHUNKERS, SCENARIOS, TICK_S, Chunks, Received, generate, receive
+from truth import CHUNKERS, SCENARIOS, TICK_S, Chunks, Received, Truth, generate, receive
 
-from omnibot_driver.core.board import ImuReading
+from omnibot_driver.core.board import ImuReading, PausedReading
 from omnibot_driver.core.device_clock import DeviceClock
 from omnibot_driver.core.imu import ImuScale
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 
 JITTER_S = 60e-6
 """Mean of the host's own delay at each read, exponentially distributed."""
+EPOCH_S = 100.0
+SETTLED_S = 2.0
+EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stall of 2 s": 2.0}
+"""What happens after half of a stream, and for how long the host reads nothing."""
+RESTART = "the board restarts"
+BOOT_S = 0.7123
 
 
 def ftdi_restarted(received: Received, random: Random) -> Chunks:
@@ -50,26 +56,33 @@ LINES: dict[str, Callable[[Received, Random], Chunks]] = {
 
 @dataclass(slots=True)
 class Stamped:
-    """(tick, stamp, arrival) of the samples that came out; the true period of the ticks."""
+    """(tick, stamp, arrival) of the samples that came out; when each tick really was."""
 
-    period_s: float
+    sampled_s: list[float]
+    restarted_s: float
     samples: list[tuple[int, float, float]] = field(default_factory=list)
 
-    def errors(self, since_s: float = 2.0) -> list[float]:
-        """Stamp less sampling time, from so long after the first sample."""
-        begin = self.samples[0][1] + since_s
-        return [at - tick * self.period_s for tick, at, _ in self.samples if at >= begin]
+    def errors(self, since_s: float = SETTLED_S) -> list[float]:
+        """Stamp less sampling time, from so long after the first sample and after a restart."""
+        return [at - self.sampled_s[tick] for tick, at, _ in self._settled(since_s)]
 
-    def unevenness(self, since_s: float = 2.0) -> float:
+    def unevenness(self, since_s: float = SETTLED_S) -> float:
         """Standard deviation of the steps between successive samples from 10 ms."""
-        begin = self.samples[0][1] + since_s
         return math.sqrt(
             fmean(
                 (b[1] - a[1] - TICK_S) ** 2
-                for a, b in pairwise(self.samples)
-                if a[1] >= begin and b[0] == a[0] + 1
+                for a, b in pairwise(self._settled(since_s))
+                if b[0] == a[0] + 1
             )
         )
+
+    def _settled(self, since_s: float) -> list[tuple[int, float, float]]:
+        begins = (self.sampled_s[self.samples[0][0]], self.restarted_s)
+        return [
+            sample
+            for sample in self.samples
+            if not any(0.0 <= self.sampled_s[sample[0]] - begin < since_s for begin in begins)
+        ]
 
 
 def spread(errors: list[float], part: float = 0.99) -> float:
@@ -79,35 +92,90 @@ def spread(errors: list[float], part: float = 0.99) -> float:
     return min(high - low for low, high in ends) / 2
 
 
-def stamp(line: str, scenario: str, loss: float, skew: float, seed: int, seconds: float) -> Stamped:
+def stamp(
+    line: str,
+    scenario: str,
+    loss: float,
+    skew: float,
+    seed: int,
+    seconds: float,
+    event: str = "none",
+) -> Stamped:
     """One stream from somewhere in its first second on."""
     random = Random(f"{line} {loss} {skew} {seed}")
-    truth = generate(SCENARIOS[scenario], seed, seconds)
+    truth = generate(SCENARIOS[scenario], seed, seconds / 2 if event == RESTART else seconds)
+    ticks = sum(key[0] == "imu" for key, _, _ in truth.frames)
+    sampled_s = [tick * TICK_S for tick in range(ticks)]
+    restarted_s = math.inf
+    if event == RESTART:
+        restarted_s = seconds / 2 + BOOT_S + random.random()
+        again = generate(SCENARIOS[scenario], seed + 1000, seconds / 2)
+        sampled_s += [math.nan, *(restarted_s + time for time in sampled_s)]
+        truth = _one_after_the_other(truth, again, restarted_s)
     start = random.randrange(1000)
     received = receive(
         truth, lambda n, r: [at for at in range(start, n) if not loss or r.random() >= loss], random
     )
-    received.times_s = [100.0 + time * (1.0 + skew) for time in received.times_s]
-    scale, ticks = ImuScale(), {}
-    imus = [key for key, _, _ in truth.frames if key[0] == "imu"]
-    for tick, (_, accel, gyro) in enumerate(imus):
-        key = scale.specific_force(accel), scale.angular_velocity(gyro)
-        ticks.setdefault(key, []).append(tick)
-    stamped = Stamped(TICK_S * (1.0 + skew))
+    received.times_s = [EPOCH_S + time * (1.0 + skew) for time in received.times_s]
+    scale = ImuScale()
+    ticks_of: dict[object, list[int]] = {}
+    tick = 0
+    for kind, *words in (key for key, _, _ in truth.frames):
+        if kind == "imu":
+            key = scale.specific_force(words[0]), scale.angular_velocity(words[1])
+            ticks_of.setdefault(key, []).append(tick)
+        tick += kind in ("imu", "text")
+    stamped = Stamped([time * (1.0 + skew) for time in sampled_s], restarted_s * (1.0 + skew))
     bot, clock = OmniBot(OmniBotSettings()), DeviceClock(TICK_S)
-    at, now, tick, last_s = 0, 0.0, -1, -math.inf
-    for end, time in LINES[line](received, random):
-        now = max(now, time + random.expovariate(1.0 / JITTER_S))
-        readings = bot.receive(received.data[at:end], now)
-        at = end
+    tick, last_s = -1, -math.inf
+    chunks = LINES[line](received, random)
+    for data, now in _reads(received.data, chunks, random, EPOCH_S + seconds / 2, EVENTS_S[event]):
+        readings = bot.receive(data, now)
         stamps_s = clock.stamps(readings, now, bot.edge)
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
-            if isinstance(reading, ImuReading):
+            if isinstance(reading, PausedReading):
+                clock.restart()
+            elif isinstance(reading, ImuReading):
                 assert last_s < stamp_s <= now
                 last_s = stamp_s
-                key = reading.specific_force, reading.angular_velocity
-                found = next((t for t in ticks.get(key, ()) if tick < t < tick + 400), None)
+                sent = ticks_of.get((reading.specific_force, reading.angular_velocity), ())
+                found = next((t for t in sent if tick < t < tick + 400), None)
                 if found is not None:  # else the framing made it up
                     tick = found
-                    stamped.samples.append((tick, stamp_s - 100.0, now - 100.0))
+                    stamped.samples.append((tick, stamp_s - EPOCH_S, now - EPOCH_S))
     return stamped
+
+
+def _one_after_the_other(before: Truth, after: Truth, begins_s: float) -> Truth:
+    """With the text of a board that has just booted between them."""
+    text = b"Paused: 0 \n"
+    at = len(before.data) + len(text)
+    boots_s = before.times_s[-1] + 0.5
+    return Truth(
+        before.data + text + after.data,
+        [
+            *before.times_s,
+            *(boots_s + n * 1e-4 for n in range(len(text))),
+            *(begins_s + time for time in after.times_s),
+        ],
+        [
+            *before.frames,
+            (("text", 0), at - len(text), at),
+            *((key, at + start, at + end) for key, start, end in after.frames),
+        ],
+    )
+
+
+def _reads(
+    data: bytes, chunks: Chunks, random: Random, stalls_at: float, stall_s: float
+) -> Iterator[tuple[bytes, float]]:
+    """A host that wakes up a little late at every chunk, and once not for long."""
+    at, now = 0, 0.0
+    for number, (end, time) in enumerate(chunks):
+        now = max(now, time + random.expovariate(1.0 / JITTER_S))
+        if stalls_at <= now < stalls_at + stall_s:
+            if number + 1 < len(chunks) and chunks[number + 1][1] < stalls_at + stall_s:
+                continue
+            now = stalls_at + stall_s
+        yield data[at:end], now
+        at = end

@@ -19,12 +19,13 @@ from surveyor import Surveyor
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.tools.calibrate import geometry
 from omnibot_driver.tools.calibrate.console import Console
-from omnibot_driver.tools.calibrate.geometry_fit import Reading, fit, rolled
+from omnibot_driver.tools.calibrate.geometry_fit import Reading, fit, rims_of, rolled
 from omnibot_driver.tools.calibrate.log import Column
 from omnibot_driver.tools.calibrate.waypoints import square
 from omnibot_driver.tools.needs import ToolError
 
 BASE_M = 0.143
+DRIFT = 0.002
 PERFECT = np.ones(3)
 SIGMA = np.array([0.002, 0.002, math.radians(1.0)])
 
@@ -54,7 +55,11 @@ def readings(factors: Column, base: float, random: np.random.Generator) -> list[
     """By a tape of SIGMA, of a robot that truly has these sizes."""
     made = []
     for name, path, heading in paths():
-        end = rolled(path, factors, base, BASE_M)[-1] + SIGMA * random.standard_normal(3)
+        rims = np.abs(rims_of(path, BASE_M))
+        rough = DRIFT * random.standard_normal(rims.shape) / np.sqrt(np.maximum(rims, 1e-3))
+        end = rolled(path, factors * (1 + rough), base, BASE_M)[
+            -1
+        ] + SIGMA * random.standard_normal(3)
         end[[0, 1] if heading else [2]] = math.nan
         made.append(Reading(name, path, end, SIGMA))
     return made
@@ -71,20 +76,20 @@ def test_any_geometry_is_found_within_what_is_claimed(
 ) -> None:
     """Radius, base and the differences of the wheels, through the noise of tape and eye."""
     factors = wheels * (1 + np.array([a, b, -a - b]))
-    found = fit(readings(factors, base, np.random.default_rng(seed)), BASE_M)
+    found = fit(readings(factors, base, np.random.default_rng(seed)), BASE_M, DRIFT)
     wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance))[:2]
-    assert abs(found.wheels - wheels) < 5 * wheels_sigma < 0.01
-    assert abs(found.base - base) < 5 * base_sigma < 0.01
-    assert abs(found.turn - wheels / base) < 5 * found.turn_sigma < 0.005
+    assert abs(found.wheels - wheels) < 5 * wheels_sigma < 0.02
+    assert abs(found.base - base) < 5 * base_sigma < 0.02
+    assert abs(found.turn - wheels / base) < 5 * found.turn_sigma < 0.01
     assert (np.abs(found.unlike - [a, b, -a - b]) < 5 * found.unlike_sigma).all()
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """Over sixty robots, errors divided by claims have a deviation near one."""
+    """Over sixty slipping robots, errors divided by claims have a deviation near one."""
     scores = []
     for seed in range(60):
         random = np.random.default_rng(seed)
-        found = fit(readings(1.03 * PERFECT, 0.98, random), BASE_M)
+        found = fit(readings(1.03 * PERFECT, 0.98, random), BASE_M, DRIFT)
         wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance))[:2]
         scores.append(((found.wheels - 1.03) / wheels_sigma, (found.base - 0.98) / base_sigma))
     assert 0.6 < np.std(scores) < 1.2
@@ -110,16 +115,12 @@ def test_readings_with_a_wrong_sign_are_turned_away() -> None:
     for one in wrong[2:4]:
         one.end[:2] *= -1
     with pytest.raises(ToolError, match="do not fit this robot"):
-        fit(wrong, BASE_M)
+        fit(wrong, BASE_M, DRIFT)
 
 
 @pytest.mark.parametrize(
     ("factors", "base", "slip"),
-    [
-        ((1.02, 1.02, 1.02), 0.97, 0.0),
-        ((0.985, 0.975, 0.98), 1.03, 0.0),
-        ((1.0, 1.0, 1.0), 1.0, 0.01),
-    ],
+    [((1.025, 1.02, 1.015), 0.97, 0.0), ((0.98, 0.98, 0.98), 1.03, 0.01)],
 )
 def test_planted_sizes_are_found_on_the_simulated_robot(
     factors: tuple[float, float, float], base: float, slip: float
@@ -138,7 +139,7 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
     for one in found.findings[:4]:
         assert one.sigma is not None
         assert abs(one.value - planted[one.name]) < max(4 * one.sigma, 0.002 * planted[one.name])
-        assert one.sigma < 0.006 * planted[one.name]
+        assert one.sigma < 0.01 * planted[one.name]
         assert found.parameters[one.name] == one.value
 
 
@@ -157,7 +158,7 @@ def test_planted_sizes_are_found_through_a_driver_and_mend_its_odometry(
     for name, value in (("wheel_radius", 0.029 * 1.04), ("base_radius", 0.143 * 0.97)):
         found, sigma = row(table, name)
         assert abs(found - value) < max(4 * sigma, 0.005 * value)
-        assert sigma < 0.015 * value
+        assert sigma < 0.02 * value
     assert written["odom_angular_scale"] == pytest.approx(1.04 / 0.97, rel=0.005)
     with Driver(port="sim://", calibration_file=str(robot.output)) as driver:
         driver.wait_for_line("state: nominal")

@@ -38,13 +38,14 @@ from omnibot_driver.core.omnibot.frames import (
     Words,
 )
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
-from omnibot_driver.core.omnibot.rhythm import Rhythm
+from omnibot_driver.core.omnibot.rhythm import LENGTH, Rhythm
 from omnibot_driver.core.omnibot.sequence import Sequence
 from omnibot_driver.core.omnibot.suspicion import Suspicion
 from omnibot_driver.core.se2 import Pose
 
 TICK_S: Final = 0.01
 RATES_HZ: Final = (100.0, 25.0, 5.0)
+NOMINAL_BYTES_PER_S: Final = 1700
 DELTA_LSB: Final = (1e-4, 1e-4, 1e-4)
 """m, m, rad."""
 POSE_LSB_M: Final = 1e-3
@@ -102,6 +103,7 @@ class OmniBot:
         self._sequence.reconnect()
         self._paused_count: int | None = None
         self._imus = 0
+        self._heard_s = -math.inf
 
     @property
     def mode(self) -> Mode:
@@ -224,9 +226,15 @@ class OmniBot:
         return frames.encode(CommandFrame(mode, (a, b, c))) if (a, b, c) != (0, 0, 0) else STOP
 
     def _read_all(self, found: list[Frame], now: float) -> list[Reading]:
+        """What a read brings at once did not come at once: each frame has a time of its own."""
+        skipped = self._decoder.skipped
+        left = sum(skipped) + sum(map(_length, found))
         readings = []
-        for frame, skipped in zip(found, self._decoder.skipped, strict=True):
-            readings.append(self._read(frame, now, skipped))
+        for frame, before in zip(found, skipped, strict=True):
+            left -= before + _length(frame)
+            came_s = max(self._heard_s, now - left / NOMINAL_BYTES_PER_S)
+            readings.append(self._read(frame, came_s, before))
+        self._heard_s = now
         return readings
 
     def _read(self, frame: Frame, now: float, skipped: int = 0) -> Reading:
@@ -286,3 +294,7 @@ class OmniBot:
         wheels = OmniKinematics(settings.wheel_radius_m, settings.base_radius_m)
         rolled = wheels.body_twist((a, b, c))
         return rolled.vx_mps, rolled.vy_mps, rolled.yaw_rate_radps
+
+
+def _length(frame: Frame) -> int:
+    return LENGTH.get(type(frame), 0)

@@ -81,7 +81,8 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
         console.wait(f"Drive {number} of {len(drives)}: {drive.name}. Mark the floor.")
         path = _drive(robot, console, drive, arguments)
         readings.append(_reading(console, drive, path, arguments))
-    return result(readings, fit(readings, robot.parameters["base_radius"]), robot.parameters)
+    now = robot.parameters
+    return result(readings, fit(readings, now["base_radius"], now["odom_wheel_drift"]), now)
 
 
 def plan(side_m: float, turns: int, *, squares: bool) -> list[Drive]:
@@ -182,7 +183,8 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
     ]
     if found.excess > 2.0:
         notes.append(
-            f"The readings scatter {found.excess:.1f} times as much as --tape and --angle allow,"
+            f"The readings scatter {found.excess:.1f} times as much as they should by --tape,"
+            " --angle and odom_wheel_drift,"
             " and the uncertainties are that much larger: was one misread, or does the robot slip?"
         )
     return Result(

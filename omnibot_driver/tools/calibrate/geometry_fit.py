@@ -68,19 +68,22 @@ class Geometry:
         return np.array([_sigma(slope, self.covariance) for slope in slopes])
 
 
-def fit(readings: Sequence[Reading], base_radius_m: float) -> Geometry:
-    """The geometry that explains the readings best; ``base_radius_m``: the believed one.
+def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geometry:
+    """The geometry that explains the readings best; ``base_radius_m``: the believed one;
+    ``drift``: standard deviation in m of a wheel's way after 1 m, for it slips now and then.
 
     Raises ToolError for readings that no such robot can have made.
     """
+
+    weights = [_weights(reading, base_radius_m, drift) for reading in readings]
 
     def misfit(sizes: Column) -> Column:
         wheels, base, a, b = sizes
         factors = wheels * (1 + np.array([a, b, -a - b]))
         parts = [np.array([a, b, a + b]) / WHEELS_ALIKE]
-        for reading in readings:
+        for reading, weight in zip(readings, weights, strict=True):
             off = rolled(reading.path, factors, base, base_radius_m)[-1] - reading.end
-            parts.append((off / reading.sigma)[~np.isnan(reading.end)])
+            parts.append(weight @ off[~np.isnan(reading.end)])
         return np.concatenate(parts)
 
     count = sum(int((~np.isnan(reading.end)).sum()) for reading in readings)
@@ -98,16 +101,9 @@ def fit(readings: Sequence[Reading], base_radius_m: float) -> Geometry:
 
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
     """The (n, 3) poses, from the identity on, of the same turns of wheels whose radii are
-    ``factors`` times as large, on a base that is ``base`` times as large.
+    ``factors`` times as large, (3,) or step by step (n - 1, 3), on a base ``base`` times as large.
     """
-    steps = np.diff(path, axis=0)
-    middle = path[:-1, 2] + steps[:, 2] / 2
-    cos, sin = np.cos(middle), np.sin(middle)
-    body = np.stack(
-        (cos * steps[:, 0] + sin * steps[:, 1], cos * steps[:, 1] - sin * steps[:, 0], steps[:, 2]),
-        axis=1,
-    )
-    rims = body @ _rims(base_radius_m).T * factors
+    rims = rims_of(path, base_radius_m) * factors
     body = rims @ np.linalg.inv(_rims(base * base_radius_m)).T
     yaw = np.concatenate(([0.0], np.cumsum(body[:, 2])))
     middle = yaw[:-1] + body[:, 2] / 2
@@ -115,6 +111,32 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
     x = np.cumsum(cos * body[:, 0] - sin * body[:, 1])
     y = np.cumsum(sin * body[:, 0] + cos * body[:, 1])
     return np.stack((np.concatenate(([0.0], x)), np.concatenate(([0.0], y)), yaw), axis=1)
+
+
+def rims_of(path: Column, base_radius_m: float) -> Column:
+    """(n - 1, 3): how far each rim rolled from pose to pose."""
+    steps = np.diff(path, axis=0)
+    middle = path[:-1, 2] + steps[:, 2] / 2
+    cos, sin = np.cos(middle), np.sin(middle)
+    body = (cos * steps[:, 0] + sin * steps[:, 1], cos * steps[:, 1] - sin * steps[:, 0])
+    return np.asarray(np.stack((*body, steps[:, 2]), axis=1) @ _rims(base_radius_m).T)
+
+
+def _weights(reading: Reading, base_radius_m: float, drift: float) -> Column:
+    """What makes the measured parts of an error independent and of one standard deviation."""
+    path = reading.path
+    x, y, yaw = np.linalg.inv(_rims(base_radius_m))
+    middle = (path[:-1, 2] + path[1:, 2]) / 2
+    cos, sin = np.cos(middle)[:, None], np.sin(middle)[:, None]
+    left_x, left_y = (path[-1, :2] - path[1:, :2]).T[:, :, None]
+    slopes = np.stack(  # (3, n - 1, 3): the end by how far each rim rolled in each step
+        (cos * x - sin * y - left_y * yaw, sin * x + cos * y + left_x * yaw, 0 * cos + yaw)
+    )
+    variance = drift**2 * np.abs(rims_of(path, base_radius_m))
+    covariance = np.einsum("aik,ik,bik->ab", slopes, variance, slopes) + np.diag(reading.sigma**2)
+    measured = ~np.isnan(reading.end)
+    root = np.linalg.cholesky(covariance[np.ix_(measured, measured)])
+    return np.asarray(np.linalg.inv(root))
 
 
 def _rims(base_radius_m: float) -> Column:

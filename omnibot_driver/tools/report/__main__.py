@@ -1,6 +1,7 @@
 """A drive in words and pictures: ``python -m omnibot_driver.tools.report BAG``."""
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Iterator
@@ -96,8 +97,10 @@ def _report(wanted: argparse.Namespace) -> int:
         written = page.write(log, findings, source, folder)
     except OSError as error:
         raise ToolError(f"{folder} cannot be written: {error}") from error
-    print(page.text(findings))
-    print(f"\n{written}")
+    try:
+        print(f"{page.text(findings)}\n\n{written}", flush=True)
+    except BrokenPipeError:  # nobody wants to read on; the files are written
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return WRONG if any(finding.level is Level.BAD for finding in findings) else 0
 
 

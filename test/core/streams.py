@@ -1,0 +1,125 @@
+"""Streams of the simulated board, their frames by the manual's tables, and what a decoder makes."""
+
+import struct
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from random import Random
+
+from omnibot_driver.core.omnibot import (
+    FrameDecoder,
+    ImuFrame,
+    decode,
+    encode,
+)
+from omnibot_driver.core.omnibot.frames import CommandFrame, Frame
+from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+
+TICK_S = 0.01
+BYTE_S = 10 / 115200
+
+REST = ImuFrame((120, -80, -16384), (1, 2, 3))
+HEADER_BYTES = b"\xff\xfa\xfb\xfc"
+LEAD_IN = encode(REST) * 2
+"""Enough to bring a decoder into step, with nothing in it that looks like a header."""
+
+
+def velocity(x: int, y: int, omega: int) -> bytes:
+    """A body velocity command, typed from the manual."""
+    return bytes.fromhex("FF FE 01") + struct.pack(">3h", x, y, omega)
+
+
+def record(board: SimulatedBoard, seconds: float) -> list[bytes]:
+    """What the board sends in each tick."""
+    return [board.step() for _ in range(round(seconds * 100))]
+
+
+def drive(board: SimulatedBoard, seconds: float) -> list[bytes]:
+    """The same with a new random velocity every half second."""
+    random, ticks = Random(7), []
+    for _ in range(round(seconds * 2)):
+        board.receive(velocity(*(random.randint(-24, 24) for _ in range(2)), random.randint(-9, 9)))
+        ticks += record(board, 0.5)
+    return ticks
+
+
+def life(board: SimulatedBoard) -> list[bytes]:
+    """Boot, start, drive, pause, un-pause, reset: every mode and every change of it."""
+    ticks = record(board, 2.6)
+    board.receive(bytes(8) + b"S")
+    ticks += drive(board, 2.0)
+    for letter in (b"P", b"P", b"R"):
+        board.receive(letter)
+        ticks += record(board, 2.37)
+    return ticks
+
+
+RUNNING = BoardSettings(running=True)
+STREAMS: dict[str, Callable[[], list[bytes]]] = {
+    "at rest": lambda: record(SimulatedBoard(RUNNING), 4.0),
+    "driving": lambda: drive(SimulatedBoard(RUNNING), 4.0),
+    "look-alike gyro": lambda: record(
+        SimulatedBoard(BoardSettings(running=True, gyro_stuck=(-6, -5, -4))), 4.0
+    ),
+    "IMU only": lambda: record(SimulatedBoard(BoardSettings(running=True, imu_only=True)), 4.0),
+    "IMU only, look-alike gyro": lambda: record(
+        SimulatedBoard(BoardSettings(running=True, imu_only=True, gyro_stuck=(-6, -5, -4))), 4.0
+    ),
+    "IMU ends in FF": lambda: record(
+        SimulatedBoard(BoardSettings(running=True, gyro_stuck=(3, -1, -1))), 4.0
+    ),
+    "paused": lambda: record(SimulatedBoard(), 12.0),
+    "all modes": lambda: life(SimulatedBoard()),
+}
+RUNNING_STREAMS = [name for name in STREAMS if name not in ("paused", "all modes")]
+
+
+@cache
+def ticks_of(name: str) -> tuple[bytes, ...]:
+    return tuple(STREAMS[name]())
+
+
+def lengths_of(stream: bytes) -> list[int]:
+    """The lengths of the frames of an undamaged stream, from the manual's tables."""
+    lengths, at = [], 0
+    while at < len(stream):
+        kind = stream[at + 1]
+        text = stream.index(b"\n", at) + 1 - at if stream[at] == 0x50 else 0
+        lengths.append({0xFA: 14, 0xFB: 9, 0xFC: 15}.get(kind, text))
+        at += lengths[-1]
+    assert at == len(stream)
+    return lengths
+
+
+def frames_of(stream: bytes) -> list[tuple[int, Frame]]:
+    """Each frame of an undamaged stream with the place where it begins."""
+    found, at = [], 0
+    for length in lengths_of(stream):
+        frame = decode(stream[at : at + length])
+        assert not isinstance(frame, CommandFrame)
+        found.append((at, frame))
+        at += length
+    return found
+
+
+def decoded(chunks: Iterable[bytes], *, step_s: float = TICK_S) -> list[Frame]:
+    """All that a fresh decoder makes of chunks that arrive ``step_s`` apart."""
+    made, now, found = FrameDecoder(), 100.0, []
+    for chunk in chunks:
+        found += made.feed(chunk, now)
+        now += step_s
+    return found + made.flush(now)
+
+
+def byte_by_byte(ticks: Sequence[bytes]) -> list[Frame]:
+    """As a line at 115200 baud brings them."""
+    made, found = FrameDecoder(), []
+    for number, tick in enumerate(ticks):
+        for place in range(len(tick)):
+            now = number * TICK_S + place * BYTE_S
+            found += made.feed(tick[place : place + 1], now)
+    return found + made.flush(len(ticks) * TICK_S)
+
+
+def is_subsequence(some: Sequence[Frame], of: Sequence[Frame]) -> bool:
+    remaining = iter(of)
+    return all(frame in remaining for frame in some)

@@ -1,0 +1,196 @@
+"""Odometry that finds its heading, is attached anew, and is reset."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import axis_signs, headings, small_moves
+from trip import (
+    PERIOD_S,
+    SETTINGS,
+    Trip,
+    attach,
+    close,
+    earth,
+    heading,
+    last,
+    xyyaw,
+)
+
+from omnibot_driver.core.board import PoseReading
+from omnibot_driver.core.odometry import Odometry
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.uncertainty import Covariance
+
+# Heading
+
+
+@given(st.lists(small_moves, min_size=1, max_size=5), headings)
+def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: float) -> None:
+    """And come out with it, turned as if it had come before them."""
+    odometry, trip = Odometry(SETTINGS), Trip(initial)
+    for move in moves:
+        assert odometry.displace(trip.move(*xyyaw(move)), 0.0) == []
+    estimates = attach(odometry, trip.pose)
+    assert len(estimates) == len(moves)
+    assert last(estimates) == close(trip.truth, 1e-8)
+    assert not odometry.heading_assumed
+
+
+def test_the_first_pose_must_be_confirmed_too() -> None:
+    """A damaged one turns nothing: the first two that agree tell the heading."""
+    odometry = Odometry(SETTINGS)
+    assert odometry.displace(earth(0.0, 0.1), 0.0) == []
+    assert odometry.settle(heading(-1.0)) == []
+    assert odometry.displace(earth(0.0, 0.1), 0.0) == []
+    assert odometry.settle(PoseReading(1.0, 2.1, math.pi / 2)) == []
+    assert odometry.displace(earth(0.0, 0.1), 0.0) == []
+    estimates = odometry.settle(PoseReading(1.0, 2.2, math.pi / 2))
+    assert len(estimates) == 3
+    assert last(estimates) == close((0.3, 0.0, 0.0))
+    assert odometry.refused_poses == 1
+
+
+def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
+    """The next one was lost; after a second it is taken for true."""
+    odometry = Odometry(SETTINGS)
+    odometry.settle(heading(math.pi / 2))
+    for _ in range(25):
+        estimates = odometry.displace(earth(0.0, 0.01), 0.0)
+    assert last(estimates) == close((0.25, 0.0, 0.0))
+    assert not odometry.heading_assumed
+
+
+def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
+    """25 deltas come out together, later ones at once."""
+    odometry = Odometry(SETTINGS)
+    for _ in range(24):
+        assert odometry.displace(earth(0.01, 0.0), 0.0) == []
+    assert not odometry.heading_assumed
+    estimates = odometry.displace(earth(0.01, 0.0), 0.0)
+    assert odometry.heading_assumed
+    assert len(estimates) == 25
+    assert last(estimates) == close((0.25, 0.0, 0.0))
+    assert last(odometry.displace(earth(0.0, 0.01), 0.0)) == close((0.25, 0.01, 0.0))
+
+
+def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
+    """What was driven on the assumption stays; what follows is right."""
+    odometry = Odometry(SETTINGS)
+    for _ in range(25):
+        odometry.displace(earth(0.0, 0.0), 0.0)
+    attach(odometry, heading(math.pi / 2))
+    odometry.settle(heading(math.pi / 2))
+    assert last(odometry.displace(earth(0.0, 0.1), 0.0)) == close((0.1, 0.0, 0.0))
+
+
+@given(st.floats(0.15, 6.1), headings)
+def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
+    """One damaged pose does not turn the odometry; two that agree tell of another earth frame."""
+    odometry, trip = Odometry(SETTINGS), Trip(initial)
+    attach(odometry, trip.pose)
+    x, y, yaw = trip.board
+    odometry.settle(PoseReading(x, y, yaw + surprise))
+    assert last(odometry.displace(trip.move(0.1, 0.0, 0.0), 0.0)) == close((0.1, 0.0, 0.0))
+    odometry.settle(trip.pose)
+    assert last(odometry.displace(trip.move(0.1, 0.0, 0.0), 0.0)) == close((0.2, 0.0, 0.0))
+    trip.board = (500.0, 600.0, initial + surprise)
+    odometry.settle(trip.pose)
+    odometry.settle(trip.pose)
+    assert last(odometry.displace(trip.move(0.1, 0.0, 0.0), 0.0)) == close((0.3, 0.0, 0.0))
+
+
+def test_two_surprising_poses_that_disagree_confirm_nothing() -> None:
+    """Each is damaged in its own way."""
+    odometry = Odometry(SETTINGS)
+    attach(odometry, heading(0.0))
+    for yaw in (1.0, 2.0, -1.0):
+        odometry.settle(heading(yaw))
+    assert last(odometry.displace(earth(1.0, 0.0), 0.0)) == close((1.0, 0.0, 0.0))
+
+
+def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> None:
+    """From +π to −π is no jump."""
+    odometry = Odometry(SETTINGS)
+    attach(odometry, heading(math.pi - 0.01))
+    odometry.displace(earth(0.0, 0.0, 0.02), 0.0)
+    odometry.settle(heading(-math.pi + 0.01))
+    ahead = earth(math.cos(-math.pi + 0.01), math.sin(-math.pi + 0.01))
+    assert last(odometry.displace(ahead, 0.0)) == close((math.cos(0.02), math.sin(0.02), 0.02))
+
+
+def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -> None:
+    """The pose counts, not the sum of rounded displacements; five steps take it over."""
+    odometry = Odometry(SETTINGS)
+    attach(odometry, PoseReading(0.0, 0.0, 0.0))
+    odometry.settle(PoseReading(0.01, -0.005, 0.02))
+    ways = [last(odometry.displace(earth(0.0, 0.0), 0.0)) for _ in range(5)]
+    assert ways[0] == close((0.002, -0.001, 0.004))
+    assert ways[4] == close((0.01, -0.005, 0.02))
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
+    """Before the first good one, and after it."""
+    odometry = Odometry(SETTINGS)
+    odometry.displace(earth(0.0, 0.1), 0.0)
+    assert odometry.settle(PoseReading(0.0, 0.0, bad)) == []
+    assert len(attach(odometry, heading(math.pi / 2))) == 1
+    odometry.settle(PoseReading(0.0, 0.0, bad))
+    odometry.settle(PoseReading(0.0, 0.0, bad))
+    assert last(odometry.displace(earth(0.0, 0.1), 0.0)) == close((0.2, 0.0, 0.0))
+
+
+# Attaching and resetting
+
+
+@given(
+    st.lists(small_moves, min_size=1, max_size=8),
+    st.lists(small_moves, min_size=1, max_size=4),
+    headings,
+    axis_signs,
+)
+def test_a_board_that_restarts_goes_on_from_here(
+    before: list[Pose], after: list[Pose], initial: float, signs: tuple[int, int, int]
+) -> None:
+    """It counts from zero; the odometry knows no seam."""
+    odometry, trip = Odometry(SETTINGS, signs), Trip(initial, signs)
+    attach(odometry, trip.pose)
+    for move in before:
+        odometry.displace(trip.move(*xyyaw(move)), 0.0)
+    trip.board = (0.0, 0.0, 0.0)
+    for number, move in enumerate(after):
+        reading = replace(
+            trip.move(*xyyaw(move)),
+            duration_s=None if number == 0 else PERIOD_S,
+            restarted=number == 0,
+        )
+        assert odometry.displace(reading, 0.0) == []
+    assert last(odometry.settle(trip.pose)) == close(trip.truth, 1e-8)
+
+
+def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
+    """Pose and covariance; forward is forward afterwards too."""
+    odometry, trip = Odometry(SETTINGS), Trip(0.7)
+    attach(odometry, trip.pose)
+    for _ in range(10):
+        odometry.displace(trip.move(0.02, 0.01, 0.1), 0.0)
+    odometry.reset()
+    (estimate,) = odometry.displace(trip.move(0.0, 0.0, 0.0), 0.0)
+    assert xyyaw(estimate.pose) == close((0.0, 0.0, 0.0))
+    assert estimate.covariance == Covariance()
+    odometry.settle(trip.pose)
+    assert last(odometry.displace(trip.move(0.1, 0.0, 0.0), 0.0)) == close((0.1, 0.0, 0.0))
+
+
+def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> None:
+    """Also where it still waited for the board's first pose."""
+    odometry, trip = Odometry(SETTINGS), Trip(0.7)
+    for _ in range(3):
+        odometry.displace(trip.move(0.02, 0.0, 0.1), 0.0)
+    odometry.reset()
+    reading = trip.move(0.01, 0.0, 0.0)
+    estimates = odometry.displace(reading, 0.0) + attach(odometry, trip.pose)
+    assert last(estimates) == close((0.01, 0.0, 0.0))

@@ -1,0 +1,245 @@
+"""The decoder on damaged streams, on texts between frames, and after silences."""
+
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import chunkings, frames
+from streams import (
+    LEAD_IN,
+    REST,
+    RUNNING_STREAMS,
+    TICK_S,
+    byte_by_byte,
+    decoded,
+    frames_of,
+    is_subsequence,
+    ticks_of,
+)
+
+from omnibot_driver.core.omnibot import (
+    DeltaFrame,
+    FrameDecoder,
+    ImuFrame,
+    PausedFrame,
+    PoseFrame,
+    encode,
+)
+from omnibot_driver.core.omnibot.frames import Frame
+
+# Damaged
+
+
+def assert_back_in_step(
+    sent: list[tuple[int, Frame]], hurt: set[int], found: list[Frame], place: int
+) -> None:
+    """``hurt``: numbers of the frames whose bytes are changed or pushed apart."""
+    truth = [frame for _, frame in sent]
+    assert is_subsequence(found, truth), f"a false frame came out: damage at {place}"
+    first, last = min(hurt), max(hurt)
+    before, after = truth[: max(0, first - 1)], truth[last + 3 :]
+    assert found[: len(before)] == before, f"damage at {place}"
+    assert found[len(found) - len(after) :] == after, f"damage at {place}"
+    for number in hurt:
+        following = truth[number + 1 :]
+        assert truth[number] not in found or truth[number] in following, f"damage at {place}"
+
+
+def damage_places(sent: list[tuple[int, Frame]]) -> list[tuple[int, int]]:
+    """Each byte of the frames 20 to 45 with the number of its frame."""
+    ends = [at for at, _ in sent[1:]]
+    return [
+        (place, number)
+        for number in range(20, 45)
+        for place in range(sent[number][0], ends[number])
+    ]
+
+
+@pytest.mark.parametrize("name", RUNNING_STREAMS)
+def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
+    """One byte lost anywhere, when what follows is in hand; in step again within two frames."""
+    stream = b"".join(ticks_of(name)[:80])
+    sent = frames_of(stream)
+    for place, number in damage_places(sent):
+        # Losing either of two equal neighbours is one damage: it may be either's frame.
+        hurt = set() if stream[place] in (stream[place - 1], stream[place + 1]) else {number}
+        found = decoded([stream[:place] + stream[place + 1 :]])
+        if hurt:
+            assert_back_in_step(sent, hurt, found, place)
+        else:
+            assert is_subsequence(found, [frame for _, frame in sent]), f"damage at {place}"
+
+
+@pytest.mark.parametrize("name", RUNNING_STREAMS)
+@pytest.mark.parametrize("extra", [0x00, 0x50, 0x7E, 0xFA, 0xFB, 0xFC, 0xFF])
+def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: int) -> None:
+    """One byte inserted anywhere; in step again, and truly so, within two frames."""
+    stream = b"".join(ticks_of(name)[:80])
+    sent = frames_of(stream)
+    truth = [frame for _, frame in sent]
+    for place, number in damage_places(sent):
+        found = decoded([stream[:place] + bytes([extra]) + stream[place:]])
+        before, after = truth[: number - 1], truth[number + 4 :]
+        assert found[: len(before)] == before, f"damage at {place}"
+        assert found[len(found) - len(after) :] == after, f"damage at {place}"
+        between = found[len(before) : len(found) - len(after)]
+        false = [frame for frame in between if frame not in truth]
+        assert len(false) <= 1, f"damage at {place}"
+
+
+@pytest.mark.parametrize("name", RUNNING_STREAMS)
+def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
+    """Without a checksum a gyro that happens to read a header may do it, once in thirty times."""
+    stream = b"".join(ticks_of(name)[:80])
+    sent = frames_of(stream)
+    truth = [frame for _, frame in sent]
+    random, false = Random(13), 0
+    for place, _ in damage_places(sent) * 3:
+        extra = bytes([random.randrange(256)])
+        found = decoded([stream[:place] + extra + stream[place:]])
+        false += not is_subsequence(found, truth)
+    assert false <= len(damage_places(sent)) * 3 / 30
+
+
+@pytest.mark.parametrize(
+    "extra", [b"\x00", b"P", b"\xfa", b"\xff", b"\xff\xff", b"\xff\xfd", b"Pau"]
+)
+def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes) -> None:
+    """Nobody can tell whether they were its own; the frame behind them comes out."""
+    other = ImuFrame((100, 90, -16300), (4, 5, 6))
+    after = LEAD_IN * 2
+    found = decoded([LEAD_IN + encode(other) + extra + after])
+    assert found in ([REST, REST, *[REST] * 4], [REST, REST, other, *[REST] * 4])
+
+
+@pytest.mark.parametrize("name", RUNNING_STREAMS)
+def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(name: str) -> None:
+    """Byte by byte as well: the FF that completes it waits for the byte that betrays it."""
+    ticks = ticks_of(name)[:30]
+    truth = [frame for _, frame in frames_of(b"".join(ticks))]
+    for number in range(8, 24):
+        tick = ticks[number]
+        for place in range(2, len(tick)):
+            if tick[place] == 0xFF or tick[place - 1] == 0xFF or tick[place - 2] == 0xFF:
+                continue  # a header's byte, or a neighbour of one
+            hurt = [*ticks[:number], tick[:place] + tick[place + 1 :], *ticks[number + 1 :]]
+            found = byte_by_byte(hurt)
+            assert is_subsequence(found, truth), f"tick {number}, byte {place}"
+            assert len(truth) - 4 <= len(found) < len(truth), f"tick {number}, byte {place}"
+
+
+@given(
+    st.lists(st.one_of(frames, st.binary(min_size=1, max_size=20)), max_size=20),
+    st.data(),
+)
+def test_rubbish_between_frames_costs_a_few_frames_only(
+    pieces: list[Frame | bytes], data: st.DataObject
+) -> None:
+    """After any past, six ordinary frames later the decoder is in step."""
+    stream = b"".join(piece if isinstance(piece, bytes) else encode(piece) for piece in pieces)
+    made = FrameDecoder()
+    for chunk in data.draw(chunkings(stream)):
+        made.feed(chunk, 0.0)
+    for _ in range(6):
+        made.feed(encode(REST), 0.0)
+    assert made.feed(encode(REST), 0.0) == [REST]
+
+
+# Texts between frames
+
+
+@pytest.mark.parametrize("count", [0, 42, 255])
+@pytest.mark.parametrize("ends", ["text", "data"])
+def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> None:
+    """A pause in the middle of the data, and a start in the middle of the texts."""
+    text = encode(PausedFrame(count))
+    stream = LEAD_IN + text + (LEAD_IN if ends == "data" else text)
+    last = [REST, REST] if ends == "data" else [PausedFrame(count)]
+    for place in range(len(stream) + 1):
+        assert decoded([stream[:place], stream[place:]]) == [
+            REST, REST, PausedFrame(count), *last,
+        ]  # fmt: skip
+
+
+@pytest.mark.parametrize("place", [*range(8), 9, 10])
+def test_a_damaged_text_does_not_come_out(place: int) -> None:
+    """A lost letter anywhere but in the number, where nobody can see it, or of its blank."""
+    text = b"Paused: 7 \n"
+    hurt = text[:place] + text[place + 1 :]
+    found = decoded([LEAD_IN + hurt + LEAD_IN + LEAD_IN])
+    whole = [PausedFrame(7)] if hurt == b"Paused: 7\n" else []
+    assert PausedFrame(7) not in found or whole
+    assert found[-2:] == [REST, REST]
+    assert len(found) >= 4
+
+
+# Silence
+
+
+@pytest.mark.parametrize("length", range(1, 14))
+def test_a_partial_frame_before_a_silence_swallows_nothing(length: int) -> None:
+    """A cable that was out for a moment: what comes now does not finish what was begun then."""
+    made = FrameDecoder()
+    made.feed(LEAD_IN + encode(REST)[:length], 0.0)
+    after = [DeltaFrame(1, 2, 3, 4), REST, PoseFrame(1.0, 2.0, 3.0, 4), DeltaFrame(5, 6, 7, 8)]
+    found = [out for i, frame in enumerate(after) for out in made.feed(encode(frame), 1 + i / 100)]
+    assert found == after
+
+
+@pytest.mark.parametrize("length", range(1, 14))
+def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: int) -> None:
+    """The rest of the frame never comes; the text does, after the boot."""
+    made = FrameDecoder()
+    made.feed(LEAD_IN + encode(REST)[:length], 0.0)
+    assert made.feed(b"Paused: 0 \n", 0.3) == [PausedFrame(0)]
+
+
+@pytest.mark.parametrize("name", RUNNING_STREAMS)
+@pytest.mark.parametrize("late_s", [0.15, 1.0])
+def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
+    """It was us who slept: what is held goes on in what was waiting, wherever it was cut."""
+    ticks = ticks_of(name)
+    stream = b"".join(ticks[: round(1 + late_s / TICK_S) + 40])
+    sent = [frame for _, frame in frames_of(stream)]
+    start = len(b"".join(ticks[:20]))
+    backlog = len(b"".join(ticks[20 : 20 + round(late_s / TICK_S)]))
+    for place in range(start, start + 38):
+        made = FrameDecoder()
+        found = made.feed(stream[:place], 0.2)
+        found += made.feed(stream[place : place + backlog], 0.2 + late_s)
+        found += made.feed(stream[place + backlog :], 0.21 + late_s)
+        found += made.flush(0.3 + late_s)
+        assert found == sent, f"cut at {place}"
+
+
+def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> None:
+    """Nothing spoke against it."""
+    made = FrameDecoder()
+    made.feed(LEAD_IN, 0.0)
+    doubtful = DeltaFrame(1, 2, 3, 255)
+    assert made.feed(encode(doubtful), 0.0) == []
+    assert made.feed(encode(REST), 1.0) == [doubtful, REST]
+
+
+def test_flush_tells_what_can_still_be_told() -> None:
+    """In step a whole frame; never a part of one, never one that is not proved."""
+    doubtful = DeltaFrame(1, 2, 3, 255)
+    in_step = FrameDecoder()
+    in_step.feed(LEAD_IN + encode(doubtful), 0.0)
+    assert in_step.flush(0.0) == [doubtful]
+    assert in_step.flush(0.0) == []
+    partial = FrameDecoder()
+    partial.feed(LEAD_IN + encode(REST)[:13], 0.0)
+    assert partial.flush(0.0) == []
+    unproved = FrameDecoder()
+    assert unproved.feed(encode(REST), 0.0) == []
+    assert unproved.flush(0.0) == []
+
+
+def test_a_decoder_goes_on_after_a_flush() -> None:
+    """With the next whole frames."""
+    made = FrameDecoder()
+    made.feed(LEAD_IN + encode(REST)[:5], 0.0)
+    made.flush(0.0)
+    assert made.feed(LEAD_IN, 0.0) == [REST, REST]
