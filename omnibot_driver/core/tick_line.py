@@ -13,6 +13,7 @@ line runs in the middle of all bounds: a timer that keeps the reads from cutting
 seconds deceives by half of what it hides at the most. Without them, or if they contradict
 (then reads were late), the line is laid under the latest points as close as it goes: an edge of
 their lower convex hull, under those of cut samples alone if there are any, which have not waited.
+Likewise where every block had one.
 
 Knows ticks and times, in s of the host's steady clock; not what is sampled, nor how ticks are told.
 """
@@ -84,7 +85,8 @@ class TickLine:
             is_near = 0.0 < self._height(best) - self._height(earliest) < WIDEST * self._period_s
             if is_near and (not self._earliest or self._earliest[-1][0] < tick):
                 self._earliest.append(earliest)
-        if not (self._earliest and self._lay_between()):
+        always_cut = all(was_cut for _, was_cut in self._latest)
+        if always_cut or not (self._earliest and self._lay_between()):
             self._lay_under()
 
     def _height(self, point: Point) -> float:
