@@ -18,6 +18,7 @@ class Probe:
     def __init__(self, namespace: str) -> None:
         self.node = Node("probe", namespace=namespace)
         self._received: dict[str, list[Any]] = {}
+        self._clients: dict[str, Any] = {}
         self._changed = threading.Condition()
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
@@ -106,8 +107,11 @@ class Probe:
         self.wait_for_future(self._executor.create_task(destroy, entity))
 
     def client(self, kind: type, service: str) -> Any:
-        client = self.node.create_client(kind, f"omnibot_driver/{service}")
-        self._executor.wake()
+        """One for each service: the driver's middleware remembers every client for ever."""
+        if service not in self._clients:
+            self._clients[service] = self.node.create_client(kind, f"omnibot_driver/{service}")
+            self._executor.wake()
+        client = self._clients[service]
         assert client.wait_for_service(PATIENCE_S), f"nobody offers {service}"
         return client
 
