@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Says what colcon and pip install, and where ``ros2 run`` and ``ros2 launch`` look for it."""
 
 from glob import glob

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Sphinx settings for `make docs`, and for rosdoc2, which executes this file with its own defaults.
 
 The site is made from the whole repository, so that a link leads in it where it leads on GitHub.

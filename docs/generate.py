@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Writes what the documents take from the code: `make docs` runs it, a test compares.
 
 Each text is a function of the code alone, so whoever changes the code sees what to commit.

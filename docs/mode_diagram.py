@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The board's modes as a picture (SVG), drawn from the mode table."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Publishes the robot's description and its fixed frames, and shows it in RViz where asked to.
 
 The joints keep their names whatever ``frame_prefix`` is: robot_state_publisher puts it before the

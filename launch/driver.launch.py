@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Starts the driver, with its parameters from a file and, where given, other values."""
 
 from launch import LaunchContext, LaunchDescription

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Starts the driver, the description and robot_localization's filter over odometry and gyro.
 
 The filter publishes odom to base_link, so the driver does not. The description is needed: it says

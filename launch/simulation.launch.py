@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Starts the driver with a simulated board inside; takes the arguments of driver.launch.py."""
 
 from launch import LaunchDescription

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The calibration file: what was measured of this robot, in YAML, read at the start, written whole
 or not at all.
 

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Measurements as the bytes that rclpy would make of their messages, without making messages.
 
 CDR, as DDS serialises, aligns every number to its own size, as a C struct does on a 64-bit machine:

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The table of parameters, declared on a node: given at start, described, checked when set."""
 
 import re

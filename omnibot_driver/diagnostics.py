@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``/diagnostics`` once a second: the link's figures, judged, as a message.
 
 By diagnostic_updater where it is installed; else the same message without it: topic, names, levels,

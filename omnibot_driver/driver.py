@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The driver as a process: signals, executor, exit code. Knows nothing of what the node does."""
 
 import os

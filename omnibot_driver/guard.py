@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The guard: a process of its own that stops the robot when the driver no longer can.
 
 It shares the driver's open port, and hears a heartbeat on its standard input. When the heartbeat

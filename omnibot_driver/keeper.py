@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Keeps a guard beside an open port: the driver's side of `guard.py`.
 
 It starts the process, beats for it, replaces it when it dies, and sends it away. It knows no

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The threads that serve a port and a session: the only module that knows threads and the clock.
 
 The *reader* opens the port, waits for bytes, hands them to the session and delivers what comes of

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From what the session measured to ROS messages: pure functions, no node, no arithmetic of note.
 
 Conventions: REP-103 (axes, units), REP-105 (odom to base_link), REP-145 (an IMU without

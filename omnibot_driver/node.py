@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The node: topics, services and parameters wired to a link and its session.
 
 Nothing is computed here. Measurements are published by the link's reader thread as they come;

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Log lines that never block the process. Knows descriptors; must not know what is printed.
 
 rclpy writes log lines while it holds the interpreter: a terminal that is stopped by ctrl-S, or a

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """One open serial port or pyserial URL: the only module that knows pyserial.
 
 It reads and writes bytes and turns every failure into a LinkError whose sentence says what to do.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the driver says: what the session tells, on topics; news, in the log.
 
 Whichever thread an event came up on publishes it: measurements come from the link's reader.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What came in over a wire once: ``replay://bag?speed=10``, read from a rosbag2.
 
 Knows the URL and the library rosbags, which reads bags without ROS. Must not know when the bytes

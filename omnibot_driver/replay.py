@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A recorded wire fed to a session: what a `Link` is to a port, this is to a recording.
 
 The only clock is the recording's. The session hears each chunk of bytes at the time at which it

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What can be seen of a port's surroundings once it is open, and should be set otherwise.
 
 Reads sysfs; knows no pyserial, no ROS, no board. What stands in the way of opening a port, its

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The services under the node's name. Those that wait for the board block nobody else."""
 
 import threading

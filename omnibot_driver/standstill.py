@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Did this process stand still? SIGSTOP, a swapped-out host, a thread that hangs.
 
 While it did, its watchdog did too, and commands went on arriving for it. So when it runs again,

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``/tf`` where tf2_ros is installed; elsewhere a warning, and a robot that drives all the same."""
 
 from collections.abc import Callable

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Keeps the tests' ROS traffic to this machine and to this run of them, and none of them timed."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A program on a terminal of 80x24 of its own, as a person has it: keys in, what it draws out."""
 
 import contextlib

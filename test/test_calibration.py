@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The calibration file: whole or not at all, and nobody else's names are touched."""
 
 import stat

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Serialised measurements are what rclpy makes of the same measurements."""
 
 import struct

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The guard as a process, on a real pseudo-terminal, with and without its keeper."""
 
 import ast

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The threads around a session, on a real pseudo-terminal and without ROS."""
 
 import contextlib

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Values to ROS messages: where each number goes, by REP-103, REP-105 and REP-145."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The table of parameters against the interface, and what its checks say."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``replay://``: the wire as a bag holds it, and every way in which it cannot be had."""
 
 import sys

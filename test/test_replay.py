@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A recorded wire, heard again: the same every time, however fast, and as it was when recorded."""
 
 import itertools

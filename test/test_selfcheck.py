@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What surrounds a port, by a sysfs made up in a temporary folder."""
 
 from pathlib import Path

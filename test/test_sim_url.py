@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``sim://``: a simulated board in the driver's own process, without ROS."""
 
 import threading

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Whether the watchdog's thread stood still, and which commands had waited meanwhile."""
 
 import pytest

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """How much Python is called for each tick of the nominal stream: a guard that counts, not times.
 
 A bound is a little above what was counted when it was set. Whoever makes the path longer raises it,

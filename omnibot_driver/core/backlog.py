@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Displacements that wait for a pose of the board, and what they add up to in the board's frame.
 
 Knows how a displacement moves a pose; not why one waits, nor what comes of it.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Which of the board's poses to believe: one that is finite, reachable and no surprise.
 
 A surprise must be confirmed by the next pose. Knows poses, speeds and what open gaps explain; not

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What any motor board offers a driver: the seam at which further boards join.
 
 Readings are what a board measured, in SI units, with no trace of its bytes. A ``Board`` turns bytes

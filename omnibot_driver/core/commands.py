@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Which frame goes out when: pacing, repeating, timing out, one authority, the e-stop latch.
 
 Nothing acknowledges a command and the board never stops by itself, so the current command is

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From arrival times to sampling times: the board's clock, as it is seen from the host's.
 
 The board samples once a tick by a crystal of its own. Its bytes reach us with a delay that is

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From figures to verdicts: what an operator should know, and do.
 
 Levels are those of diagnostic_msgs. ERROR: the robot cannot be used, or must not be. WARN: it can,

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Motion commands, from a wish to what comes of it: when each expires, and whether the robot obeys.
 
 Composes the helm, the command stream and the watch. Knows no modes and no requests: whether a robot

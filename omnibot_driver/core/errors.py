@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The exceptions of the driver, all of them, in one tree.
 
 Bytes that came from a board never raise; they are counted. These are raised for what *we* or our

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What a session tells whoever listens: values only."""
 
 from dataclasses import dataclass

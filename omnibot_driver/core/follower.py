@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The pose that is given out: moves with the robot, and nears the truth no faster than it could.
 
 Knows poses and speeds; not how the truth is found.

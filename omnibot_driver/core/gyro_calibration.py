@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
 A gyro at rest reads its bias and noise. Whether the robot is at rest is told by three witnesses:

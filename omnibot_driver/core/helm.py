@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From wishes to motions: checked, limited, in the board's own axes and frame.
 
 Knows what may be wished for and where the board's switch stands; not what mode the board is in, nor

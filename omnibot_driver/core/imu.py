@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From the counts of an MPU6050 to SI units, and what gravity says of it; axes stay the sensor's.
 
 Source: MPU-6050 product specification, sections 6.1 and 6.2 (sensitivity scale factors).

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the IMU measured, without its biases; and what it says of itself while the robot stands."""
 
 from dataclasses import dataclass

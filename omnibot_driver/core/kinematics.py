@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Three omni wheels and the body they carry; no time, no noise, no bytes.
 
 Axes are REP-103's: x forward, y left, yaw counter-clockwise. Source: the velocity equations and the

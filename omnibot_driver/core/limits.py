@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """How fast is allowed, and what fits a word on the wire; every limit keeps the direction.
 
 Pure arithmetic on finite numbers; ``require_finite`` is where others are turned away.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From readings to measurements: stamped, checked, integrated, corrected, counted.
 
 Composes the board's clock, plausibility, odometry and the IMU. Knows no commands and no modes.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What is commanded, as the frame that says it now.
 
 A ``Motion`` is one command. The stream asks it for its frame whenever one goes out, so a set-point

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What a user is told of the stream: seldom, or once, in sentences that say what to do.
 
 Knows counts, times and words; not where they come from.

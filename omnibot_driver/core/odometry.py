@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From displacements and the board's own poses to pose, twist and covariance.
 
 One idea: ``_board`` is where the board believes to be, told by displacements at once and by its

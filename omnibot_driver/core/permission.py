@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Whether the robot may be driven, or its gyro calibrated, now: if not, why, and what to do.
 
 Each answer is a sentence, empty when nothing is in the way. Knows modes and phases.

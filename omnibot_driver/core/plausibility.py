@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Readings that no robot can have made: what framing cannot see, because no byte is missing.
 
 Two things are impossible. A displacement faster than the robot can go; and a leap of a single

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The plane: poses, and the way from one to another. Knows geometry, nothing that moves in it."""
 
 import math

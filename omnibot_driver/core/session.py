@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """One connection to one board, whole: bytes and wishes in; measurements, answers and bytes out.
 
 The shell around it calls an input, then takes ``take_output`` to the port and ``take_events`` to

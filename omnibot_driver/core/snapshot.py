@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """All that is known of the link and the board at one moment: values only."""
 
 from dataclasses import dataclass

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Bringing the board into the wanted mode, and believing only what is heard afterwards.
 
 A letter may be lost, P toggles, and a board that boots swallows what it hears first. So a request

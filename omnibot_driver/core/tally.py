@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What came in, in figures: counts that only grow. Knows readings and times, not what to make of
 them.
 """

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """When was tick n? A straight line over the ticks, found from the times between which they came.
 
 A tick's bytes come late, never early: arrivals lie on or above the line, whose slope is the true

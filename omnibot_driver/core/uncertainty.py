@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """How far the odometry may be off: what it does not know, kept apart by where it comes from.
 
 * What the wheels do not tell: the slip of every metre (a random walk), and wheels that are larger

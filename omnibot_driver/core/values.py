@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Values that are made by the hundred each second: immutable to the type checker alone.
 
 A frozen dataclass sets each field through ``object.__setattr__``, which triples the price of making

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Whether the robot does what it is told, as far as its displacements tell.
 
 Nothing acknowledges a command, but a robot that is commanded and does not move, or that moves and

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Runs the demo: ``python -m omnibot_driver.demo``."""
 
 import io

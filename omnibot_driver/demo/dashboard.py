@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The monitor in front of the demo, where there is a terminal for it. Knows processes, no ROS."""
 
 import subprocess

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the demo shows: rows, a picture, words. Knows terminals; must not know ROS or processes."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A module of ours as a process of its own. Knows processes; must not know what they do."""
 
 import ctypes

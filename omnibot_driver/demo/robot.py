@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The robot as a ROS program sees it. Must not know who made it, nor what is shown of it."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """How the robot is steered round the square: a pure function of where it is."""
 
 import math

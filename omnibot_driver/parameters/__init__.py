@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Every parameter of the driver: name, default, unit, range, meaning; and what they add up to.
 
 One table, from which the node declares and checks, and from which ``make docs`` writes

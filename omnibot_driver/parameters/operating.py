@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The parameters of the driver's work: the line, commands, frames. Knows no ROS."""
 
 from typing import Final

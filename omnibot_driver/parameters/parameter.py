@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """One parameter: name, default, unit, range, meaning, and the check of a value. Knows no ROS."""
 
 from collections.abc import Iterable

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The parameters of what is driven: the robot, its board, its IMU, and how sure they measure."""
 
 from typing import Final

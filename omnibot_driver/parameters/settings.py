@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From checked values to what the core is set to: each value under its meaning there."""
 
 from collections.abc import Mapping

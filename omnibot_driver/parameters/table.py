@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Every parameter of the driver, and the check of all values together. Knows no ROS."""
 
 import difflib

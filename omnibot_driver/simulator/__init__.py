@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The OmniBot board in software, written from its manual, to run the driver against.
 
 Shares no code with the driver: a misread manual must not cancel out. `SimulatedBoard` is pure,

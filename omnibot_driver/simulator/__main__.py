@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Command line of the simulated board: real time, a pseudo-terminal, a small console on stdin.
 
 Knows arguments, signals and the console. Must not know the wire or the board's insides.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The manual's geometry of three omni wheels (Control equation, Odometry equation).
 
 Knows the pure kinematics, without the gains of the firmware's command path, and how a displacement

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A bad line: bytes that are lost, alone or in bursts, and bits that change on the way.
 
 Knows bytes and chances; not what they mean.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The board's firmware: modes, the 100 Hz control loop, odometry and what is sent when.
 
 Pure: bytes in, one tick at a time, bytes out; the same settings and input give the same output.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The MPU6050 as it is mounted, by default upside down; +-2 g and +-250 degrees per second.
 
 Knows the sensor's scales, axes, bias and noise. Must not know the wire. The lever arm between the

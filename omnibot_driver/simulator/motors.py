@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """One wheel: a motor with its encoder, and the firmware's speed controller for it.
 
 Knows the 100 Hz tick and the controller gains of the manual. All speeds are encoder counts per

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What a user may choose about a simulated board: one table for the command line and for sim://.
 
 Knows words and their meaning. Must not know what runs the board.

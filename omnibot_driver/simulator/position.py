@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Positional control, of which the manual says no more than that the switch selects it.
 
 Knows the units of a commanded pose and how fast the robot drives to one. Must not know wheels.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A simulated board in real time behind a pseudo-terminal.
 
 Knows descriptors. Must not know what bytes mean.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A simulated board in real time: the thread that lets a tick pass every 10 ms.
 
 Knows the clock and the board's `receive` and `step`. Must not know what carries the bytes, nor

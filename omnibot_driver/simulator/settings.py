@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What can be chosen about a simulated board and its robot: values only, no behaviour."""
 
 from dataclasses import dataclass

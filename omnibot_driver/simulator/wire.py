@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The wire as the board sees it: the frames it sends and the bytes it understands.
 
 Knows the byte layouts of the manual (sections Serial Command and Serial Data Output), written from

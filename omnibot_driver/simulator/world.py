@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The robot on the floor: what truly moves when the motors turn.
 
 Knows motors, true wheel sizes, slip and the true pose. Must not know what the firmware believes,

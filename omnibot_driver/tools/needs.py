@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the tools need beyond the driver, and the sentence for who has not got it."""
 
 from importlib import import_module

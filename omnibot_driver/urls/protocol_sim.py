@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``sim://``: a simulated board inside this process, as a port of pyserial's.
 
 Options come after a question mark: ``sim://?seed=1&imu_only``. The board begins when the port is

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The core alone: decoding against a trusting loop, linearity, memory over an hour of stream."""
 
 import gc

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Another process's callback: notes when which Imu came, until its standard input ends.
 
 Arguments: namespaces. Prints one JSON object with an array per namespace: ``heard`` has pairs of

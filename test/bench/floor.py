@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The floor: the smallest program that does the same without looking at what it does.
 
 ``measurements PORT NAMESPACE`` publishes an Imu for every IMU frame, an Odometry and a JointState

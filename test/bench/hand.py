@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Commands two robots in turn, 40 times a second each, for so many seconds.
 
 Arguments: seconds, namespaces. Prints one JSON array per namespace: pairs of the steady clock's

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Processes that are measured, and what /proc tells of them."""
 
 import json

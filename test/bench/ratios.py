@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Figures against a floor: the median of alternating pairs, and how far they scatter."""
 
 from collections.abc import Callable, Sequence

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The performance report: ``make bench`` prints it and writes it into docs/performance.md.
 
 Every figure is measured beside its floor on the same machine in the same minutes. ``--quick`` makes

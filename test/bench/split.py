@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Where the driver's processor time goes: timers of its reader's own time, around the stages.
 
 Run in the driver's process before it starts; at its end it writes a JSON object of seconds per

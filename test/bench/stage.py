@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Boards that say the nominal stream on pseudo-terminals, each at a moment of its own in the tick.
 
 They take turns within the 10 ms, so whoever reads them is measured in alternation. Every IMU frame

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The driver as a process on a pseudo-terminal, beside the floor."""
 
 import bisect

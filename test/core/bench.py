@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A session and a simulated board on one workbench, wired to each other in simulated time."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A simulated robot, a line that loses frames, and the odometry at its other end."""
 
 import math

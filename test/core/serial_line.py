@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A board's byte stream with known sampling times, and the ways it reaches a host.
 
 Written from the manual, with no code of the driver's: 10 ms ticks of the board's own crystal, IMU,

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Hypothesis strategies of the core's tests, all of them."""
 
 import struct

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Streams of the simulated board, their frames by the manual's tables, and what a decoder makes."""
 
 import struct

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Odometry that finds its heading, is attached anew, and is reset."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Minutes over a bad line, in simulated time: bytes are lost alone and in bursts."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """One bit of one payload changes on the line, anywhere: what is published, and for how long."""
 
 import math

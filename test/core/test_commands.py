@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Pacing, repeating, timing out and the latch, with frames that mean nothing."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The covariance of the odometry: its form, its growth, and the truth of it."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The decoder on undamaged streams, from the beginning or from anywhere.
 
 Streams come from the simulated board and are typed from the manual's layouts; what is expected of

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The decoder on damaged streams, on texts between frames, and after silences."""
 
 from random import Random

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Whatever comes in, at whatever times, in whatever chunks, the decoder
 
 * never raises;

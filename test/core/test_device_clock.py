@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Sampling times against the truth of a generated line, in simulated time."""
 
 import math

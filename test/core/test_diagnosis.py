@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Verdicts: each fault alone raises its own status, says what to do, and is forgotten in time."""
 
 from collections.abc import Callable

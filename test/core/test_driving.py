@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Motion commands through a session to a simulated board: authority, ramps, stamps, limits."""
 
 import itertools

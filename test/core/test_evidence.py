@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Content as evidence: what a frame costs after what came before it."""
 
 import pytest

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The driver's codec against bytes typed by hand from the manual."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Odometry over lost frames and false poses, against the simulated board."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The gyro's bias, planted and found; and everything that must not pass for one."""
 
 import itertools

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Biases, calibration and figures, through a session and a simulated board."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Odometry over pauses, restarts and hours, and from wheel counts, against the simulated board."""
 
 import math

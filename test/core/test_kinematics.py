@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The wheels' geometry against the manual's equations, typed by hand."""
 
 import pytest

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Speed limits keep the direction; rounding and saturation are honest."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The mode table: what S, P, R and what is heard do."""
 
 from itertools import product

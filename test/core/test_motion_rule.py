@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The one motion rule, the e-stop, and what is done about a robot that does not obey."""
 
 import contextlib

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Odometry: displacements from a made-up board, and from the simulated one."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A board that takes its wheels and its base for others than they are, put right."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The board's bytes as readings in SI units, and wishes as the board's bytes."""
 
 import math

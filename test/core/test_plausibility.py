@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Readings that cannot be true: refused alone, and nothing else is."""
 
 import math

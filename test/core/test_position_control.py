@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Goals through a session to a simulated board whose switch stands on position."""
 
 import math

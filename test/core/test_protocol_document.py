@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The examples in docs/protocol.md against the codec: a document that is wrong must not pass.
 
 An example is a line of a code block: bytes, ``->``, a word and its numbers, perhaps a remark.

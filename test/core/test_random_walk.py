@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Random services, commands, cuts, losses, restarts and stalls: what holds whatever happens."""
 
 import contextlib

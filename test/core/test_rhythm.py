@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Bytes that made no frame, and the frames that they were."""
 
 import pytest

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the wheels have rolled: from displacements and back, over losses, restarts and resets."""
 
 import math

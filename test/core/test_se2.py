@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The integral of a constant twist, and its inverse."""
 
 import pytest

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the board's counters tell: losses, wraps, pauses, restarts."""
 
 import pytest

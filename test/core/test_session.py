@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A session against a simulated board in simulated time: what is promised, by the board's bytes."""
 
 import itertools

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Settings that the wire contradicts: told in one sentence, and only when they are wrong."""
 
 import math

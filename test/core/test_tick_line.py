@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The line over the ticks, between made-up bounds in s."""
 
 from collections.abc import Callable

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A board made up for the odometry: it turns body twists into what the manual's firmware sends.
 
 Written with rotation matrices and independent of the code under test.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Robots under way on a line that loses frames, and when their odometry is settled again."""
 
 from itertools import pairwise

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A simulated board at the end of a line that can be broken, and a record of the truth.
 
 Knows bytes only as bytes. A ``Damage`` is what happens to those of one tick, or of one write.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The fault campaign: ``make faults`` runs it and writes its table into docs/safety.md.
 
 Every scripted fault, random input, random walks over several seeds; with ``--minutes`` a soak of

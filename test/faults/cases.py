@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The faults, scripted: what happens while somebody drives, and what has to come of it.
 
 A case gets a rig whose robot stands and leaves it so; ``findings`` collects what it has to say.

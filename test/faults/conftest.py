@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the tests of the campaign share."""
 
 from collections.abc import Iterator

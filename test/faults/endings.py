@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """How a driver ends while the robot drives: asked to, by a defect, or by force.
 
 Each ending names what is run in the driver's process first, and leaves a rig without a driver.

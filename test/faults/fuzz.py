@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Random input from ROS: messages of any content and size, bytes that are no message, calls."""
 
 import struct

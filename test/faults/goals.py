@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What discards a goal of position control: nobody says anything, and the robot stands.
 
 Each event returns the board's tick from which it has to.

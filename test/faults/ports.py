@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Boards whose port can be stuck, full, half-open or gone without a word.
 
 Knows descriptors and sockets; bytes only as bytes.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What was published, as keys that can be looked for in what the board sent."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A real driver process on a breakable line, somebody who drives it, and the judgement of it all.
 
 What is judged: whether the robot stood still in time, whether every message published was sent by

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Ports that are open and take nothing: stuck adapters, full buffers, half-open sockets."""
 
 from collections.abc import Callable

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Nearly every fault once: the robot stands still in time and nothing false is said."""
 
 from collections.abc import Iterator

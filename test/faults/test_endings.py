@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """However the driver ends, the robot stands still."""
 
 from pathlib import Path

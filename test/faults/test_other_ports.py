@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A board behind a network, and one whose switch stands on position."""
 
 from collections.abc import Callable, Iterator

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """People and programs that do what they should not, while somebody drives."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Faults in random order, on top of each other, while somebody drives at random.
 
 Every few steps the line heals and the hand leaves the stick: then the robot has to stand in time,

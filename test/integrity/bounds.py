@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The numbers to reach, and how streams are run to compare with them."""
 
 from dataclasses import dataclass

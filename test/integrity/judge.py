@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The judge: which frames that came out were sent there, and which intact ones are missing."""
 
 from collections.abc import Callable

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The two parsers under test, brought to one shape: the driver's, and one that trusts headers."""
 
 import struct

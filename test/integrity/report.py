@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The integrity report: ``make integrity`` prints it and writes it into docs/integrity.md.
 
 Arguments: ``--seconds`` of each stream, how many ``--seeds`` and the ``--first`` of them; the costs

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The quick loop for calm frames takes exactly what the decoder's own loop takes."""
 
 from random import Random

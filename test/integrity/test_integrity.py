@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A part of the integrity report: every bound, on streams long enough for it to mean something."""
 
 import os

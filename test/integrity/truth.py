@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The generator of truth: what a board sends, frame by frame and byte by byte, with arrival times.
 
 Typed from the manual's layouts with ``struct``; it shares nothing with the driver. Sensor noise is

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The robot's description, expanded by xacro and read by the URDF parser that ROS tools use."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The documents: what is generated is current, links and commands hold, the site builds."""
 
 import re

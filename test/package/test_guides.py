@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The guides against the code: no sentence it no longer says, no parameter it lacks."""
 
 import ast

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What `colcon build` and `pip install` put where, found and started the way `ros2 run` does it."""
 
 import os

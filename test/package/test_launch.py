@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the launch files start, with which arguments and parameters.
 
 Where launch is not installed, only what can be read off the files is checked.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the Makefile says to somebody whose machine cannot do what it asks for."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the package declares about itself, and who in it may import whom."""
 
 import ast
@@ -238,3 +240,11 @@ def test_mypy_checks_exactly_what_imports_no_ros() -> None:
         if not re.search(mypy["exclude"], str(file.relative_to(ROOT)))
     }
     assert checked == without_ros
+
+
+def test_every_source_file_says_whose_it_is() -> None:
+    """In its first line, with the licence that package.xml declares."""
+    line = f"# Copyright {MANIFEST.findtext('maintainer')}. SPDX-License-Identifier: Apache-2.0"
+    files = python_files(PACKAGE, "docs", "launch", "test", "setup.py")
+    without = [str(file) for file in files if file.read_text().partition("\n")[0] != line]
+    assert not without

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The udev rules and the systemd unit: well formed, and as the documents say."""
 
 import re

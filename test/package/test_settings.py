@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Settings for other packages: they name what the driver has, and ask no more than it gives."""
 
 import ast

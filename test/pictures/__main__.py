@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Every picture of the README and the documents that a tool makes: ``make pictures``.
 
 Each module here has a ``main(folder)`` that writes pictures into the folder; each runs in a process

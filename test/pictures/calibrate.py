@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The pictures of ``calibrate imu``, ``scale`` and ``geometry``, on robots with planted errors.
 
 What was planted is in docs/calibrate.md, beside what is found here.

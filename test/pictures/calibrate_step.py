@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The pictures of ``calibrate step`` and ``calibrate commission``, on robots with planted errors.
 
 What was planted is in docs/calibrate.md, beside what is found here.

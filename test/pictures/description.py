@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The picture of the robot's description: its cylinders and boxes, by a small ray tracer."""
 
 from collections.abc import Iterator

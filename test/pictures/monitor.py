@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The monitor's pictures, from its real screen: ``python test/pictures/monitor.py docs/pictures``.
 
 A driver on a simulated board, a robot that drives a square round it, and the dashboard at 80x24.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The report's pictures: a drive round the demo's square, with an e-stop, recorded to a bag."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """One wheel: step responses of motor and controller."""
 
 import pytest

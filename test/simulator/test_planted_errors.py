@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What a calibration is to find can be planted: it shows in what the board sends and does."""
 
 import struct

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The board in real time behind a real pseudo-terminal."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The firmware: modes, commands, odometry and the rhythm of what is sent."""
 
 import struct

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The simulator's codec against bytes typed by hand from the manual."""
 
 import pytest

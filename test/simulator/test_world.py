@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Geometry, truth and the departures of the truth from what the board believes."""
 
 from math import cos, pi, sqrt

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A driver's topics recorded into a rosbag2, as `ros2 bag record` would, and read back."""
 
 import importlib

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Real driver processes, a real pseudo-terminal, real DDS: what the system tests stand on."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A drive over a bad line, end to end: what was published against what the board really sent.
 
 ``python test/system/drive.py SECONDS --lose 0.001`` runs the driver as a process of its own on a

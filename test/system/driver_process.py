@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The driver as a process of its own, with its output and its end."""
 
 import contextlib

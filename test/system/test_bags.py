@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What a driver publishes fits into a bag and comes out of it; a recorded wire is heard again."""
 
 import signal

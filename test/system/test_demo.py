@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The demo: its steering and drawing as functions, and the whole of it as a user runs it."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The driver on a line that loses bytes, end to end: process, pseudo-terminal, topics."""
 
 from drive import drive

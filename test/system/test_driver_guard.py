@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A host that is lost: the driver is killed, crashes or hangs while the robot moves."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Joint states, diagnostics, transforms and the gyro's calibration, over real DDS."""
 
 import importlib.util

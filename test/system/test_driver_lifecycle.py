@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Starting, ending, parameters and ports that are missing, busy, wrong or come late."""
 
 import contextlib

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Each service, called by another process, with the board's bytes and modes checked."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the driver publishes and obeys, as another process sees it over real DDS."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Three robots in one domain: each hears its own commands and speaks of its own frames."""
 
 from collections.abc import Iterator

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The monitor on a terminal and in a pipe, with a real driver on a simulated board."""
 
 import json

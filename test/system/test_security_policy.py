@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """config/omnibot.policy.xml against SROS2's schema 0.2.0, and against the node as it really is."""
 
 from collections.abc import Callable

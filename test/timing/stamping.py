@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Stamps of a generated line against its true sampling times.
 
 The line is that of ``test/integrity/truth.py``, with a crystal that is off, through the driver's

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The timing report: prints the worst figures of each cell and writes them into docs/time.md.
 
 Arguments: ``--seconds`` of each stream and ``--seeds``. The seeds share out the skews.

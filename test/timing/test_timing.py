@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A part of the timing report."""
 
 import pytest

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A robot in simulated time: session and board on a bench, in place of a running driver."""
 
 from collections.abc import Callable

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A robot with planted errors, a real driver, and a user who answers."""
 
 import math

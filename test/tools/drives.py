@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Drives made of numbers, to plant troubles in: as a log, or as a bag like any recorder's."""
 
 from collections.abc import Sequence

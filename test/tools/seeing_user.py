@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A user beside a simulated robot, who sees its wheels and holds it as asked."""
 
 from omnibot_driver.simulator import PtyBoard

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Somebody with a tape measure, for ``calibrate geometry``."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``calibrate commission`` with a real driver, and a user who says what the wheels truly do."""
 
 import math

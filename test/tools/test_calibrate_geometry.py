@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``calibrate geometry``: wheels and bases of the wrong size are found by tape measure."""
 
 import argparse

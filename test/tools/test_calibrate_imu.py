@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``calibrate imu``: what was planted in the sensor is found, within what is claimed."""
 
 import math

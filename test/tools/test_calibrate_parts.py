@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What all calibrations have in common: bounds, questions, tables, files."""
 
 import io

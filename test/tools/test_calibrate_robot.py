@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A robot that is moved for a calibration stands still whatever happens, and says why."""
 
 import os

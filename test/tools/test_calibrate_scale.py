@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``calibrate scale``: the board's command units are found again."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``calibrate step`` with a real driver: a planted motor, found, told, drawn and written."""
 
 import argparse

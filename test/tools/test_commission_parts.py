@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What ``calibrate commission`` concludes from patterns, postures and drifts."""
 
 import math

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The dashboard at 80x24, with a robot that is none."""
 
 import asyncio

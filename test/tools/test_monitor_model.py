@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the monitor knows of the robot: rates, latest values, the way it went."""
 
 import math

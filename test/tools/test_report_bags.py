@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Bags of every kind read without ROS, and what is said of those that cannot be."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """docs/report.md names what the report judges, and the limits that it judges by."""
 
 import ast

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What a report says of the streams of a drive in which a trouble was planted, or none."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What a report says of a robot with a trouble in its motion or in its IMU."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The page needs nothing but itself, and the pictures show what there is."""
 
 import re

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``calibrate step``: constants that were planted in a wheel are found in its deltas."""
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The loop that is calculated with, its models, and the gains chosen for it."""
 
 import numpy as np

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What a report says of a drive made of numbers."""
 
 from drives import Drive

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """One wheel of the simulated board, faster than real time: what a calibration would hear."""
 
 import math

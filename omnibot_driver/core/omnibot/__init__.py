@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The Neuron OmniBot's STM32 motor board, and nothing else."""
 
 from omnibot_driver.core.omnibot.board import OmniBot, OmniBotSettings

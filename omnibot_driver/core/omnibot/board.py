@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The OmniBot board as a ``core.board.Board``: its bytes as readings, wishes as its bytes.
 
 Source: the board's manual ver. 0.3. Units on the wire: deltas 0.1 mm and 0.1 mrad per 40 ms;

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The commonest frames, quickly: IMU readings and deltas that nothing at all speaks against.
 
 It takes what the decoder's own loop would take with the evidence ``weigh`` finds, and nothing else:

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From a stream of bytes to frames: finding where a frame begins, and proving it.
 
 The protocol has no checksum and its header words are the commonest readings of a gyro at rest, so

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What speaks for and against a reading of the bytes, in one currency.
 
 A cost is about the negative logarithm of a probability: 1 is a factor of three. This module knows

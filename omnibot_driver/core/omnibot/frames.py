@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The wire format: every frame the board sends or obeys, as bytes and as values.
 
 Source: the board's manual ver. 0.3, sections "Serial Command (Rx)", "Serial Data Output (Tx)" and

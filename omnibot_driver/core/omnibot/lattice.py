@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """All readings of a stretch of bytes at once, the cheapest of them, and how far it is ahead.
 
 Nodes are the places between bytes, each twice: as a boundary of frames, and within a bad run.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The board's modes as a table: what S, P, R and what is heard do from each of them.
 
 Source: the manual's "Operation State Machine" and "System state command". The board never says

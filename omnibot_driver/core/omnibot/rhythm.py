@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The order in which a running board sends, and what it tells of bytes that made no frame.
 
 In nominal mode a delta follows every fourth IMU frame, and a pose every fifth delta; in IMU-only

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The board's counters: how many deltas are missing, and whether it has begun to count anew.
 
 SEQ is one byte and wraps every 10.24 s; arrival times tell how often. A pose comes with every fifth

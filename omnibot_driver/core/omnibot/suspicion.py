@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Settings that what the board sends contradicts: the user is told, nothing is switched by itself.
 
 Poses that make sense only in the other byte order; deltas that lead to the next pose only in the

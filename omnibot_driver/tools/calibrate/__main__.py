@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Runs a calibration: ``python -m omnibot_driver.tools.calibrate imu|scale|geometry|...``.
 
 Each subcommand is a module of this package with ``add_arguments(parser)`` and

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Allan deviation of a sensor at rest, and what it says of the noise.
 
 Overlapping estimator: NIST Special Publication 1065; noise terms and the deviation of an estimate:

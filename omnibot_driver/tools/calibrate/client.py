@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The running driver as a ROS node: found, its parameters, its services. Must not know motions.
 
 Everything runs in the caller's thread: whoever waits, spins.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``calibrate commission``: a guided walk that finds which way round everything is.
 
 What the board's data can tell is taken from them; a person is asked for the rest, which is what the

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What ``calibrate commission`` found, for the table, the file and the reader."""
 
 import math

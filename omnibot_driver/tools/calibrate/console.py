@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The conversation with whoever stands beside the robot: questions, progress, the table.
 
 ``read`` is what answers; tests answer themselves.

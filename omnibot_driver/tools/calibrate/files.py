@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Where a calibration goes: the driver's calibration file, and a picture."""
 
 import os

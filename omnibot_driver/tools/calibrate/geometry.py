@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``calibrate geometry``: lines, turns and squares, and a tape measure: wheel and base radius."""
 
 import argparse

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From where the odometry believed to be and where the tape found the robot, to its geometry. Pure.
 
 Every way of the odometry is taken back to what the wheels rolled, and rolled again with wheels and

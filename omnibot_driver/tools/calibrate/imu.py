@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``calibrate imu``: the robot rests, the IMU says what it says of nothing."""
 
 import argparse

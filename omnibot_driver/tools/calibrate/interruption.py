@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Ctrl-C, a lost SSH session and kill: told when somebody asks, except while a person is asked.
 
 Inside ROS an exception at any place would leave the executor half done.

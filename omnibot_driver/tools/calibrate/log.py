@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What was heard of a robot and told to it during one motion or one rest, as columns.
 
 Times are in seconds by ROS's clock; those of measurements are when the board sampled. Knows no ROS.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the board's commands and deltas mean, told by what the wheels do. Pure calculation.
 
 Nothing here needs eyes or floor: the board's own odometry is enough, whatever its signs and scales.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """How a robot is moved for a calibration: laws, their bounds, and whether the robot obeys.
 
 Pure. A law says what is commanded at a time, given where the odometry is; None ends the motion.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """How the IMU is mounted, from gravity in three postures and from one turn. Pure calculation.
 
 Level, nose up and left side up, by some unknown angle each: what is straight up in the body is then

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What an IMU at rest says: its biases, its noise, and which way is up. Pure.
 
 A single rest cannot tell an accelerometer's bias from a tilt, nor a tilt of the sensor from one of

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What a calibration found: values with their uncertainty. Knows no terminal, no file, no ROS."""
 
 from collections.abc import Callable, Mapping

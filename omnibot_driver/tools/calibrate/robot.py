@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The robot as a calibration has it: a client of the running driver. Must not know what is found.
 
 Every motion is `drive`, whatever happens ends in commands to stand still; and if this process dies,

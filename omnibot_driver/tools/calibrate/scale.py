@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``calibrate scale``: commanded against measured speeds, the board's command units."""
 
 import argparse

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What a person saw the wheels do, and what follows from it.
 
 Pure. Patterns are of wheels A, B, C: 1 counter-clockwise seen from outside (what the manual's

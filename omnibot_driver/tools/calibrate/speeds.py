@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Commanded against measured speeds: what to command, and the scale that explains it. Pure.
 
 The board takes whole counts. So whole counts are commanded, and a speed that was measured is

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``calibrate step``: how each wheel answers a step, its motor, and which gains suit it.
 
 Each wheel alone is sent to and fro between two speeds in the same direction, then in the other one.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The picture of ``calibrate step``: what was measured, and what the gains would do."""
 
 from collections.abc import Sequence

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From recorded steps of one wheel to models with uncertainties. Pure calculation.
 
 Time counts from the *onset*: the board's control tick that could first see the command. The ticks

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Step responses as an odometry delta sees them: averaged over the 40 ms that it covers.
 
 Every model knows how far a wheel has turned at a time, after a step of 1 in rate at time 0; so a

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Which gains of the manual's law suit a motor, and what they and the manual's do on it.
 
 Criterion: a step of command followed and a step of load held off (a floor, a sagging battery, dry

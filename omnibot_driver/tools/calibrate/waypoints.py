@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Driving by the odometry, from one pose to the next. Pure."""
 
 import math

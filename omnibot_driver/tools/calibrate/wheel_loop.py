@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """One wheel in the manual's control loop, small signals: what it answers to which gains.
 
 All speeds are encoder counts per control tick of 10 ms, all efforts PWM steps, all times ticks.

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Runs the monitor: ``ros2 run omnibot_driver monitor``."""
 
 import argparse

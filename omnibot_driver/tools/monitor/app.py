@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The dashboard. Knows terminals and keys; what it shows and whom it tells is a ``Robot``."""
 
 import asyncio

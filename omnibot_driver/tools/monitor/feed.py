@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The driver as the monitor has it: its topics into a model, its services and ``cmd_vel`` out.
 
 Callbacks run on an executor's thread of their own, so what a screen does delays none of them.

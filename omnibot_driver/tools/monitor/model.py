@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What is known of the robot: the latest values, how often they come, the way it went.
 
 Must not know ROS, terminals or the clock. Values are kept as they came, NaN and infinity included:

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Pictures made of characters: a way in Braille, a row of bars. Knows cells; no colours, no ROS."""
 
 import math

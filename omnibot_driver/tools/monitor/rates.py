@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """How often something arrives. Knows counting; must not know what arrives, nor read a clock."""
 
 from collections import deque

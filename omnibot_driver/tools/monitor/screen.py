@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Whether there is a screen. Knows the streams of this process; nothing of what is shown."""
 
 import os

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Steering by keys, with a dead man's rule. Knows keys and times; no terminal, no ROS, no clock.
 
 A terminal tells that a key is pressed, repeats it while it is held, and never tells of its release.

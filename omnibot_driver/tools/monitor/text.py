@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A view of the robot in words and in JSON. Must not know ROS, nor where it is shown."""
 
 import json

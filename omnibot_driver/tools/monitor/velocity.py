@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """``cmd_vel`` both ways: heard from whomever, said as a dead man wishes. Knows ROS alone."""
 
 import time

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What a drive was like, from a bag or from a robot that is listened to: a page, pictures, words.
 
 ``recorder`` turns messages into a ``log`` of columns; ``bag`` and ``live`` feed it. ``judge`` asks

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A drive in words and pictures: ``python -m omnibot_driver.tools.report BAG``."""
 
 import argparse

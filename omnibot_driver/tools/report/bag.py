@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A rosbag2 read without ROS: a folder or a file of it, sqlite3 or mcap, also compressed."""
 
 from collections.abc import Callable, Collection, Iterator

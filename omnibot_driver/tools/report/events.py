@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the driver said of itself: its state, the e-stop, /diagnostics."""
 
 from collections import Counter

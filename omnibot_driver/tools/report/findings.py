@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What can be said of a drive: how good it is, the figure, and what to do."""
 
 from collections.abc import Iterable

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Whether the robot did what it was told: commands against what was measured."""
 
 from collections.abc import Iterator

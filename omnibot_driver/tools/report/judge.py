@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Everything that a log tells, the gravest first."""
 
 from collections.abc import Iterator

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """A running robot, recorded as into a bag. Knows ROS; must not know what is made of it."""
 
 import time

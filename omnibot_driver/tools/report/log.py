@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What was heard of one robot, as columns. Times are seconds since the log began."""
 
 from collections.abc import Mapping

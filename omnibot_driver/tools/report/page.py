@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """The report as files: pictures, and one page of HTML that has them inside."""
 
 import base64

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Pictures of a log: each function draws one figure, which needs neither a screen nor ROS."""
 
 from collections.abc import Iterable

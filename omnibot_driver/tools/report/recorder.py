@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """From messages to columns, whether rosbags or rclpy made them: both name the fields alike."""
 
 import math

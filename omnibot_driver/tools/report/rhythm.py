@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Timing of a stream: its rate, how even its stamps are, what is missing, how late it arrives."""
 
 from collections.abc import Iterator

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """Which robots there are among topics, known by name and type alone."""
 
 from collections.abc import Iterable, Mapping

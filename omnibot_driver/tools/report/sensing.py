@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the IMU tells of itself: gravity and bias at rest, turning and vibration in motion."""
 
 from collections.abc import Iterator

@@ -1,3 +1,5 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
 """What the odometry tells of a drive: how far, how fast, and whether it hangs together."""
 
 from collections.abc import Iterator
