@@ -60,7 +60,7 @@ def main() -> int:
     figures, sections = measure(quick=chosen.quick)
     machine = (
         f"{os.cpu_count()} processors, load {os.getloadavg()[2]:.1f} over the last 15 minutes,"
-        f" Linux {platform.release()}, Python {platform.python_version()}:"
+        f" Linux, Python {platform.python_version()}:"
     )
     text = "\n".join([machine, "", *table(figures), *sections])
     print(text)
