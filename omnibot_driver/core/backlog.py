@@ -54,6 +54,16 @@ class Backlog:
             return reading.lost * reading.duration_s
         return 0.0 if last_stamp_s is None else max(0.0, stamp_s - last_stamp_s)
 
+    def unstamped_s(self, last_stamp_s: float | None) -> float:
+        """Likewise, as far as the stamps show it beside what the first one stands for itself."""
+        unheard_s = self.unheard_s(last_stamp_s)
+        if not self._waiting or last_stamp_s is None:
+            return unheard_s
+        reading, stamp_s = self._waiting[0]
+        if reading.duration_s is None:
+            return 0.0
+        return min(unheard_s, max(0.0, stamp_s - last_stamp_s - reading.duration_s))
+
     def before(self, board: Pose) -> Pose:
         """Where they began if they lead to this pose."""
         start = Pose(yaw_rad=board.yaw_rad - sum(reading.dyaw_rad for reading, _ in self._waiting))

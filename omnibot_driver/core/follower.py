@@ -38,6 +38,13 @@ class Follower:
         self._room_m += room_m - chord.way_m
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
+    def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
+        """Likewise, but what goes beyond the room is followed later."""
+        linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
+        behind = self.target.moved(chord)
+        self.move(chord.times(linear, linear, angular), room_m, room_rad)
+        self.target = behind
+
     def follow(self, seconds: float) -> None:
         """Approach the target by this step's share, as far as there is room."""
         wrong = self.wrong

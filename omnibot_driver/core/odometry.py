@@ -8,6 +8,7 @@ together, by the same tangent in the body's axes, so motion that was lost on the
 with the next pose. This module knows SE(2); it knows no bytes, no clock and no ROS.
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -202,13 +203,13 @@ class Odometry:
     def _resume(self, told: Pose) -> list[OdometryEstimate]:
         """The pose tells what was lost before the displacements that wait."""
         assert self._board is not None
-        seconds = self._backlog.unheard_s(self._last_stamp_s)
+        seconds = self._backlog.unstamped_s(self._last_stamp_s)
         way = unroll(self._board.way_to(self._backlog.before(told)))
         self._board = self._board.moved(roll(way))
         self._rolled += self._scaled(way)
         self._uncertainty.move(self._follower.target.yaw_rad, self._signed(way))
         self._follower.correct(roll(self._signed(way)), 0.0)
-        self._move(Pose(), seconds)
+        self._move(Pose(), seconds, seconds)
         self._backlog.forget_losses()
         estimates = self._release()
         self._uncertainty.settle()
@@ -267,10 +268,11 @@ class Odometry:
         elif reading.lost:
             self._miss((reading.lost + 1) * seconds)
         if reading.lost:
-            self._bridge(bridge, reading.lost * seconds)
+            stamped_s = math.inf if last_stamp_s is None else stamp_s - last_stamp_s - seconds
+            self._bridge(bridge, reading.lost * seconds, stamped_s)
         if self._board is not None:
             self._board = advanced(self._board, reading)
-        self._move(tangent, seconds)
+        self._move(tangent, seconds, seconds)
         self._follower.follow((reading.lost + 1) * seconds)
         twist = rolling = None
         if reading.duration_s:
@@ -281,12 +283,12 @@ class Odometry:
             stamp_s, self._follower.pose, twist, covariance, self._rolled, rolling
         )
 
-    def _bridge(self, tangent: Pose, seconds: float) -> None:
-        """Motion that was not told, taken to be this one."""
+    def _bridge(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
+        """Motion that was not told, taken to be this one; the stamps leave so much time for it."""
         if self._board is not None:
             self._board = self._board.moved(roll(tangent))
         self._belief.bridged(roll(tangent))
-        self._move(tangent, seconds)
+        self._move(tangent, seconds, min(seconds, max(0.0, stamped_s)))
 
     def _bridge_until_pose(self, lost: int) -> None:
         """Displacements are missing that the pose includes; nobody knows what comes after it."""
@@ -295,13 +297,16 @@ class Odometry:
             self._miss((lost + 1) * period_s)
             self._bridge(tangent.times(lost, lost, lost), lost * period_s)
 
-    def _move(self, tangent: Pose, seconds: float) -> None:
-        """Along a tangent in the board's body axes."""
+    def _move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
+        """Along a tangent in the board's body axes, and no further than by the stamps it can be."""
         self._rolled += self._scaled(tangent)
         part = self._signed(tangent)
         self._uncertainty.move(self._follower.target.yaw_rad, part)
-        self._follower.move(
-            roll(part), self._settings.fastest_mps * seconds, self._settings.fastest_radps * seconds
+        move = self._follower.move if stamped_s >= seconds else self._follower.trail
+        move(
+            roll(part),
+            self._settings.fastest_mps * stamped_s,
+            self._settings.fastest_radps * stamped_s,
         )
         self._belief.passed(seconds)
 

@@ -135,7 +135,7 @@ def test_a_wrong_namespace_names_the_drivers_there_are(
     rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With exit code 1."""
-    monkeypatch.setattr(client, "FOUND_WITHIN_S", 2.0)
+    monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
     assert main(["imu", "--yes", "--namespace", "nowhere"]) == 1
     said = capsys.readouterr().err
     assert "no driver is running in the namespace /nowhere; there are" in said

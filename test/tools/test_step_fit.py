@@ -62,7 +62,7 @@ def test_a_motor_is_found_in_the_manuals_loop(
     steps = made_up(motor_model(MANUAL), planted, seed)
     found = fit(motor_model(MANUAL), steps)
     assert (np.abs(found.values - planted) < 5 * found.sigmas + 1e-6).all()
-    assert found.rms_radps < 1.02 * min(fit(FIRST_ORDER, steps).rms_radps, NOISE_RADPS * 1.1)
+    assert found.rms_radps < 1.02 * min(fit(FIRST_ORDER, steps).rms_radps, NOISE_RADPS * 1.3)
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
