@@ -107,7 +107,8 @@ class Sequence:
         if not self._regular:
             return Step(0)
         from_zero = abs(count * DELTAS_PER_POSE - self._delta) <= DELTAS_PER_POSE
-        if from_zero and abs(passed - counted) > 2 * DELTAS_PER_POSE:
+        goes_on = passed == DELTAS_PER_POSE or self._ahead is not None  # until a delta confirms it
+        if from_zero and not goes_on and abs(passed - counted) > 2 * DELTAS_PER_POSE:
             return Step(0, None, restarted=True)
         missing = max(0, passed - counted)
         in_time = missing * DELTA_PERIOD_S <= now - self._delta_at + DELTA_PERIOD_S
