@@ -7,6 +7,7 @@ pipe that nobody reads, would freeze every thread, the watchdog included, and th
 with its last command. So what is printed goes through a pipe that would rather lose a line.
 """
 
+import contextlib
 import os
 import sys
 import threading
@@ -58,11 +59,8 @@ def _redirect(descriptor: int) -> int:
 
 
 def _copy(reading: int, writing: int) -> None:
-    try:
-        while data := os.read(reading, CHUNK_BYTES):
-            while data:
-                data = data[os.write(writing, data) :]
-    except OSError:
-        return  # nobody listens any more
-    finally:
-        os.close(reading)
+    with open(reading, "rb", buffering=0) as source:
+        while data := source.read(CHUNK_BYTES):
+            with contextlib.suppress(OSError):  # a full disk may have room later
+                while data:
+                    data = data[os.write(writing, data) :]
