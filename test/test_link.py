@@ -105,6 +105,25 @@ def test_closing_writes_stop_and_ends_the_threads(board: PtyBoard) -> None:
     assert ours.state == "disconnected"
 
 
+def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_farewell_too(
+    board: PtyBoard,
+) -> None:
+    """The robot may still be driving by what it was told before the port was lost."""
+    listener = Listener()
+    closer = threading.Thread(target=lambda: link.close("stop"))
+
+    def close_first(_trouble: str | None) -> None:
+        closer.start()
+        wait_for_the_end_of("omnibot-pacer")
+
+    listener.report = close_first  # type: ignore[method-assign]
+    link = link_to(board.path, listener, session())
+    link.start()
+    assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
+    closer.join(PATIENCE_S)
+    wait_for_the_end_of("omnibot-reader")
+
+
 def test_every_read_and_every_write_can_be_listened_to(board: PtyBoard) -> None:
     """Byte for byte as they were, the opening and the farewell included."""
     read, written = [], []
@@ -253,7 +272,7 @@ def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) 
     terminal.fill()
     link.close("stop")
     terminal.read_until(LAST_WORDS)
-    wait_for_threads_to_end()
+    wait_for_the_end_of("omnibot-reader", "omnibot-pacer")
 
 
 def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
@@ -292,12 +311,12 @@ def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: 
     assert farewell_over.wait(PATIENCE_S)
     terminal.read_until(LAST_WORDS)
     link.close("stop")
-    wait_for_threads_to_end()
+    wait_for_the_end_of("omnibot-reader", "omnibot-pacer")
 
 
-def wait_for_threads_to_end() -> None:
+def wait_for_the_end_of(*names: str) -> None:
     for thread in threading.enumerate():
-        if thread.name.startswith("omnibot-"):
+        if thread.name in names:
             thread.join(PATIENCE_S)
 
 
