@@ -23,6 +23,7 @@ class UnblockedOutput:
     """While entered, writing to the standard output and error of this process never waits."""
 
     def __enter__(self) -> Self:
+        _fill_gaps()
         if os.isatty(2):
             os.environ.setdefault("RCUTILS_COLORIZED_OUTPUT", "1")  # it would see our pipe
         self._originals = [os.dup(descriptor) for descriptor in STANDARD]
@@ -40,13 +41,21 @@ class UnblockedOutput:
         exc: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        sys.stdout.flush()
+        if sys.stdout is not None:  # it was closed
+            sys.stdout.flush()
         for descriptor, original in zip(STANDARD, self._originals, strict=True):
             os.dup2(original, descriptor)  # closes the pipe's last writing end
         for copier, original in zip(self._copiers, self._originals, strict=True):
             copier.join(LAST_WORDS_S)
             if not copier.is_alive():
                 os.close(original)
+
+
+def _fill_gaps() -> None:
+    """Where a standard descriptor is closed, the port would become it: the board would get the log."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= max(STANDARD):
+        pass
+    os.close(descriptor)
 
 
 def _redirect(descriptor: int) -> int:

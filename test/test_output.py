@@ -5,9 +5,13 @@
 import fcntl
 import os
 import struct
+import subprocess
+import sys
 import termios
 import threading
 import time
+
+import pytest
 
 from omnibot_driver.output import _copy
 
@@ -38,3 +42,23 @@ def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
     assert os.read(heard, 100).endswith(b"kept\n")
     for descriptor in (heard, room, disk):
         os.close(descriptor)
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
+    """What is printed would go to the board."""
+    program = """
+import os, sys
+from omnibot_driver.output import UnblockedOutput
+with UnblockedOutput():
+    print("to nobody", file=sys.stderr)
+    port = os.open("/dev/null", os.O_RDWR)
+sys.exit(port <= 2)
+"""
+    command = f'exec "$0" -c "$1" {closed}'
+    done = subprocess.run(
+        ["sh", "-c", command, sys.executable, program],
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert done.returncode == 0
