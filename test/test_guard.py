@@ -85,7 +85,7 @@ def started(pid: int) -> None:
     bit = 1 << (signal.SIGTERM - 1)
     while not int(status_of(pid, "SigIgn"), 16) & bit:
         assert time.monotonic() < end
-        time.sleep(0.005)
+        time.sleep(0.005)  # what a process ignores changes without an event
 
 
 def status_of(pid: int, field: str) -> str:
@@ -94,7 +94,7 @@ def status_of(pid: int, field: str) -> str:
 
 
 def alive(keeper: Keeper, seconds: float) -> None:
-    """Beat as the driver does."""
+    """Beat as the driver does, whose pace is the thing itself."""
     end = time.monotonic() + seconds
     while (now := time.monotonic()) < end:
         keeper.beat(now)
