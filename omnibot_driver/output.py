@@ -52,7 +52,7 @@ class UnblockedOutput:
 
 
 def _fill_gaps() -> None:
-    """Where a standard descriptor is closed, the port would become it: the board would get the log."""
+    """Else the port would become a standard output that is closed: the board would get the log."""
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= max(STANDARD):
         pass
     os.close(descriptor)

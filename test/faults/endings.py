@@ -161,11 +161,9 @@ ENDINGS: Final[dict[str, Ending]] = {
     "SIGKILL, the port full": Ending(
         partial(while_full, by_signals(signal.SIGKILL)), (-signal.SIGKILL,), (STOP, LAST_WORDS)
     ),
-    "SIGSEGV": Ending(by_signals(signal.SIGSEGV), (-signal.SIGSEGV,), LAST_WORDS),
-    "a null pointer": Ending(
+    "a segmentation fault": Ending(
         by_topic, (-signal.SIGSEGV,), LAST_WORDS, IN_A_CALLBACK.format("ctypes.string_at(0)")
     ),
-    "abort": Ending(by_signals(signal.SIGABRT), (-signal.SIGABRT,), LAST_WORDS),
     "a library that exits": Ending(by_topic, (3,), LAST_WORDS, IN_A_CALLBACK.format("os._exit(3)")),
 }
 

@@ -17,9 +17,9 @@ SOME = (
     "a farewell that hangs, and ctrl-C",
     "an exception, the port full",
     "SIGKILL, the port full",
-    "a null pointer",
+    "a segmentation fault",
 )
-"""Others are in test_driver_lifecycle and test_driver_guard; ``make faults`` has them all."""
+"""Others are in test_driver_endings and test_driver_guard; ``make faults`` has them all."""
 
 
 @pytest.mark.parametrize("ending", [ENDINGS[name] for name in SOME], ids=SOME)
