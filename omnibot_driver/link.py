@@ -156,7 +156,8 @@ class Link:
             self._failed(error)
 
     def _serve(self) -> None:
-        while not self._closing.is_set():
+        # Once more when it ends: a robot that was lost while it drove is still to be stopped.
+        while not (leaving := self._closing.is_set()) or self._opened:
             try:
                 with closing(self._open()) as port:
                     self._report(None)
@@ -169,7 +170,10 @@ class Link:
                         raise
                     finally:
                         self._detach(port, comes_back=comes_back)
+                return
             except LinkError as error:
+                if leaving:
+                    return
                 self._trouble = str(error)
                 self._report(self._trouble)
                 self._closing.wait(self._wait_s)

@@ -113,6 +113,22 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_farewell_too(
     wait_for_the_end_of("omnibot-reader")
 
 
+def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
+    """The cable is in again, and the driver ends before it would have tried the port anew."""
+    name = tmp_path / "omnibot"
+    listener, ours = Listener(), session()
+    link = link_to(str(name), listener, ours)
+    link.reconnect_interval_s = 3600.0
+    with PtyBoard(SimulatedBoard(BoardSettings(running=True)), str(name)):
+        link.start()
+        listener.wait_for(lambda: ours.state == "nominal")
+    listener.wait_for(lambda: len(listener.reports) == 2)
+    with PtyBoard(SimulatedBoard(BoardSettings(running=True)), str(name)) as board:
+        link.close("stop")
+        assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
+    wait_for_the_end_of("omnibot-reader")
+
+
 def test_every_read_and_every_write_can_be_listened_to(board: PtyBoard) -> None:
     """Byte for byte as they were, the opening and the farewell included."""
     read, written = [], []

@@ -10,6 +10,7 @@ from goals import GOAL_ENDINGS
 from rig import GoalRig, Rig
 
 SOME = (
+    "ctrl-C, plugged in but not yet open again",
     "SIGTERM while a call is pending",
     "SIGINT, SIGTERM, SIGKILL to its process group",
     "an exit in a callback",
