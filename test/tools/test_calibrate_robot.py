@@ -3,18 +3,24 @@
 """A robot that is moved for a calibration stands still whatever happens, and says why."""
 
 import os
+import re
 import signal
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
-from calibrate_rig import Rig, rig
+from calibrate_rig import BUSY_S, Rig, rig
 from driver_process import PATIENCE_S
 from geometry_msgs.msg import Twist
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Float32MultiArray, String
 
+from omnibot_driver.parameters import PARAMETERS
 from omnibot_driver.simulator import SimulatedBoard
-from omnibot_driver.tools.calibrate import client
+from omnibot_driver.tools.calibrate import client, listener
+from omnibot_driver.tools.calibrate import robot as robot_module
 from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
 from omnibot_driver.tools.calibrate.motion import Bounds, steady
@@ -24,6 +30,7 @@ from omnibot_driver.tools.needs import ToolError
 SLOWLY = (0.15, 0.0, 0.0)
 BOUNDS = Bounds(speed=0.2, turning=0.5, way=0.8, turn=1.0, seconds=20.0, acceleration=1.0)
 AFTER_S = 0.4
+LOST_S = listener.LOST_S
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +84,7 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
         ("estop", "the e-stop is latched"),
         ("reboot", "the driver's state is or was"),
         ("other", "somebody else commands the robot on cmd_vel"),
+        ("wheels", "somebody else commands the robot on wheel_cmd"),
         ("signal", "interrupted: the robot is told to stand still"),
     ],
 )
@@ -87,10 +95,12 @@ def test_what_happens_on_the_way_ends_it_at_rest(
     node = robot._node
     estop = node.create_publisher(Bool, "estop", 10)
     other = node.create_publisher(Twist, "cmd_vel", 1)
+    wheels = node.create_publisher(Float32MultiArray, "wheel_cmd", 1)
     actions = {
         "estop": lambda: estop.publish(Bool(data=True)),
         "reboot": rigged.port.board.reboot,
         "other": lambda: other.publish(Twist()),
+        "wheels": lambda: wheels.publish(Float32MultiArray(data=[0.0, 0.0, 0.0])),
         "signal": lambda: os.kill(os.getpid(), signal.SIGINT),
     }
     with pytest.raises(ToolError, match=sentence) as caught:
@@ -123,6 +133,69 @@ def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> Non
     with pytest.raises(ToolError, match="does not move when told"):
         robot.drive(steady(SLOWLY, 10.0), BOUNDS)
     robot.set_parameters({"linear_scale": 70.0})
+
+
+def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
+    robot: Robot, rigged: Rig
+) -> None:
+    """ctrl-Z, then fg: the driver has stopped the robot meanwhile, and there it stays."""
+    clock = SimpleNamespace(monotonic=time.monotonic)
+
+    def suspend() -> None:
+        clock.monotonic = lambda: time.monotonic() + BUSY_S
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(robot_module, "time", clock)
+        with pytest.raises(ToolError, match=r"this program was held up for 3\.\d s"):
+            robot.drive(steady(SLOWLY, 10.0), BOUNDS, show=once(suspend))
+    values = robot.log.commands.values
+    halted = int(np.flatnonzero(values[:, 0])[-1]) + 1
+    assert not values[halted:].any()
+    assert rigged.port.wait_for(stands, PATIENCE_S)
+
+
+def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
+    robot: Robot, rigged: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside whatever else is wrong."""
+    monkeypatch.setattr(robot_module, "STANDING", -1.0)
+    monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)
+    with pytest.raises(ToolError, match=r"^the robot was told to stand still and is not seen to"):
+        robot.drive(steady(SLOWLY, 0.5), BOUNDS)
+    near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
+    with pytest.raises(ToolError, match=r"it went too far .*; and the robot was told to stand"):
+        robot.drive(steady(SLOWLY, 10.0), near)
+
+
+def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) -> None:
+    """Of the same name, too: both would obey."""
+    before = len(rigged.port.board.commands)
+    twin = robot._node.create_publisher(String, f"{robot.driver}/state", listener.LATCHED)
+    assert robot._wait(lambda: robot._node.count_publishers(twin.topic_name) == 2, PATIENCE_S)
+    name = re.escape(robot.driver)
+    with pytest.raises(ToolError, match=f"there are several drivers here: {name}, {name}; end all"):
+        robot.drive(steady(SLOWLY, 1.0), BOUNDS)
+    assert all(one.kind != "velocity" for one in list(rigged.port.board.commands)[before:])
+
+
+def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each topic that is wanted."""
+    monkeypatch.setattr(listener, "LOST_S", LOST_S)
+    heard_s = {listener.IMU: 10.0, listener.ODOMETRY: 9.9}
+    assert listener.silent(heard_s, listener.TOPICS, 10.19) == []
+    assert listener.silent(heard_s, listener.TOPICS, 10.21) == [listener.ODOMETRY]
+    assert listener.silent(heard_s, [listener.IMU], 10.29) == []
+    assert listener.silent(heard_s, listener.TOPICS, 10.31) == list(listener.TOPICS)
+
+
+def test_a_driver_of_another_version_is_told(
+    rigged: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It does not know a parameter of ours."""
+    newer = SimpleNamespace(name="of_tomorrow")
+    monkeypatch.setattr(client, "PARAMETERS", (*PARAMETERS, newer))
+    assert rigged.calibrate("scale") == 1
+    assert "is of another version than this tool" in capsys.readouterr().err
 
 
 def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
@@ -158,9 +231,17 @@ def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixtur
 
 
 def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
-    """The last one of this module; its guard stops the robot."""
-    with pytest.raises(ToolError, match=r"nothing came on .*odom for"):
-        robot.drive(steady(SLOWLY, 30.0), BOUNDS, show=once(rigged.driver.process.kill))
+    """The last one of this module; its guard stops the robot, which nobody hears any more."""
+
+    def kill() -> None:
+        rigged.driver.process.kill()
+        patch.setattr(listener, "LOST_S", LOST_S)
+
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        pytest.raises(ToolError, match=r"nothing came on .*odom for 0.3 s.*cut its power"),
+    ):
+        robot.drive(steady(SLOWLY, 30.0), BOUNDS, show=once(kill))
     assert rigged.port.wait_for(stands, PATIENCE_S)
 
 
