@@ -70,7 +70,7 @@ sizes = st.floats(0.93, 1.07)
 unlike = st.floats(-0.01, 0.01)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(sizes, sizes, unlike, unlike, st.integers(0, 10_000))
 def test_any_geometry_is_found_within_what_is_claimed(
     wheels: float, base: float, a: float, b: float, seed: int

@@ -23,11 +23,12 @@ from omnibot_driver.tools.needs import ToolError
 
 PLAIN: Final = 0.005
 """A wheel that differs from the others by more is worth a word."""
-INTRODUCTION: Final = """\
-You need a tape measure, something to mark the floor with, and a plumb or a fixed point under the
-robot's centre. Before each drive mark where the centre is and where the front points; after it you
-are asked where the robot has got to, seen from those marks: forward and left count as positive,
-back and right as negative. Let it go where it goes, and do not push it."""
+INTRODUCTION: Final = (
+    "You need a tape measure, something to mark the floor with, and a plumb or a fixed point under"
+    " the robot's centre. Before each drive mark where the centre is and where the front points;"
+    " after it you are asked where the robot has got to, seen from those marks: forward and left"
+    " count as positive, back and right as negative. Let it go where it goes, and do not push it."
+)
 
 
 @dataclass(frozen=True, slots=True)
