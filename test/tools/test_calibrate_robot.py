@@ -230,6 +230,21 @@ def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixtur
     assert not rigged.output.exists()
 
 
+def test_ctrl_c_at_an_open_question_ends_it(
+    rigged: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With the exit code of an interruption; nothing moves."""
+
+    def interrupt(_question: str) -> str:
+        os.kill(os.getpid(), signal.SIGINT)
+        return "y"
+
+    commands = len(rigged.port.board.commands)
+    assert rigged.calibrate("scale", answer=interrupt) == 130
+    assert "calibrate: interrupted: " in capsys.readouterr().err
+    assert all(one.kind != "velocity" for one in list(rigged.port.board.commands)[commands:])
+
+
 def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
     """The last one of this module; its guard stops the robot, which nobody hears any more."""
 
