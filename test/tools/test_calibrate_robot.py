@@ -3,11 +3,9 @@
 """A robot that is moved for a calibration stands still whatever happens, and says why."""
 
 import os
-import re
 import signal
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,13 +13,12 @@ import pytest
 from calibrate_rig import BUSY_S, Rig, rig
 from driver_process import PATIENCE_S
 from geometry_msgs.msg import Twist
-from std_msgs.msg import Bool, Float32MultiArray, String
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Bool, Float32MultiArray
 
-from omnibot_driver.parameters import PARAMETERS
 from omnibot_driver.simulator import SimulatedBoard
-from omnibot_driver.tools.calibrate import client, listener
+from omnibot_driver.tools.calibrate import listener
 from omnibot_driver.tools.calibrate import robot as robot_module
-from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
 from omnibot_driver.tools.calibrate.motion import Bounds, steady
 from omnibot_driver.tools.calibrate.robot import Robot, connect
@@ -167,15 +164,18 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
         robot.drive(steady(SLOWLY, 10.0), near)
 
 
-def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) -> None:
-    """Of the same name, too: both would obey."""
-    before = len(rigged.port.board.commands)
-    twin = robot._node.create_publisher(String, f"{robot.driver}/state", listener.LATCHED)
-    assert robot._wait(lambda: robot._node.count_publishers(twin.topic_name) == 2, PATIENCE_S)
-    name = re.escape(robot.driver)
-    with pytest.raises(ToolError, match=f"there are several drivers here: {name}, {name}; end all"):
-        robot.drive(steady(SLOWLY, 1.0), BOUNDS)
-    assert all(one.kind != "velocity" for one in list(rigged.port.board.commands)[before:])
+def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
+    """Nor is a robot seen to stand by it."""
+    nonsense = Odometry()
+    nonsense.pose.pose.position.x = nonsense.twist.twist.linear.x = float("nan")
+
+    def spoil(seconds: float) -> None:
+        if seconds > AFTER_S:
+            robot._on_odometry(nonsense)
+
+    with pytest.raises(ToolError, match="does not say where it is"):
+        robot.drive(steady(SLOWLY, 10.0), BOUNDS, show=spoil)
+    assert rigged.port.wait_for(stands, PATIENCE_S)
 
 
 def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -186,33 +186,6 @@ def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.Mo
     assert listener.silent(heard_s, listener.TOPICS, 10.21) == [listener.ODOMETRY]
     assert listener.silent(heard_s, [listener.IMU], 10.29) == []
     assert listener.silent(heard_s, listener.TOPICS, 10.31) == list(listener.TOPICS)
-
-
-def test_a_driver_of_another_version_is_told(
-    rigged: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """It does not know a parameter of ours."""
-    newer = SimpleNamespace(name="of_tomorrow")
-    monkeypatch.setattr(client, "PARAMETERS", (*PARAMETERS, newer))
-    assert rigged.calibrate("scale") == 1
-    assert "is of another version than this tool" in capsys.readouterr().err
-
-
-def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
-    """A parameter out of range."""
-    with pytest.raises(ToolError, match="the driver refuses linear_scale: "):
-        robot.set_parameters({"linear_scale": -1.0})
-
-
-def test_a_wrong_namespace_names_the_drivers_there_are(
-    rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """With exit code 1."""
-    monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
-    assert main(["imu", "--yes", "--namespace", "nowhere"]) == 1
-    said = capsys.readouterr().err
-    assert "no driver is running in the namespace /nowhere; there are" in said
-    assert f"/{rigged.driver.namespace}/omnibot_driver" in said
 
 
 def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixture[str]) -> None:
@@ -258,28 +231,3 @@ def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
     ):
         robot.drive(steady(SLOWLY, 30.0), BOUNDS, show=once(kill))
     assert rigged.port.wait_for(stands, PATIENCE_S)
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["--namespace", "no/such name!"], "is no namespace"),
-        (["--ros-args", "--nonsense"], "ROS does not understand its arguments"),
-    ],
-)
-def test_what_ros_cannot_take_is_a_sentence(
-    words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """No traceback."""
-    assert main(["imu", "--plot", str(tmp_path), *words]) == 1
-    assert sentence in capsys.readouterr().err
-
-
-def test_no_driver_at_all_says_how_to_start_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In a domain where nobody is."""
-    monkeypatch.setattr(client, "FOUND_WITHIN_S", 0.2)
-    monkeypatch.setenv("ROS_DOMAIN_ID", "101" if os.environ["ROS_DOMAIN_ID"] != "101" else "100")
-    assert main(["imu", "--plot", str(tmp_path)]) == 1
-    assert "nor any other: start it (ros2 run omnibot_driver driver)" in capsys.readouterr().err

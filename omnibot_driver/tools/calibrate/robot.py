@@ -180,8 +180,8 @@ class Robot(Listener):
             self._send(topic, HALT)
             self._hear(PERIOD_S)
             now_s = time.monotonic()
-            moves = max(map(abs, self._twist)) > STANDING
-            standing_since_s = math.inf if moves else min(standing_since_s, now_s)
+            stands = all(abs(speed) <= STANDING for speed in self._twist)  # NaN does not
+            standing_since_s = min(standing_since_s, now_s) if stands else math.inf
             if now_s - standing_since_s > STOOD_S:
                 return True
         return False
