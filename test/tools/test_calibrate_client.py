@@ -44,7 +44,7 @@ def test_a_wrong_namespace_names_the_drivers_there_are(
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
     assert main(["imu", "--yes", "--namespace", "nowhere"]) == 1
     said = capsys.readouterr().err
-    assert "no driver is running in the namespace /nowhere; there are" in said
+    assert "no driver is running in the namespace /nowhere, but" in said
     assert f"/{rigged.driver.namespace}/omnibot_driver" in said
 
 
@@ -97,4 +97,7 @@ def test_no_driver_at_all_says_how_to_start_one(
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 0.2)
     monkeypatch.setenv("ROS_DOMAIN_ID", "101" if os.environ["ROS_DOMAIN_ID"] != "101" else "100")
     assert main(["imu", "--plot", str(tmp_path)]) == 1
-    assert "nor any other: start it (ros2 run omnibot_driver driver)" in capsys.readouterr().err
+    assert (
+        "no driver is running: start one (ros2 run omnibot_driver driver)"
+        in capsys.readouterr().err
+    )

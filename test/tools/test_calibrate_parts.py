@@ -15,7 +15,7 @@ from omnibot_driver import calibration
 from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.parameters import BY_NAME
-from omnibot_driver.tools.calibrate.__main__ import main, split_ros_arguments
+from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.console import Console, digits
 from omnibot_driver.tools.calibrate.files import output_file, picture_file, write
 from omnibot_driver.tools.calibrate.log import Log
@@ -182,14 +182,6 @@ def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -
         picture_file(str(tmp_path / "picture.doc"), "imu")
     assert picture_file(str(tmp_path), "imu") == tmp_path / "calibrate_imu.png"
     assert output_file(None, str(tmp_path / "own.yaml")) == tmp_path / "own.yaml"
-
-
-def test_ros_arguments_are_told_from_ours() -> None:
-    """As rclpy tells them."""
-    words = ["imu", "--yes", "--ros-args", "-r", "cmd_vel:=other", "--", "--minutes", "2"]
-    own, ros = split_ros_arguments(words)
-    assert own == ["imu", "--yes", "--minutes", "2"]
-    assert ros == ["--ros-args", "-r", "cmd_vel:=other", "--"]
 
 
 @pytest.mark.parametrize(

@@ -43,15 +43,16 @@ class Client:
 
         if self._wait(look, FOUND_WITHIN_S):
             return here[0]
-        own, found = self._namespace(), drivers(self._node)
+        if not (others := drivers(self._node)):
+            raise ToolError(
+                "no driver is running: start one (ros2 run omnibot_driver driver), or set"
+                " ROS_DOMAIN_ID as it is where the driver runs"
+            )
+        own = self._namespace()
         place = f"in the namespace {own}" if own else "without a namespace"
-        others = (
-            f"there are {', '.join(found)}: choose by --namespace"
-            if found
-            else "nor any other: start it (ros2 run omnibot_driver driver), and check that"
-            " ROS_DOMAIN_ID is the same"
+        raise ToolError(
+            f"no driver is running {place}, but {', '.join(others)}: choose by --namespace"
         )
-        raise ToolError(f"no driver is running {place}; {others}")
 
     def _require_alone(self) -> None:
         """Two drivers in one namespace would both obey."""
