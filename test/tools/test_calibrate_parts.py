@@ -162,6 +162,16 @@ def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
     assert not path.exists()
 
 
+def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
+    """For the file and the picture; after ten minutes of driving is no time to refuse them."""
+    path, picture = tmp_path / "a" / "b" / "robot.yaml", tmp_path / "c" / "d" / "picture.png"
+    assert output_file(str(path), "") == path
+    assert picture_file(str(picture), "imu") == picture
+    write(result(linear_scale=80.5), path, picture)
+    assert path.exists()
+    assert picture.exists()
+
+
 def test_everything_that_may_be_written_is_a_parameter() -> None:
     """A name that the driver does not know would end it."""
     assert set(calibration.NAMES) <= set(BY_NAME)
