@@ -20,6 +20,7 @@ from omnibot_driver.tools.report.log import Log
 
 SECONDS = 10.0
 CHUNK = 0x06
+STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
 
 
 @pytest.fixture
@@ -55,6 +56,25 @@ def test_an_unfinished_bag_is_read_and_called_so(
     assert "never finished" in (text := capsys.readouterr().out)
     assert f"ros2 bag reindex {bag}" in text
     assert len(log_of(bag).imu) == len(drive.imu.stamp_s)
+
+
+def test_files_of_an_unfinished_bag_are_put_in_order_by_their_times(tmp_path: Path) -> None:
+    """The tenth comes before the second by name."""
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    for name, first in (("bag_2", 0), ("bag_10", 10)):
+        kind = "diagnostic_msgs/msg/DiagnosticArray"
+        with Writer(tmp_path / name, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            topics = (("/odom", "nav_msgs/msg/Odometry"), ("/diagnostics", kind))
+            _, told = (writer.add_connection(*topic, typestore=TYPES) for topic in topics)
+            for at_s in range(first, first + 10):
+                status = (0, "name", "", "", [])
+                text = message(kind, ((0, 0), ""), [message(STATUS, *status)])
+                writer.write(told, START_NS + at_s * 10**9, TYPES.serialize_cdr(text, kind))
+        shutil.copy(tmp_path / name / f"{name}.mcap", bag)
+    log = log_of(bag)
+    assert [status.at_s for status in log.diagnostics] == list(range(20))
+    assert log.duration_s == 19.0
 
 
 @pytest.mark.parametrize("text", ["", "a: [", "rosbag2_bagfile_information: 7", "\x00"])

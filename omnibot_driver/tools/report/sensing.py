@@ -41,11 +41,17 @@ RATE_HZ: Final = 100.0
 def at_rest(log: Log, imu: Series) -> Mask:
     """By the wheels; where there are none, by the IMU itself, second by second."""
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
-    if len(odom):
-        edges = odom.stamp_s[moving(odom)]
+    if len(odom) > 1:
+        unheard = np.diff(odom.stamp_s) > SHORT_GAP_S
+        restless = moving(odom)
+        restless[1:] |= unheard
+        restless[:-1] |= unheard
+        edges = odom.stamp_s[restless]
         after = np.append(edges, np.inf)[np.searchsorted(edges, imu.stamp_s)]
         before = np.insert(edges, 0, -np.inf)[np.searchsorted(edges, imu.stamp_s)]
         known = (imu.stamp_s > odom.stamp_s[0]) & (imu.stamp_s < odom.stamp_s[-1])
+        step = np.searchsorted(odom.stamp_s, imu.stamp_s) - 1
+        known &= ~unheard[np.clip(step, 0, len(unheard) - 1)]
         return np.asarray(known & (after - imu.stamp_s > REST_S) & (imu.stamp_s - before > REST_S))
     rest = np.zeros(len(imu), dtype=bool)
     whole = len(imu) // BLOCK * BLOCK
