@@ -80,6 +80,12 @@ def test_a_gap_in_the_odometry_is_no_rest(drive: Drive) -> None:
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
 
 
+def test_an_even_turn_is_no_rest_without_odometry(drive: Drive) -> None:
+    """The IMU alone tells rest then."""
+    drive.odom.drop(0.0, 99.0)
+    assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
+
+
 def test_a_sensor_that_stands_upright_is_noted(drive: Drive) -> None:
     """It turns as the wheels do."""
     drive.imu.values[:, 2] *= -1.0

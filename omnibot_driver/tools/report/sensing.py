@@ -25,6 +25,8 @@ LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
 STILL_GYRO_RADPS: Final = 0.01
 STILL_FORCE_MPS2: Final = 0.3
+TURNING_RADPS: Final = 0.1
+"""An even turn without odometry: it might be a bias, but a rare one."""
 LARGEST_BIAS_RADPS: Final = 0.01
 LARGEST_TILT_DEG: Final = 5.0
 LEAST_TURN_RAD: Final = 1.5
@@ -55,8 +57,10 @@ def at_rest(log: Log, imu: Series) -> Mask:
         return np.asarray(known & (after - imu.stamp_s > REST_S) & (imu.stamp_s - before > REST_S))
     rest = np.zeros(len(imu), dtype=bool)
     whole = len(imu) // BLOCK * BLOCK
-    spread = imu.values[:whole].reshape(-1, BLOCK, 6).std(axis=1)
-    still = (spread[:, :3] < STILL_GYRO_RADPS).all(axis=1)
+    blocks = imu.values[:whole].reshape(-1, BLOCK, 6)
+    spread = blocks.std(axis=1)
+    still = (np.abs(blocks.mean(axis=1)[:, :3]) < TURNING_RADPS).all(axis=1)
+    still &= (spread[:, :3] < STILL_GYRO_RADPS).all(axis=1)
     still &= (spread[:, 3:] < STILL_FORCE_MPS2).all(axis=1)
     rest[:whole] = np.repeat(still, BLOCK)
     return rest
