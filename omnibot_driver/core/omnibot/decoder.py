@@ -36,8 +36,6 @@ from omnibot_driver.core.omnibot.frames import (
 )
 from omnibot_driver.core.omnibot.lattice import Gap, Piece, read
 
-SURE: Final = 3.5
-"""One reading in thirty as likely as the best is too many."""
 SPOKEN_AGAINST: Final = 3.0
 """A content of this cost waits for what follows."""
 DOUBT_BYTES: Final = 170
@@ -274,7 +272,7 @@ class FrameDecoder:
 
         What ends before ``until`` has waited long enough.
         """
-        last_sure = [n for n, piece in enumerate(pieces) if piece.margin >= SURE]
+        last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0
         in_step, end = self._in_step, -1
         for number, piece in enumerate(pieces):
@@ -284,7 +282,7 @@ class FrameDecoder:
                 or any(piece.end == after.start for after in pieces[number + 1 : number + 2])
                 or type(piece.frame) is PausedFrame
             )
-            sure = proved and piece.margin >= SURE
+            sure = proved and piece.sure
             if piece.end == size and not closed and _may_end_in_a_header(piece.frame, piece.before):
                 return
             if not (sure or closed or number < settled_before or piece.end <= until):
