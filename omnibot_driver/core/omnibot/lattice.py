@@ -34,8 +34,8 @@ from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
 """One reading in thirty as likely as the best is too many."""
-FIRST_STEP: Final = 8.0
-"""What the best reading costs more than the bound says, with SURE, half of the time."""
+STEP: Final = 5.5
+"""What the limit is above the bound at first; then twice that, and so on."""
 BEYOND: Final = 0.025
 """Half the grid of the prices: no sum is at the limit itself, so rounding decides nothing."""
 
@@ -133,15 +133,17 @@ class _Search:
     def run(self, in_step: bool, closed: bool) -> None:
         """Find the best reading, and all that are nearly as cheap."""
         self._least = [0.0] * (self._end + 1) if closed else least_costs(self._data)
-        step = FIRST_STEP
+        step = STEP
         limit = self._least[1] + step + BEYOND
         while True:
             self._forward(in_step, closed, limit)
             best = self._cost[self._end]
             if best + SURE <= limit:
                 return
-            step *= 2
-            limit = limit + step if best == inf else best + SURE + BEYOND
+            if best < inf:
+                limit = best + SURE + BEYOND
+            else:
+                limit, step = limit + step, 2 * step
 
     def _forward(self, in_step: bool, closed: bool, limit: float) -> None:
         data, size, least = self._data, len(self._data), self._least
