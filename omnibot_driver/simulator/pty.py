@@ -101,7 +101,8 @@ def _make_link(link: Path, target: str) -> None:
         link.symlink_to(target)
     except OSError as error:
         raise type(error)(
-            f"cannot make the link {link} ({error.strerror}): choose a folder that exists and is yours"
+            f"cannot make the link {link} ({error.strerror}): "
+            "choose a folder that exists and is yours"
         ) from error
 
 
