@@ -106,7 +106,7 @@ class Link:
     def blocked(self) -> bool:
         """The port is open and takes nothing; it is about to be opened anew."""
         with self._changed:
-            return self._write_error is not None
+            return self._port is not None and self._write_error is not None
 
     def command(self, action: Callable[[Session, float], None], sent_ns: int) -> None:
         """``call``, with a command sent at this time of day by the sender's clock.

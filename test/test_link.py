@@ -273,6 +273,7 @@ def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
         link.start()
         listener.wait_for(lambda: ours.state == "nominal")
     listener.wait_for(lambda: ours.state == "disconnected" and len(listener.reports) > 1)
+    assert not link.blocked, "there is no port"
     link.close("stop")
     assert "lost" in str(listener.reports[1])
 
