@@ -25,6 +25,8 @@ from omnibot_driver.core.tally import Tally
 Estimate = ImuEstimate | OdometryEstimate
 Measured = tuple[Reading, Sequence[Estimate]]
 """A reading that is sure, and what came of it."""
+_SAMPLES = (ImuReading, DisplacementReading)
+"""What has a stamp of its own."""
 
 
 class Measuring:
@@ -73,7 +75,7 @@ class Measuring:
     def take_in(self, readings: Sequence[Reading], now: float) -> list[Measured]:
         """What is sure of these, which came in at ``now``, and of those before that waited."""
         stamps_s = self._clock.stamps(readings, now, self._board.edge)
-        if readings:
+        if readings and isinstance(readings[-1], _SAMPLES):
             self.tally.read(now - stamps_s[-1])
         measured: list[Measured] = []
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
