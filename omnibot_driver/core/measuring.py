@@ -27,8 +27,6 @@ from omnibot_driver.core.tally import Tally
 Estimate = ImuEstimate | OdometryEstimate
 Measured = tuple[Reading, Sequence[Estimate]]
 """A reading that is sure, and what came of it."""
-_SAMPLES = (ImuReading, DisplacementReading)
-"""What has a stamp of its own."""
 
 
 class Measuring:
@@ -83,13 +81,7 @@ class Measuring:
         A reading does not overtake one of another kind.
         """
         stamps_s = self._clock.stamps(readings, now, self._board.edge)
-<<<<<<< HEAD
-        if readings and isinstance(readings[-1], _SAMPLES):
-            self.tally.read(now - stamps_s[-1])
-        measured: list[Measured] = []
-=======
         estimates = []
->>>>>>> 221c2541facc03e4b134f9cf94f56b94a7ca1bc1
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
             if self._undigested or not isinstance(reading, ImuReading):
                 self._undigested.append((reading, stamp_s))
