@@ -103,7 +103,7 @@ class CommandStream:
     def wake_at(self) -> float:
         """When ``due`` has to be asked again; infinity while the line is quiet."""
         next_write = self._next_write()
-        if self._current is not None and not self.latched:
+        if self._current is not None:
             return min(next_write, self._expires_at)
         return next_write if self._frame(next_write, next_write) else math.inf
 
@@ -125,4 +125,4 @@ class CommandStream:
             return self._stop
         if self._current is not None:
             return self._current.frame(now)
-        return self._stop if self._urgent or due_at < self._stopping_until else b""
+        return self._stop if due_at < self._stopping_until else b""
