@@ -104,7 +104,10 @@ class Link:
 
     @property
     def blocked(self) -> bool:
-        """The port is open and takes nothing; it is about to be opened anew."""
+        """What was said last was not taken, and the port is opened anew.
+
+        It may be gone by now: the reader is woken by what the caller finds here.
+        """
         with self._changed:
             return self._write_error is not None
 
@@ -208,11 +211,14 @@ class Link:
                     raise self._write_error
                 if not data:
                     continue
+                now = time.monotonic()
+                measured = self._session.hear(data, now)
+            self._deliver(measured)
+            with self._lock:
                 self._wait_s = self.reconnect_interval_s
                 self._received += len(data)
-                now = time.monotonic()
                 self._heed_standstill(now)
-                self._session.receive(data, now)
+                self._session.heed(now)
                 events = self._settle()
             self._deliver(events)
 
@@ -266,13 +272,14 @@ class Link:
 
     def _settle(self) -> Sequence[Event]:
         """With the lock held: write what is due, wake the pacer if it sleeps for too long."""
-        self._write(self._session.take_output(time.monotonic()))
+        if data := self._session.take_output(time.monotonic()):
+            self._write(data)
         if self._session.wake_at < self._pacing_until:
             self._changed.notify_all()
         return self._session.take_events()
 
     def _write(self, data: bytes) -> None:
-        if not data or self._port is None or self._write_error is not None:
+        if self._port is None or self._write_error is not None:
             return
         try:
             self._port.write(data)

@@ -20,6 +20,8 @@ from listener import (
 )
 from terminal import Terminal
 
+from omnibot_driver.core.inertial import ImuEstimate
+
 
 @pytest.fixture
 def terminal() -> Iterator[Terminal]:
@@ -89,14 +91,14 @@ def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: 
 
     closed, farewell_over = ours.closed, threading.Event()
 
-    def defective(data: bytes, now: float) -> None:
+    def defective(data: bytes, now: float) -> list[ImuEstimate]:
         raise RuntimeError("a defect")
 
     def tell_and_close(now: float) -> None:
         farewell_over.set()
         closed(now)
 
-    ours.receive, ours.closed = defective, tell_and_close  # type: ignore[method-assign]
+    ours.hear, ours.closed = defective, tell_and_close  # type: ignore[method-assign]
     os.write(terminal.far, b"x")
     assert farewell_over.wait(PATIENCE_S)
     terminal.read_until(LAST_WORDS)
