@@ -104,9 +104,12 @@ class Link:
 
     @property
     def blocked(self) -> bool:
-        """The port is open and takes nothing; it is about to be opened anew."""
+        """What was said last was not taken, and the port is opened anew.
+
+        It may be gone by now: the reader is woken by what the caller finds here.
+        """
         with self._changed:
-            return self._port is not None and self._write_error is not None
+            return self._write_error is not None
 
     def command(self, action: Callable[[Session, float], None], sent_ns: int) -> None:
         """``call``, with a command sent at this time of day by the sender's clock.
