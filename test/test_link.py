@@ -280,7 +280,7 @@ def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: 
 
     closed, farewell_over = ours.closed, threading.Event()
 
-    def defective(data: bytes, now: float) -> list[ImuEstimate]:
+    def defective(data: bytes, now: float) -> None:
         raise RuntimeError("a defect")
 
     def tell_and_close(now: float) -> None:
