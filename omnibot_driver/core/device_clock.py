@@ -79,7 +79,7 @@ class DeviceClock:
         line = self._line = self._line or TickLine(self._period_s, (self._tick, now))
         short = 0
         if edge is not None:
-            kinds = [type(reading) for reading in readings]
+            kinds = list(map(type, readings))
             came = edge.ahead + kinds.count(ImuReading)
             if came:
                 self._single_reads = self._single_reads + 1 if came == 1 else 0

@@ -57,6 +57,7 @@ class TickLine:
         self._latest: deque[tuple[Point, bool]] = deque(maxlen=BLOCKS_KEPT)
         self._earliest: deque[Point] = deque(maxlen=BLOCKS_KEPT)
         self._best: tuple[Point, bool] | None = None
+        self._best_s = math.inf
         self._not_before: list[Point] = []
         self._block_from = first[0]
 
@@ -68,10 +69,12 @@ class TickLine:
         """A read: its newest tick had come by ``latest``; the next, or if ``cut`` the same, was not
         to come before ``earliest``."""
         tick, arrival = latest
-        if arrival < self.at(tick):
+        anchor_tick, anchor_s = self._anchor
+        if arrival < anchor_s + self.slope_s * (tick - anchor_tick):
             self._anchor = latest
-        if self._best is None or self._height(latest) < self._height(self._best[0]):
-            self._best = latest, cut
+        height_s = arrival - self.slope_s * tick
+        if self._best is None or height_s < self._best_s:
+            self._best, self._best_s = (latest, cut), height_s
         self._not_before.append(earliest)
         if tick - self._block_from >= BLOCK_TICKS:
             self._end_block(*self._best)

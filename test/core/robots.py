@@ -1,0 +1,44 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Robots at the beginning of a test: on the workbench, standing or driving."""
+
+from bench import Bench
+
+from omnibot_driver.simulator import BoardSettings
+
+
+def standing() -> Bench:
+    """A started board that stands still, half a second after the last Stop."""
+    bench = Bench()
+    bench.open()
+    bench.run_until_state("nominal")
+    bench.run(1.5)
+    return bench
+
+
+def driving(**settings: object) -> Bench:
+    """A board that carries out 0.4 m/s, commanded just now."""
+    bench = Bench(BoardSettings(running=True, **settings))  # type: ignore[arg-type]
+    bench.open()
+    bench.run_until_state("nominal")
+    bench.run(1.5)
+    drive_on(bench)
+    assert not bench.still()
+    return bench
+
+
+def drive_on(bench: Bench) -> None:
+    for _ in range(5):
+        bench.drive(0.4)
+        bench.run(0.1)
+
+
+def estop(bench: Bench, active: bool) -> str:
+    said = bench.session.estop(active, bench.now)
+    bench.settle()
+    return said
+
+
+def reconnect(bench: Bench) -> None:
+    bench.close()
+    bench.open()

@@ -1,0 +1,110 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A line that is opened, and a board that is found on it: zeros, Stop, S, and the state by name."""
+
+import pytest
+from bench import OPENING, Bench
+from robots import standing
+
+from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.supervisor import Request
+from omnibot_driver.simulator import BoardSettings
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return standing()
+
+
+def test_the_opening_sequence_is_zeros_stop_and_s_until_data_flows() -> None:
+    """A board that boots swallows what it hears first; no command may be cut by that."""
+    bench = Bench(BoardSettings(boot_time_s=2.0))
+    bench.open()
+    bench.run(1.25)
+    assert bench.written_since(0) == OPENING + b"S" + b"S" + b"S"
+    bench.run_until_state("nominal")
+    assert [command.kind for command in bench.board.commands][:1] == ["start"]
+
+
+def test_the_state_follows_what_is_heard_and_nothing_else() -> None:
+    """Disconnected, connecting, paused, nominal: in the names the interface promises."""
+    bench = Bench(run=False)
+    assert bench.session.state == "disconnected"
+    bench.open()
+    assert bench.session.state == "connecting"
+    bench.run_until_state("paused")
+    bench.ask(Request.START, 5.0)
+    assert bench.session.state == "nominal"
+    bench.close()
+    assert bench.session.state == "disconnected"
+
+
+def test_without_auto_start_a_paused_board_stays_paused() -> None:
+    """The opening then has no S."""
+    bench = Bench(run=False)
+    bench.open()
+    bench.run(3.0)
+    assert bench.session.state == "paused"
+    assert bench.written_since(0) == OPENING
+
+
+def test_imu_frames_without_deltas_are_imu_only_mode() -> None:
+    """The board never says so itself."""
+    bench = Bench(BoardSettings(imu_only=True))
+    bench.open()
+    bench.run_until_state("imu_only")
+    assert any(isinstance(event, ImuEstimate) for event in bench.events)
+    assert not bench.odometry
+
+
+def test_garbage_is_not_an_understood_board() -> None:
+    """The port is open and bytes flow, but the state goes on being ``connecting``."""
+    bench = Bench()
+    bench.speaks = False
+    bench.open()
+    for _ in range(300):
+        bench.session.receive(b"\x00\x55\xff\x13" * 4, bench.now)
+        bench.run(0.01)
+    assert bench.session.state == "connecting"
+    assert [text for text in bench.notices if "baudrate" in text] == bench.notices
+    assert len(bench.notices) == 1
+
+
+def test_a_silent_board_is_told_once() -> None:
+    """And again only after it has been heard meanwhile."""
+    bench = Bench()
+    bench.speaks = False
+    bench.open()
+    bench.run(10.0)
+    assert len([text for text in bench.notices if "power" in text]) == 1
+    bench.speaks = True
+    bench.run(2.0)
+    bench.speaks = False
+    bench.run(10.0)
+    assert len([text for text in bench.notices if "power" in text]) == 2
+
+
+def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -> None:
+    """Brown-out while driving: what was commanded before the restart is not sent after it."""
+    bench.drive(0.5)
+    bench.run(0.2)
+    bench.board.reboot()
+    bench.run_until_state("paused")
+    noticed = len(bench.written) - 1
+    bench.run_until_state("nominal")
+    bench.run(1.0)
+    assert bench.still()
+    assert bench.written_since(noticed).startswith(OPENING + b"S")
+    assert b"\xff\xfe\x01" not in bench.written_since(noticed)
+    bench.drive(0.3)
+    bench.run(0.3)
+    assert not bench.still()
+
+
+def test_a_paused_robot_is_still_paused_after_a_reconnect(bench: Bench) -> None:
+    """The wanted mode outlives the port."""
+    bench.ask(Request.PAUSE, 5.0)
+    bench.close()
+    bench.open()
+    bench.run(3.0)
+    assert bench.session.state == "paused"

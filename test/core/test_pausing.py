@@ -1,0 +1,161 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Pausing a board whose P is a toggle: never the wrong way, and believed only when it is shown."""
+
+import pytest
+from bench import STOP, Bench
+from robots import drive_on, standing
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.supervisor import Request, RequestDone
+from omnibot_driver.simulator import BoardMode
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return standing()
+
+
+def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
+    """Stop at once, P once data shows that the board runs."""
+    bench.drive(0.5)
+    bench.run(0.3)
+    start = len(bench.written)
+    answer = bench.ask(Request.PAUSE, 5.0)
+    assert answer.success
+    assert bench.board.mode is BoardMode.PAUSED
+    assert bench.session.state == "paused"
+    assert bench.written_since(start) == STOP + STOP + b"P"
+
+
+def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
+    """The second time no P is sent, and the answer still rests on a new notice."""
+    bench.ask(Request.PAUSE, 5.0)
+    start, asked_at = len(bench.written), bench.now
+    answer = bench.ask(Request.PAUSE, 5.0)
+    assert answer.success
+    assert bench.now > asked_at
+    assert b"P" not in bench.written_since(start)
+    assert bench.board.mode is BoardMode.PAUSED
+
+
+def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
+    bench: Bench,
+) -> None:
+    """The belief says nominal; only data that comes in after the request allows a P."""
+    bench.board.receive(b"P")
+    assert bench.session.state == "nominal"
+    assert bench.ask(Request.PAUSE, 5.0).success
+    bench.run(1.0)
+    assert bench.board.mode is BoardMode.PAUSED
+
+
+def test_a_lost_p_is_said_again(bench: Bench) -> None:
+    """Data that flows for longer than the time between two notices shows that P was lost."""
+    bench.hears = False
+    bench.session.request(Request.PAUSE, token := object(), bench.now)
+    bench.settle()
+    bench.run(0.5)
+    bench.hears = True
+    bench.run(2.0)
+    assert RequestDone(token, True, "paused") in bench.events
+    assert bench.board.mode is BoardMode.PAUSED
+
+
+def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
+    bench: Bench,
+) -> None:
+    """Somebody else has just paused it: our P, sent for data from before, un-pauses it."""
+    data = bench.board.step()
+    bench.board.receive(b"P")
+    notice = bench.board.step()
+    assert notice.startswith(b"Paused")
+    bench.session.request(Request.PAUSE, token := object(), bench.now)
+    for late in (data, notice):
+        bench.settle()
+        bench.session.receive(late, bench.now)
+    bench.settle()
+    assert bench.board.mode is BoardMode.NOMINAL
+    asked_at, done = bench.now, RequestDone(token, True, "paused")
+    while done not in bench.events:
+        assert bench.now < asked_at + 5.0
+        bench.run(0.01)
+    assert bench.board.mode is BoardMode.PAUSED
+    bench.run(3.0)
+    assert bench.board.mode is BoardMode.PAUSED
+
+
+def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_paused() -> None:
+    """S is in flight, and the notice was sent before it was obeyed."""
+    bench = Bench(run=False)
+    bench.open()
+    bench.run_until_state("paused")
+    notice = b""
+    while not notice:
+        notice = bench.board.step()
+    bench.session.request(Request.START, object(), bench.now)
+    bench.settle()
+    bench.run(0.2)
+    bench.session.request(Request.PAUSE, token := object(), bench.now)
+    bench.settle()
+    bench.session.receive(notice, bench.now)
+    bench.settle()
+    asked_at, done = bench.now, RequestDone(token, True, "paused")
+    while done not in bench.events:
+        assert bench.now < asked_at + 5.0
+        bench.run(0.01)
+    assert bench.board.mode is BoardMode.PAUSED
+
+
+def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> None:
+    """It said P and slept for three seconds; what it reads then was sent before P was obeyed."""
+    on_its_way = b"".join(bench.board.step() for _ in range(10))
+    bench.session.request(Request.PAUSE, token := object(), bench.now)
+    bench.session.receive(on_its_way[:80], bench.now)
+    bench.settle()
+    assert bench.board.mode is BoardMode.PAUSED
+    backlog = on_its_way[80:] + b"".join(bench.board.step() for _ in range(300))
+    bench.now += 3.0
+    for byte in backlog:
+        bench.session.receive(bytes([byte]), bench.now)
+        bench.settle()
+    bench.run(0.2)
+    assert RequestDone(token, True, "paused") in bench.events
+    assert [command.kind for command in bench.board.commands].count("pause") == 1
+
+
+def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None:
+    """Somebody wanted it to be still: P goes on, motion is refused, and the sentence says so."""
+    bench.hears = False
+    answer = bench.ask(Request.PAUSE, 5.0)
+    assert not answer.success
+    assert "until ~/start" in answer.message
+    with pytest.raises(CommandRefused, match="being paused; the service ~/start"):
+        bench.drive(0.4)
+    bench.hears = True
+    bench.run(3.0)
+    assert bench.board.mode is BoardMode.PAUSED
+    assert bench.session.state == "paused"
+
+
+def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
+    """And a fresh command moves it again."""
+    bench.hears = False
+    bench.ask(Request.PAUSE, 5.0)
+    bench.hears = True
+    assert bench.ask(Request.START, 5.0).success
+    bench.run(3.0)
+    assert bench.board.mode is BoardMode.NOMINAL
+    drive_on(bench)
+    assert not bench.still()
+
+
+def test_a_paused_board_that_somebody_else_starts_is_paused_again(bench: Bench) -> None:
+    """It was asked to be paused; meanwhile motion is refused."""
+    assert bench.ask(Request.PAUSE, 5.0).success
+    bench.board.receive(b"S")
+    bench.run(0.2)
+    with pytest.raises(CommandRefused):
+        bench.drive(0.4)
+    bench.run(3.0)
+    assert bench.board.mode is BoardMode.PAUSED

@@ -1,0 +1,160 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Start and reset, and what is true of every request: one at a time, proved or refused in time."""
+
+import itertools
+
+import pytest
+from bench import STOP, Bench
+from robots import drive_on, driving, standing
+
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.events import StateChanged
+from omnibot_driver.core.supervisor import Request, RequestDone
+from omnibot_driver.simulator import BoardMode
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return standing()
+
+
+@pytest.mark.parametrize(
+    ("request_", "limit_s"), [(Request.START, 5.0), (Request.PAUSE, 5.0), (Request.RESET, 10.0)]
+)
+def test_on_a_silent_board_every_request_is_answered_in_time(
+    request_: Request, limit_s: float
+) -> None:
+    """With a sentence that says what to look at."""
+    bench = Bench()
+    bench.speaks = False
+    bench.open()
+    bench.run(2.0)
+    answer = bench.ask(request_, limit_s)
+    assert not answer.success
+    assert "power" in answer.message
+
+
+def test_a_board_that_does_not_hear_gets_no_false_confirmation(bench: Bench) -> None:
+    """Cut in the direction to the board: pause, start and reset all say so in time."""
+    bench.hears = False
+    answer = bench.ask(Request.PAUSE, 5.0)
+    assert not answer.success
+    assert "cable" in answer.message
+    answer = bench.ask(Request.RESET, 10.0)
+    assert not answer.success
+
+
+def test_one_request_is_under_way_at_a_time(bench: Bench) -> None:
+    """The second is refused at once and told why."""
+    bench.session.request(Request.RESET, object(), bench.now)
+    with pytest.raises(RequestRefused, match="a reset is under way"):
+        bench.session.request(Request.PAUSE, object(), bench.now)
+
+
+def test_requests_without_a_port_are_refused() -> None:
+    """At once, not after a timeout."""
+    with pytest.raises(RequestRefused, match="port is not open"):
+        Bench().session.request(Request.START, object(), 0.0)
+
+
+def test_a_request_ends_with_the_port(bench: Bench) -> None:
+    """Nobody waits for an answer that cannot come."""
+    bench.session.request(Request.RESET, token := object(), bench.now)
+    bench.close()
+    answers = [event for event in bench.events if isinstance(event, RequestDone)]
+    assert [(answer.token, answer.success) for answer in answers] == [(token, False)]
+
+
+def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench) -> None:
+    """S is harmless while running; the current command goes on."""
+    bench.drive(0.3)
+    assert bench.ask(Request.START, 1.0).success
+    bench.run(0.1)
+    assert not bench.still()
+
+
+def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Bench) -> None:
+    """Stop, R, the notice, the opening, data; the board counts from zero, odom does not."""
+    for _ in range(20):
+        bench.drive(0.5)
+        bench.run(0.1)
+    bench.run(1.0)
+    before, start = bench.odometry[-1].pose, len(bench.written)
+    answer = bench.ask(Request.RESET, 10.0)
+    assert answer.success
+    assert bench.written_since(start).startswith(STOP + b"R")
+    assert bench.board.odometry.x_mm == pytest.approx(0.0, abs=0.5)
+    bench.run(1.0)
+    after = bench.odometry[-1].pose
+    assert (after.x_m, after.y_m) == pytest.approx((before.x_m, before.y_m), abs=2e-3)
+    assert bench.still()
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
+    """Whether it was found so or asked to be; and the answer says so."""
+    bench = standing() if asked else Bench(run=False)
+    if asked:
+        assert bench.ask(Request.PAUSE, 5.0).success
+    else:
+        bench.open()
+        bench.run_until_state("paused")
+    bench.run(0.5)
+    answer = bench.ask(Request.RESET, 10.0)
+    assert answer.success
+    assert "paused, as it was" in answer.message
+    bench.run(3.0)
+    assert bench.board.mode is BoardMode.PAUSED
+    assert [command.kind for command in bench.board.commands].count("reset") == 1
+
+
+def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
+    """Its notices go on counting, as they did before."""
+    bench = Bench(run=False)
+    bench.open()
+    bench.run(2.5)
+    bench.hears = False
+    answer = bench.ask(Request.RESET, 10.0)
+    assert not answer.success
+    assert "cable" in answer.message
+
+
+def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
+    """It ran before the reset, so it runs after it; the robot stands until a fresh command."""
+    bench = driving()
+    bench.hears = False
+    bench.ask(Request.PAUSE, 5.0)
+    bench.hears = True
+    assert bench.ask(Request.RESET, 10.0).message == "running (nominal)"
+    bench.run(3.0)
+    assert bench.board.mode is BoardMode.NOMINAL
+    assert bench.still()
+    drive_on(bench)
+    assert not bench.still()
+
+
+def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) -> None:
+    """Nothing has restarted, so the pause that somebody wanted is still wanted."""
+    bench.hears = False
+    bench.ask(Request.PAUSE, 5.0)
+    assert not bench.ask(Request.RESET, 10.0).success
+    bench.hears = True
+    with pytest.raises(CommandRefused):
+        bench.drive(0.4)
+    bench.run(3.0)
+    assert bench.board.mode is BoardMode.PAUSED
+
+
+def test_the_state_does_not_flap_while_a_deaf_board_is_asked_to_reset(bench: Bench) -> None:
+    """Connecting, until it is known that it has not restarted."""
+    bench.hears = False
+    bench.events.clear()
+    shown = [bench.session.state]
+    bench.session.request(Request.RESET, object(), bench.now)
+    bench.settle()
+    for _ in range(1200):
+        shown.append(bench.session.state)
+        bench.run(0.01)
+    assert [state for state, _ in itertools.groupby(shown)] == ["nominal", "connecting", "nominal"]
+    assert bench.events.count(StateChanged()) == 2
