@@ -71,6 +71,18 @@ def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_wit
     assert sequence.delta(16, 16 * 0.04) == Step(1)
 
 
+def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
+    """Twelve deltas are missing, and both poses among them came in: twelve in all."""
+    sequence = Sequence()
+    for count in range(10):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    told = [sequence.pose(number, (5 * number + 4) * 0.04) for number in (2, 3)]
+    assert told == [Step(5), Step(5)]
+    assert sequence.delta(22, 22 * 0.04) == Step(2)
+
+
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
     """Two seconds after 205 the count is at zero anyway, but not that of the poses."""
     sequence = Sequence()

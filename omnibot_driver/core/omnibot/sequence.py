@@ -115,9 +115,10 @@ class Sequence:
         if from_zero and not goes_on and abs(passed - counted) > 2 * DELTAS_PER_POSE:
             return Step(0, None, restarted=True)
         missing = max(0, passed - counted)
-        in_time = missing * DELTA_PERIOD_S <= now - self._delta_at + DELTA_PERIOD_S
-        self._told = missing if in_time else 0
-        return Step(self._told)
+        if (self._told + missing) * DELTA_PERIOD_S > now - self._delta_at + DELTA_PERIOD_S:
+            return Step(0)  # there was no time for so many
+        self._told += missing
+        return Step(missing)
 
     def _take_back(self, count: int, now: float) -> None:
         """What seemed to begin anew did not, if this count goes on from the one before it."""
