@@ -43,13 +43,13 @@ docs: $(VENV)/.docs  ## write what is generated, and build the documents as a si
 	$(PY) -m sphinx -q -W --keep-going -c docs . build/docs
 	@echo "build/docs/docs/index.html"
 
-pictures: $(VENV)/.test  ## make the pictures of README and documents anew (10 minutes)
+pictures: $(VENV)/.test  ## make the pictures of README and documents anew (6 minutes)
 	@$(PY) test/pictures
 
 integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), into docs/integrity.md
 	$(PY) test/integrity/report.py
 
-bench: $(VENV)/.test  ## measure speed against a floor (15 minutes), into docs/performance.md
+bench: $(VENV)/.test  ## measure speed against a floor (10 minutes), into docs/performance.md
 	$(PY) test/bench/report.py
 
 faults: $(VENV)/.test  ## break everything, with the real node (16 minutes), into docs/safety.md

@@ -92,7 +92,7 @@ class Link:
         """Do something with the session; what it has to say is on the wire before this returns."""
         events: Sequence[Event] = ()
         try:
-            with self._changed:
+            with self._lock:
                 now = time.monotonic()
                 self._heed_standstill(now)
                 try:
@@ -213,14 +213,16 @@ class Link:
                     continue
                 now = time.monotonic()
                 measured = self._session.hear(data, now)
-            self._deliver(measured)
+            if measured:
+                self._deliver(measured)
             with self._lock:
                 self._wait_s = self.reconnect_interval_s
                 self._received += len(data)
                 self._heed_standstill(now)
                 self._session.heed(now)
                 events = self._settle()
-            self._deliver(events)
+            if events:
+                self._deliver(events)
 
     def _detach(self, port: Port, *, comes_back: bool) -> None:
         """Whatever ended the reading, the robot is not left with a command to carry out."""
@@ -248,10 +250,10 @@ class Link:
                 if now < self._pacing_until:
                     self._changed.wait(self._pacing_until - now)
                     continue
-                notices = self._beat(now)
+                events: list[Event] = [*self._beat(now)]
                 if now >= self._session.wake_at:
                     self._session.tick(now)
-                events = [*notices, *self._settle()]
+                    events += self._settle()
             self._deliver(events)
 
     def _beat(self, now: float) -> list[Notice]:

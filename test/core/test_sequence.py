@@ -128,6 +128,28 @@ def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it
     assert sequence.delta(112, 100.12, imus=4) == Step(0)
 
 
+def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
+    """Its count is near zero, but the next true one goes on from where the board was."""
+    sequence = begun(88)
+    assert sequence.delta(1, 100.02, imus=1).restarted
+    assert sequence.delta(89, 100.04, imus=2) == Step(0)
+    assert sequence.delta(90, 100.08, imus=4) == Step(0)
+
+
+def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
+    """What was held in doubt came out late, and the next delta soon after it."""
+    sequence = Sequence()
+    for count in range(11):
+        sequence.delta(count, count * 0.04, imus=4)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    for count in (11, 12, 13):
+        sequence.delta(count, 0.56, imus=4)
+    assert sequence.pose(2, 0.56) == Step(1)
+    assert sequence.delta(15, 0.58, imus=4) == Step(0)
+    assert sequence.delta(16, 0.64, imus=4) == Step(0)
+
+
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
     """Few IMU frames came since, for a count that would say that many deltas are missing."""
     sequence = Sequence()

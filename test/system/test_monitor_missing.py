@@ -2,6 +2,8 @@
 
 """What the monitor says of what is missing or wrong: a sentence, and an exit code."""
 
+import json
+import math
 import os
 import subprocess
 import sys
@@ -84,6 +86,13 @@ def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFi
     assert "nothing comes on imu/data_raw, odom" in output.err
 
 
+def test_two_drivers_of_one_name_are_told(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
+    """What is shown is of both, and both obey."""
+    fake.node.create_publisher(String, "omnibot_driver/state", LATCHED)
+    assert main(["--once", "--namespace", "fake", *QUICKLY]) == 1
+    assert "there are 2 drivers called /fake/omnibot_driver" in capsys.readouterr().err
+
+
 def test_nan_is_named_and_shown(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
     """Where a number would be, and in one sentence."""
     bad = Odometry()
@@ -94,6 +103,18 @@ def test_nan_is_named_and_shown(fake: Probe, capsys: pytest.CaptureFixture[str])
     output = capsys.readouterr()
     assert "nan" in output.out
     assert "not a finite number: pose x, measured y" in output.err
+
+
+def test_a_heading_is_within_half_a_turn(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
+    """Whichever of its two quaternions comes: this is 145° to the left, not 215° to the right."""
+    odometry = Odometry()
+    turn = odometry.pose.pose.orientation
+    turn.z, turn.w = -math.sin(math.radians(72.5)), -math.cos(math.radians(72.5))
+    publisher = fake.node.create_publisher(Odometry, "odom", 10)
+    fake.node.create_timer(0.02, lambda: publisher.publish(odometry))
+    main(["--json", "--namespace", "fake", *QUICKLY])
+    told = json.loads(capsys.readouterr().out)
+    assert told["pose"]["yaw_rad"] == pytest.approx(math.radians(145.0))
 
 
 def test_a_pipe_cannot_steer(capsys: pytest.CaptureFixture[str]) -> None:

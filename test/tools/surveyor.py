@@ -24,7 +24,7 @@ class Surveyor:
             self._mark = here
             sign = 1 if "left" in question else -1
             self._turns = (
-                sign * float(question.split(": ")[1].split()[0]) if "turns" in question else 0
+                sign * float(question.split(": ")[1].split()[0]) if "turn" in question else 0
             )
         way = self._mark.way_to(here)
         if "forward of" in question:

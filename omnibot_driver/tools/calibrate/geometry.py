@@ -111,9 +111,10 @@ def believed(now: Mapping[str, Any]) -> dict[str, float]:
 def plan(side_m: float, turns: int, *, squares: bool) -> list[Drive]:
     """What to drive, one after the other."""
     angle_rad = math.tau * turns
+    number = f"{turns} turns" if turns > 1 else "1 turn"
     drives = [
-        Drive(f"{turns} turns to the left", [Pose(0.0, 0.0, angle_rad)], True),
-        Drive(f"{turns} turns to the right", [Pose(0.0, 0.0, -angle_rad)], True),
+        Drive(f"{number} to the left", [Pose(0.0, 0.0, angle_rad)], True),
+        Drive(f"{number} to the right", [Pose(0.0, 0.0, -angle_rad)], True),
         Drive(f"{side_m:g} m forward", [Pose(side_m, 0.0, 0.0)], False),
         Drive(f"{side_m:g} m to the left", [Pose(0.0, side_m, 0.0)], False),
     ]

@@ -14,7 +14,8 @@ UNLIKE_ONE: Final = 0.02
 """A gain that differs more from 1 is the scale's affair."""
 QUANTUM_RADPS: Final = 0.05
 """Standard deviation of a delta's rate by the steps of the encoder and of 0.1 mm on the wire."""
-MANY: Final = 3.0
+MANY: Final = 1.5
+"""Quanta. A computer that held commands up made 2, and a delay that was 4 ms too long."""
 UNEXPLAINED: Final = 1.2
 """So many times the second order's residuals tell that no motor fits."""
 

@@ -92,6 +92,7 @@ def _run(options: argparse.Namespace, ros_arguments: list[str]) -> int:
         _find(feed, options.timeout)
         if options.once:
             return _print(_gather(feed, options.timeout), feed, options.json)
+        feed.say(feed.namesakes())
         from omnibot_driver.tools.monitor.app import Monitor
 
         screen = Monitor(feed)
@@ -134,7 +135,7 @@ def _gather(feed: "Feed", timeout_s: float) -> View:
 
 
 def _print(view: View, feed: "Feed", as_json: bool) -> int:
-    troubles = []
+    troubles = [namesakes] if (namesakes := feed.namesakes()) else []
     if missing := view.missing(feed.diagnoses()):
         troubles.append(
             f"{view.driver} is {view.state}, but nothing comes on {', '.join(missing)}: is it"

@@ -115,6 +115,16 @@ class Feed:
             if name.endswith("/estop_active") and self._node.count_publishers(name)
         )
 
+    def namesakes(self) -> str:
+        """A sentence where there is more than one driver of this name."""
+        count = self._node.count_publishers(f"{self.driver}/state")
+        if count < 2:
+            return ""
+        return (
+            f"there are {count} drivers called {self.driver}: what is shown mixes them, and both do"
+            " what is asked; end all but one, or give them namespaces"
+        )
+
     def diagnoses(self) -> bool:
         """Whether the driver publishes diagnostics (one that replays a recording does not)."""
         return any(
@@ -193,7 +203,8 @@ class Feed:
 
     def _on_odom(self, message: Odometry) -> None:
         at, turn = message.pose.pose.position, message.pose.pose.orientation
-        pose = Pose(at.x, at.y, 2.0 * math.atan2(turn.z, turn.w))
+        yaw_rad = math.remainder(2.0 * math.atan2(turn.z, turn.w), math.tau)
+        pose = Pose(at.x, at.y, yaw_rad)
         twist = body_twist(message.twist.twist)
         known = message.twist.covariance[0] < UNMEASURED_VARIANCE
         self._know(lambda model, now_s: model.odom(pose, twist if known else None, now_s))
@@ -235,18 +246,19 @@ class Feed:
     def _call(self, client: Any, request: Any, what: str) -> None:
         if not client.service_is_ready():
             service = self._node.resolve_service_name(client.srv_name)
-            self._say(f"{what}: nobody offers {service}; is the driver running?")
+            self.say(f"{what}: nobody offers {service}; is the driver running?")
             return
-        self._say(f"{what}: asked, no answer yet")
+        self.say(f"{what}: asked, no answer yet")
         client.call_async(request).add_done_callback(partial(self._answered, what))
 
     def _answered(self, what: str, future: Any) -> None:
         answer = future.result()
-        self._say(f"{what}: {'' if answer.success else 'failed: '}{answer.message}")
+        self.say(f"{what}: {'' if answer.success else 'failed: '}{answer.message}")
         if answer.success and what == "e-stop":
             self._model.estop_asked = False
 
-    def _say(self, text: str) -> None:
+    def say(self, text: str) -> None:
+        """In the line where answers are shown."""
         with self._lock:
             self._model.said = text
 
@@ -261,5 +273,5 @@ class Feed:
         except ExternalShutdownException:
             pass
         except Exception as error:
-            self._say(f"the monitor hears nothing any more after a defect of its own: {error!r}")
+            self.say(f"the monitor hears nothing any more after a defect of its own: {error!r}")
             raise
