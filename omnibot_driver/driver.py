@@ -110,9 +110,12 @@ def _set_deadline() -> None:
     """Nothing that hangs may hold the end up; without the process the guard stops the robot."""
 
     def give_up() -> None:
-        print("omnibot_driver hangs while it ends: it is cut short", file=sys.stderr, flush=True)
-        time.sleep(0.1)  # until that is copied
-        os._exit(1)
+        try:
+            text = "omnibot_driver hangs while it ends: it is cut short"
+            print(text, file=sys.stderr, flush=True)
+            time.sleep(0.1)  # until that is copied
+        finally:  # also when nobody takes what is printed
+            os._exit(1)
 
     deadline = threading.Timer(LONGEST_END_S, give_up)
     deadline.daemon = True

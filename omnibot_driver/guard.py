@@ -64,6 +64,6 @@ def drop_what_waits(port: int) -> None:
 
 
 if __name__ == "__main__":
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)  # whoever ends the driver so need not ask its guard
     watch(int(sys.argv[1]), bytes.fromhex(sys.argv[2]))

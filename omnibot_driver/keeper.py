@@ -7,10 +7,13 @@ threads and no board; whoever uses it calls ``beat`` from the thread whose life 
 """
 
 import contextlib
+import fcntl
 import math
 import os
+import struct
 import subprocess
 import sys
+import termios
 from typing import Final
 
 from omnibot_driver import guard
@@ -18,6 +21,8 @@ from omnibot_driver import guard
 BEAT_S: Final = 0.1
 RESTART_S: Final = 1.0
 """A guard that dies at once is not started more often than this."""
+HANGS_AFTER: Final = 50
+"""A guard that has not read so many beats would not stop the robot either."""
 LEAVES_WITHIN_S: Final = 0.5
 SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + LEAVES_WITHIN_S
 
@@ -40,15 +45,8 @@ class Keeper:
 
     def beat(self, now: float) -> None:
         """The driver is alive; call it every ``BEAT_S``."""
-        if self._process is not None:
-            assert self._process.stdin is not None
-            try:
-                os.write(self._process.stdin.fileno(), guard.BEAT)
-            except BlockingIOError:
-                pass  # it is being kept from reading; what waits for it shows that we live
-            except OSError:
-                code = self._dismiss(guard.BYE, LEAVES_WITHIN_S)
-                self._tell(f"the guard process died (exit code {code}); another one is started")
+        if self._process is not None and (trouble := self._beat(self._process)):
+            self._tell(f"the guard process {trouble}; another one is started")
         if self._process is None and now >= self._restart_at:
             self._restart_at = now + RESTART_S
             self._start()
@@ -63,6 +61,21 @@ class Keeper:
             self._dismiss(guard.BYE, LEAVES_WITHIN_S)
         else:
             self._dismiss(b"", SPEAKS_WITHIN_S)
+
+    def _beat(self, process: subprocess.Popen[bytes]) -> str:
+        """Returns what is wrong with it, and then it is gone."""
+        assert process.stdin is not None
+        pipe = process.stdin.fileno()
+        try:
+            (unread,) = struct.unpack("i", fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)))
+            if unread < HANGS_AFTER * len(guard.BEAT):
+                os.write(pipe, guard.BEAT)
+                return ""
+        except OSError:
+            return f"died (exit code {self._dismiss(guard.BYE, LEAVES_WITHIN_S)})"
+        process.kill()
+        self._dismiss(b"", LEAVES_WITHIN_S)
+        return "hung"
 
     def _start(self) -> None:
         # By its bare name: whoever kills all that is called omnibot_driver does not hit the guard.

@@ -71,6 +71,7 @@ class Link:
         self._lock = threading.Lock()
         self._changed = threading.Condition(self._lock)
         self._closing = threading.Event()
+        self._on_exit: OnExit = "stop"
         self._port: Port | None = None
         self._write_error: LinkError | None = None
         self._keeper: Keeper | None = None
@@ -105,7 +106,7 @@ class Link:
     def blocked(self) -> bool:
         """The port is open and takes nothing; it is about to be opened anew."""
         with self._changed:
-            return self._write_error is not None
+            return self._port is not None and self._write_error is not None
 
     def command(self, action: Callable[[Session, float], None], sent_ns: int) -> None:
         """``call``, with a command sent at this time of day by the sender's clock.
@@ -137,10 +138,12 @@ class Link:
     def close(self, on_exit: OnExit) -> None:
         """Stop the robot, then end the threads and close the port; harmless to repeat."""
         with self._changed:
-            if self._port is not None and not self._closing.is_set():
+            if not self._closing.is_set():
+                self._on_exit = on_exit
                 self._write(self._session.farewell(on_exit))
+                self._interrupt()
+                self._port = None  # nobody adds to the last words
             self._closing.set()
-            self._interrupt()
             self._changed.notify_all()
         for thread in self._threads:
             if thread.is_alive():
@@ -153,7 +156,8 @@ class Link:
             self._failed(error)
 
     def _serve(self) -> None:
-        while not self._closing.is_set():
+        # Once more when it ends: a robot that was lost while it drove is still to be stopped.
+        while not (leaving := self._closing.is_set()) or self._opened:
             try:
                 with closing(self._open()) as port:
                     self._report(None)
@@ -166,7 +170,10 @@ class Link:
                         raise
                     finally:
                         self._detach(port, comes_back=comes_back)
+                return
             except LinkError as error:
+                if leaving:
+                    return
                 self._trouble = str(error)
                 self._report(self._trouble)
                 self._closing.wait(self._wait_s)
@@ -201,11 +208,14 @@ class Link:
                     raise self._write_error
                 if not data:
                     continue
+                now = time.monotonic()
+                measured = self._session.hear(data, now)
+            self._deliver(measured)
+            with self._lock:
                 self._wait_s = self.reconnect_interval_s
                 self._received += len(data)
-                now = time.monotonic()
                 self._heed_standstill(now)
-                self._session.receive(data, now)
+                self._session.heed(now)
                 events = self._settle()
             self._deliver(events)
 
@@ -213,7 +223,7 @@ class Link:
         """Whatever ended the reading, the robot is not left with a command to carry out."""
         with self._changed:
             if self._write_error is None:
-                self._write(self._session.farewell("stop"))
+                self._write(self._session.farewell(self._on_exit))
             else:  # Stop, right behind whatever is out of the kernel's reach
                 port.write_if_room(self._session.broken_off())
             comes_back &= not self._closing.is_set()
@@ -259,18 +269,14 @@ class Link:
 
     def _settle(self) -> Sequence[Event]:
         """With the lock held: write what is due, wake the pacer if it sleeps for too long."""
-        self._write(self._session.take_output(time.monotonic()))
+        if data := self._session.take_output(time.monotonic()):
+            self._write(data)
         if self._session.wake_at < self._pacing_until:
             self._changed.notify_all()
         return self._session.take_events()
 
     def _write(self, data: bytes) -> None:
-        if (
-            not data
-            or self._port is None
-            or self._write_error is not None
-            or self._closing.is_set()
-        ):
+        if self._port is None or self._write_error is not None:
             return
         try:
             self._port.write(data)

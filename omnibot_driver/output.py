@@ -7,6 +7,7 @@ pipe that nobody reads, would freeze every thread, the watchdog included, and th
 with its last command. So what is printed goes through a pipe that would rather lose a line.
 """
 
+import contextlib
 import os
 import sys
 import threading
@@ -22,6 +23,7 @@ class UnblockedOutput:
     """While entered, writing to the standard output and error of this process never waits."""
 
     def __enter__(self) -> Self:
+        _fill_gaps()
         if os.isatty(2):
             os.environ.setdefault("RCUTILS_COLORIZED_OUTPUT", "1")  # it would see our pipe
         self._originals = [os.dup(descriptor) for descriptor in STANDARD]
@@ -39,13 +41,21 @@ class UnblockedOutput:
         exc: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        sys.stdout.flush()
+        if sys.stdout is not None:  # it was closed
+            sys.stdout.flush()
         for descriptor, original in zip(STANDARD, self._originals, strict=True):
             os.dup2(original, descriptor)  # closes the pipe's last writing end
         for copier, original in zip(self._copiers, self._originals, strict=True):
             copier.join(LAST_WORDS_S)
             if not copier.is_alive():
                 os.close(original)
+
+
+def _fill_gaps() -> None:
+    """Else the port would become a standard output that is closed: the board would get the log."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= max(STANDARD):
+        pass
+    os.close(descriptor)
 
 
 def _redirect(descriptor: int) -> int:
@@ -58,11 +68,8 @@ def _redirect(descriptor: int) -> int:
 
 
 def _copy(reading: int, writing: int) -> None:
-    try:
-        while data := os.read(reading, CHUNK_BYTES):
-            while data:
-                data = data[os.write(writing, data) :]
-    except OSError:
-        return  # nobody listens any more
-    finally:
-        os.close(reading)
+    with open(reading, "rb", buffering=0) as source:
+        while data := source.read(CHUNK_BYTES):
+            with contextlib.suppress(OSError):  # a full disk may have room later
+                while data:
+                    data = data[os.write(writing, data) :]

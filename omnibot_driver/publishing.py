@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from nav_msgs.msg import Odometry
 from rclpy._rclpy_pybind11 import RCLError
+from rclpy.clock import ClockChange, JumpThreshold, TimeJump
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
@@ -55,6 +56,10 @@ class Publishing:
         self.settings = settings
         self._port = values["port"]
         self._clock = node.get_clock()
+        self._time_is_simulated = self._clock.ros_time_is_active
+        self._time_watch = self._clock.create_jump_callback(
+            JumpThreshold(min_forward=None, min_backward=None), post_callback=self._change_time
+        )
         self._over = False
         node.context.on_shutdown(self._end)
         self._imu = node.create_publisher(Imu, "imu/data_raw", 10)
@@ -96,7 +101,8 @@ class Publishing:
         if not events or self._over:
             return
         before_ns = time.monotonic_ns()
-        wall_ns = self._now_ns()
+        # Where nobody simulates ROS time it is the system's, which costs a tenth.
+        wall_ns = self._clock.now().nanoseconds if self._time_is_simulated else time.time_ns()
         self._clock_offset_ns = messages.clock_offset(
             self._clock_offset_ns, before_ns, wall_ns, time.monotonic_ns()
         )
@@ -139,11 +145,9 @@ class Publishing:
         """ROS is being shut down; to ask it each time costs more than an Imu."""
         self._over = True
 
-    def _now_ns(self) -> int:
-        """ROS time. Where nobody simulates it, it is the system's, which costs a tenth."""
-        if self._clock.ros_time_is_active:
-            return int(self._clock.now().nanoseconds)
-        return time.time_ns()
+    def _change_time(self, jump: TimeJump) -> None:
+        """Called when time begins or ceases to be simulated; to ask each time costs a microsecond."""
+        self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[bytes], None]:
         publisher = self._node.create_publisher(UInt8MultiArray, topic, RAW_DEPTH)

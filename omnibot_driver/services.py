@@ -41,7 +41,9 @@ class Services:
         active = bool(request.data)
         response.message = self._link.call(lambda session, now: session.estop(active, now))
         if active and self._link.blocked:
-            response.message += "; the port takes nothing: the stop follows when it is open again"
+            response.message = (
+                "e-stop latched; the port takes nothing: the stop follows when it is open again"
+            )
         response.success = True
         return response
 

@@ -2,8 +2,10 @@
 
 """What stands around a link in place of a node."""
 
+import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.events import Event
@@ -15,7 +17,8 @@ from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link
 
 PATIENCE_S = 20.0
-LAST_WORDS = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00 FF FE 10 00 00 00 00 00 00")
+STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+LAST_WORDS = bytes(8) + STOP + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
 
 
 class Listener:
@@ -77,3 +80,18 @@ def driver_threads() -> list[str]:
     """Those of links, recordings and simulated boards; a test runner has threads of its own."""
     names = (thread.name for thread in threading.enumerate())
     return sorted(name for name in names if name.startswith(("omnibot-", "simulated board")))
+
+
+@contextmanager
+def nothing_left_behind() -> Iterator[None]:
+    """As many descriptors afterwards as before, and the same threads."""
+    threads, descriptors = driver_threads(), os.listdir("/proc/self/fd")
+    yield
+    assert driver_threads() == threads
+    assert len(os.listdir("/proc/self/fd")) == len(descriptors)
+
+
+def wait_for_the_end_of(*names: str) -> None:
+    for thread in threading.enumerate():
+        if thread.name in names:
+            thread.join(PATIENCE_S)

@@ -1,10 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What tests do to terminals."""
+"""Pseudo-terminals with nobody behind them, and what tests do to them."""
 
 import contextlib
 import os
+import select
 import time
+import tty
+
+from listener import PATIENCE_S
 
 
 def fill(descriptor: int, words: bytes = b"x") -> None:
@@ -20,3 +24,30 @@ def fill(descriptor: int, words: bytes = b"x") -> None:
                 taken += os.write(descriptor, words[taken % len(words) :])
                 full = 0
         time.sleep(0.01)
+
+
+class Terminal:
+    """A pseudo-terminal with nobody behind it who reads."""
+
+    def __init__(self) -> None:
+        self.far, self._near = os.openpty()
+        tty.setraw(self._near)
+        os.set_blocking(self._near, False)
+        os.set_blocking(self.far, False)
+        self.path = os.ttyname(self._near)
+
+    def fill(self) -> None:
+        """Until it takes no more."""
+        fill(self._near)
+
+    def read_until(self, words: bytes) -> bytes:
+        """All that has been written, up to the time when these words are in it."""
+        heard, end = b"", time.monotonic() + PATIENCE_S
+        while words not in heard:
+            assert select.select([self.far], [], [], end - time.monotonic())[0], heard
+            heard += os.read(self.far, 4096)
+        return heard
+
+    def close(self) -> None:
+        os.close(self.far)
+        os.close(self._near)

@@ -1,8 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The table of parameters against the interface, and what its checks say."""
+"""The table of parameters against the interface, the core and the file."""
 
-import math
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.core.plausibility import MotionLimits
 from omnibot_driver.parameters import (
     BY_NAME,
     PARAMETERS,
@@ -21,7 +21,6 @@ from omnibot_driver.parameters import (
 )
 
 CONFIG = Path(__file__).parent.parent / "config" / "driver.yaml"
-
 PROMISED: dict[str, object] = {
     "port": "/dev/ttyUSB0",
     "baudrate": 115200,
@@ -64,14 +63,6 @@ PROMISED: dict[str, object] = {
 }
 """Names and defaults that users rely on."""
 
-VECTORS = [BY_NAME["gyro_bias"], BY_NAME["accel_bias"]]
-RANGED = [
-    parameter for parameter in PARAMETERS if parameter.low is not None and parameter not in VECTORS
-]
-FLOATS = [parameter for parameter in PARAMETERS if isinstance(parameter.default, float)]
-CHOICES = [parameter for parameter in PARAMETERS if parameter.choices]
-FRAMES = [parameter for parameter in PARAMETERS if parameter.name.endswith("_frame")]
-
 
 def name_of(parameter: object) -> str | None:
     return parameter.name if isinstance(parameter, Parameter) else None
@@ -112,146 +103,6 @@ def test_identity_cannot_change_while_it_runs(name: str) -> None:
 def test_tuning_may_change_while_it_runs(name: str) -> None:
     """It is found by trying."""
     assert not BY_NAME[name].fixed
-
-
-@pytest.mark.parametrize("parameter", FLOATS, ids=name_of)
-def test_an_integer_will_do_for_a_float(parameter: Parameter) -> None:
-    """YAML's 1 is meant as 1.0."""
-    assert parameter.high is not None
-    value = parameter.check(int(parameter.high))
-    assert type(value) is float
-    assert value == parameter.high
-
-
-@pytest.mark.parametrize("parameter", RANGED, ids=name_of)
-def test_both_ends_of_a_range_are_allowed_and_nothing_beyond(parameter: Parameter) -> None:
-    """The message names the parameter, what it may be, its unit, and what was given."""
-    assert parameter.low is not None
-    assert parameter.high is not None
-    kind = type(parameter.default)
-    assert parameter.check(kind(parameter.low)) == parameter.low
-    assert parameter.check(kind(parameter.high)) == parameter.high
-    for wrong in (parameter.low - 1, parameter.high + 1, -math.inf, math.inf, math.nan, 1e300):
-        with pytest.raises(ParameterError) as caught:
-            parameter.check(wrong)
-        message = str(caught.value)
-        assert f"'{parameter.name}'" in message
-        assert repr(type(parameter.default)(wrong) if kind is float else wrong) in message or (
-            str(int(wrong)) in message
-        )
-        if kind is float:
-            assert f"{parameter.low:g} to {parameter.high:.10g} {parameter.unit}" in message
-
-
-@pytest.mark.parametrize("parameter", CHOICES, ids=name_of)
-def test_each_choice_is_allowed_and_the_message_lists_them(parameter: Parameter) -> None:
-    """Nobody has to look them up."""
-    for choice in parameter.choices:
-        assert parameter.check(choice) == choice
-    with pytest.raises(ParameterError) as caught:
-        parameter.check("nonsense" if isinstance(parameter.default, str) else 3)
-    for choice in parameter.choices:
-        assert str(choice) in str(caught.value)
-
-
-WRONG_TYPES: dict[type, list[object]] = {
-    bool: [1, 0, 1.0, "true", None, [True]],
-    int: [True, 1.5, "2", None, [2], math.nan, math.inf],
-    float: [True, "0.5", None, [0.5], b"1"],
-    str: [1, 1.0, True, None, ["a"], b"a"],
-    list: [
-        1, "111", None, True, b"111", [], [1, 1], [1, 1, 1, 1], [1, 9, 1], [1, 1, math.nan],
-        ["1", "1", "1"], [None, 1, 1], [[1], [1], [1]],
-    ],
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("parameter", "wrong"),
-    [
-        (parameter, wrong)
-        for parameter in PARAMETERS
-        for wrong in WRONG_TYPES[type(parameter.default)]
-    ],
-    ids=lambda value: value.name if isinstance(value, Parameter) else repr(value),
-)
-def test_a_value_of_another_type_is_refused(parameter: Parameter, wrong: object) -> None:
-    """Always by a ParameterError that names the parameter."""
-    with pytest.raises(ParameterError, match=f"'{parameter.name}'"):
-        parameter.check(wrong)
-
-
-json_like = st.recursive(
-    st.one_of(
-        st.none(), st.booleans(), st.integers(-(2**63), 2**63 - 1), st.floats(), st.text(),
-        st.binary(),
-    ),
-    lambda inner: st.lists(inner, max_size=4),
-)  # fmt: skip
-
-
-@given(st.sampled_from(PARAMETERS), json_like)
-def test_any_value_is_either_taken_in_the_right_type_or_refused(
-    parameter: Parameter, value: object
-) -> None:
-    """Nothing else is raised, and what was taken is taken again."""
-    try:
-        taken = parameter.check(value)
-    except ParameterError:
-        return
-    assert type(taken) is type(parameter.default)
-    assert parameter.check(taken) == taken
-
-
-@pytest.mark.parametrize("wrong", [[1, 0, 1], [1, 2, 1], [1, 1, 0.5]])
-def test_axis_signs_are_nothing_but_ones(wrong: list[float]) -> None:
-    """A sign is no factor."""
-    with pytest.raises(ParameterError, match="each 1 or -1"):
-        BY_NAME["axis_signs"].check(wrong)
-
-
-@pytest.mark.parametrize("signs", [[1, -1, 1], (1, -1, 1), [1.0, -1.0, 1.0]])
-def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
-    """In any sequence; integers come of it."""
-    taken = BY_NAME["axis_signs"].check(signs)
-    assert taken == [1, -1, 1]
-    assert isinstance(taken, list)
-    assert all(type(sign) is int for sign in taken)
-
-
-@pytest.mark.parametrize("parameter", FRAMES, ids=name_of)
-@pytest.mark.parametrize("wrong", ["", "/odom"])
-def test_a_frame_name_is_not_empty_and_has_no_leading_slash(
-    parameter: Parameter, wrong: str
-) -> None:
-    """tf2 takes neither."""
-    with pytest.raises(ParameterError, match=f"'{parameter.name}'"):
-        parameter.check(wrong)
-
-
-@pytest.mark.parametrize("wrong", ["/", "/robot1/"])
-def test_a_frame_prefix_has_no_leading_slash(wrong: str) -> None:
-    """tf2 knows no such frames; no prefix at all is one."""
-    with pytest.raises(ParameterError, match=r"'frame_prefix'.*such as robot1/"):
-        BY_NAME["frame_prefix"].check(wrong)
-    assert BY_NAME["frame_prefix"].check("robot1/") == "robot1/"
-    assert BY_NAME["frame_prefix"].check("") == ""
-
-
-@pytest.mark.parametrize("parameter", VECTORS, ids=name_of)
-def test_a_bias_is_three_numbers_each_within_its_range(parameter: Parameter) -> None:
-    """Integers will do; floats come of it."""
-    assert parameter.high is not None
-    taken = parameter.check((1, -1, 0.5))
-    assert taken == [1.0, -1.0, 0.5]
-    assert isinstance(taken, list)
-    assert all(type(number) is float for number in taken)
-    for wrong in (parameter.high + 1, -math.inf, math.nan, True, "1"):
-        with pytest.raises(ParameterError, match=f"'{parameter.name}'.*three numbers, each"):
-            parameter.check([0.0, wrong, 0.0])
-
-
-# The whole table
 
 
 def test_what_is_not_given_is_the_default() -> None:
@@ -319,10 +170,14 @@ def test_values_reach_the_core_under_their_meaning() -> None:
             "odom_gap_acceleration": 3, "odom_gap_angular_acceleration": 4,
             "use_board_pose": False, "base_radius": 0.2, "counts_per_revolution": 1000,
             "fastest_linear_speed": 1.5, "fastest_angular_speed": 5,
+            "fastest_linear_acceleration": 16, "fastest_angular_acceleration": 51,
+            "largest_force_step": 4.5, "odom_linear_scale": 1.1, "odom_angular_scale": 1.2,
+            "baudrate": 57600,
             "gyro_bias": [0.1, 0.2, 0.3], "accel_bias": [1, 2, 3], "auto_gyro_bias": True,
         }
     )  # fmt: skip
     board, session = board_settings(values), session_settings(values)
+    assert board.baudrate == 57600
     assert (board.linear_scale, board.angular_scale, board.wheel_radius_m) == (71.0, 501.0, 0.03)
     assert (board.position_scale, board.heading_scale) == (900.0, 800.0)
     assert (board.delta_frame, board.pose_byte_order) == ("body", "little")
@@ -335,14 +190,20 @@ def test_values_reach_the_core_under_their_meaning() -> None:
     odometry, noise = session.odometry, session.odometry.noise
     assert (odometry.fastest_mps, odometry.fastest_radps) == (1.5, 5.0)
     assert odometry.use_board_pose is False
+    assert (odometry.linear_scale, odometry.angular_scale) == (1.1, 1.2)
+    assert session.motion == MotionLimits(
+        fastest_mps=1.5,
+        fastest_radps=5.0,
+        fastest_mps2=16.0,
+        fastest_radps2=51.0,
+        force_step_mps2=4.5,
+        full_scale_mps2=pytest.approx(8 * 9.80665),
+    )
     assert (noise.wheel_scale, noise.base_radius_m) == (0.06, 0.2)
     assert (noise.unheard_mps2, noise.unheard_radps2) == (3.0, 4.0)
     assert (noise.wheel_drift, noise.wheel_slip) == (0.03, 0.05)
     assert (session.imu.gyro_bias, session.imu.accel_bias) == ((0.1, 0.2, 0.3), (1.0, 2.0, 3.0))
     assert session.imu.auto_gyro_bias is True
-
-
-# The file
 
 
 def in_the_file() -> dict[str, object]:

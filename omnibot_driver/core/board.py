@@ -105,7 +105,7 @@ class BoardFigures:
     saturated: int = 0
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Edge:
     """Where a read ended among the samples.
 

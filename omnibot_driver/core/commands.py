@@ -34,24 +34,22 @@ class CommandStream:
         self.settings = settings
         self.latched = False
         self._stop, self._emergency_stop = stop, emergency_stop
-        self._current: Motion | None = None
+        self.current: Motion | None = None
+        """The command that is being carried out."""
         self._expires_at = -math.inf
         self._stopping_until = -math.inf
         self._written_at = self._said_at = -math.inf
         self._last_written = b""
         self._urgent = False
         self._fresh = self._switching = False
-
-    @property
-    def current(self) -> Motion | None:
-        """The command that is being carried out."""
-        return self._current
+        self._quiet = True
+        """Nothing is to be written until something happens."""
 
     def command(self, motion: Motion, now: float, *, expires_at: float) -> None:
         """The newest command replaces whatever was current; another's is stopped in between."""
-        before, self._current = self._current, motion
+        before, self.current = self.current, motion
         self._expires_at = expires_at
-        self._fresh = True
+        self._fresh, self._quiet = True, False
         self._switching |= before is not None and before.authority is not motion.authority
         stopped = self._just_written(self._stop, now)
         self._switching &= not stopped
@@ -59,20 +57,20 @@ class CommandStream:
 
     def discard(self) -> None:
         """No command is current and the line goes quiet; an e-stop stays."""
-        self._current = None
+        self.current = None
         self._stopping_until = -math.inf
         self._fresh = self._urgent = self._switching = False
 
     def halt(self, now: float) -> None:
         """Discard the command, Stop at once, and repeat it for ``STOPPING_S``."""
         self.discard()
-        self._stopping_until = now + STOPPING_S
+        self._stopping_until, self._quiet = now + STOPPING_S, False
         self._urgent = not self._just_written(self._stop, now)
 
     def latch(self, now: float) -> None:
         """E-stop: nothing but emergency-stop frames from now on, the first at once."""
         self.discard()
-        self.latched = True
+        self.latched, self._quiet = True, False
         self._urgent = not self._just_written(self._emergency_stop, now)
 
     def release(self, now: float) -> None:
@@ -87,7 +85,9 @@ class CommandStream:
 
     def due(self, now: float) -> bytes:
         """The bytes to write now, possibly none. They count as written."""
-        if self._current is not None and now >= self._expires_at:
+        if self._quiet:
+            return b""
+        if self.current is not None and now >= self._expires_at:
             self.halt(now)
         next_write = self._next_write()
         if now < next_write:
@@ -97,13 +97,17 @@ class CommandStream:
         if frame:
             self._said_at = now
             self.wrote(frame, now)
+        else:
+            self._quiet = True
         return frame
 
     @property
     def wake_at(self) -> float:
         """When ``due`` has to be asked again; infinity while the line is quiet."""
+        if self._quiet:
+            return math.inf
         next_write = self._next_write()
-        if self._current is not None:
+        if self.current is not None:
             return min(next_write, self._expires_at)
         return next_write if self._frame(next_write, next_write) else math.inf
 
@@ -114,7 +118,7 @@ class CommandStream:
         if self._urgent:
             return -math.inf
         paced_at = self._written_at + PACE_S
-        if self._fresh or (self._current is not None and not self._current.settled):
+        if self._fresh or (self.current is not None and not self.current.settled):
             return paced_at
         return max(paced_at, self._said_at + 1.0 / self.settings.rate_hz)
 
@@ -123,6 +127,6 @@ class CommandStream:
             return self._emergency_stop
         if self._switching:
             return self._stop
-        if self._current is not None:
-            return self._current.frame(now)
+        if self.current is not None:
+            return self.current.frame(now)
         return self._stop if due_at < self._stopping_until else b""

@@ -85,7 +85,7 @@ class DeviceClock:
             self._cut_off = None
         short = 0
         if edge is not None:
-            kinds = [type(reading) for reading in readings]
+            kinds = list(map(type, readings))
             came = edge.ahead + kinds.count(ImuReading)
             if came:
                 self._single_reads = self._single_reads + 1 if came == 1 else 0

@@ -263,7 +263,7 @@ class Diagnosis:
             level, message = Level.STALE, "the board sends no measurements"
         elif stuck:
             level = Level.ERROR
-            message = f"the {' and '.join(stuck)} always says the same: switch the board off and on"
+            message = f"always the same from the {' and '.join(stuck)}: switch the board off and on"
         elif imu.advice:
             level, message = Level.WARN, imu.advice
         elif imu.gravity_mps2 is None:

@@ -11,6 +11,8 @@ This module knows readings and times. It reads no clock, and does not know when 
 """
 
 import math
+from collections.abc import Sequence
+from statistics import fmean
 from typing import Final
 
 from omnibot_driver.core.board import Vector3
@@ -36,61 +38,23 @@ REFINEMENT: Final = 0.05
 """Part of the way to what one block says: half the way in a quarter of a minute."""
 
 
-class Moments:
-    """Mean and standard deviation of vectors, axis by axis."""
-
-    def __init__(self) -> None:
-        self.count = 0
-        self._first: Vector3 = (0.0, 0.0, 0.0)
-        self._sum: Vector3 = (0.0, 0.0, 0.0)
-        self._squares: Vector3 = (0.0, 0.0, 0.0)
-
-    def add(self, vector: Vector3) -> None:
-        """One more."""
-        if not self.count:
-            self._first = vector
-        self.count += 1
-        (x, y, z), (first_x, first_y, first_z) = vector, self._first
-        (sum_x, sum_y, sum_z), (xx, yy, zz) = self._sum, self._squares
-        x, y, z = x - first_x, y - first_y, z - first_z
-        self._sum = sum_x + x, sum_y + y, sum_z + z
-        self._squares = xx + x * x, yy + y * y, zz + z * z
-
-    @property
-    def mean(self) -> Vector3:
-        """Of at least one."""
-        x, y, z = (
-            first + total / self.count for first, total in zip(self._first, self._sum, strict=True)
-        )
-        return x, y, z
-
-    @property
-    def deviation(self) -> Vector3:
-        """Of at least one."""
-        n = self.count
-        x, y, z = (
-            math.sqrt(max(0.0, squares / n - (total / n) ** 2))
-            for total, squares in zip(self._sum, self._squares, strict=True)
-        )
-        return x, y, z
-
-
 class Look:
     """What was seen of the robot since ``began_s``."""
 
     def __init__(self) -> None:
-        self.rate, self.force = Moments(), Moments()
+        self.rates: list[Vector3] = []
+        self.forces: list[Vector3] = []
         self.began_s = self.last_s = math.nan
         self.displacements = 0
         self._x_m = self._y_m = self._yaw_rad = 0.0
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
         """A reading of the IMU."""
-        if not self.rate.count:
+        if not self.rates:
             self.began_s = stamp_s
         self.last_s = stamp_s
-        self.rate.add(rate)
-        self.force.add(force)
+        self.rates.append(rate)
+        self.forces.append(force)
 
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
         """A displacement, in whichever axes."""
@@ -102,7 +66,7 @@ class Look:
     @property
     def length_s(self) -> float:
         """From the first reading to the last."""
-        return self.last_s - self.began_s if self.rate.count else 0.0
+        return self.last_s - self.began_s if self.rates else 0.0
 
     @property
     def rolled(self) -> bool:
@@ -112,8 +76,8 @@ class Look:
     @property
     def motion(self) -> str:
         """What speaks against rest, in words; empty if nothing does."""
-        shaken_radps, shaken_mps2 = max(self.rate.deviation), max(self.force.deviation)
-        bias_radps = max(map(abs, self.rate.mean))
+        shaken_radps, shaken_mps2 = max(deviation(self.rates)), max(deviation(self.forces))
+        bias_radps = max(map(abs, mean(self.rates)))
         if self.rolled:
             return "its wheels turn"
         if shaken_radps > STILL_RADPS:
@@ -184,25 +148,41 @@ class GyroCalibration:
         if motion := look.motion:
             self.give_up(f"the robot moves ({motion}); let it stand still for 2 s and call again")
             return
-        self.gravity_mps2 = math.hypot(*look.force.mean)
-        self.noise = look.rate.deviation
+        self.gravity_mps2 = math.hypot(*mean(look.forces))
+        self.noise = deviation(look.rates)
         if self.measuring:
-            self.bias = look.rate.mean
+            self.bias = mean(look.rates)
             self._answer(
                 True,
                 f"gyro bias {_numbers(self.bias)} rad/s, noise {_numbers(self.noise)} rad/s rms,"
-                f" from {look.rate.count} readings",
+                f" from {len(look.rates)} readings",
             )
         elif self.refine and look.displacements:
             x, y, z = (
                 known + REFINEMENT * (seen - known)
-                for known, seen in zip(self.bias, look.rate.mean, strict=True)
+                for known, seen in zip(self.bias, mean(look.rates), strict=True)
             )
             self.bias = x, y, z
 
     def _answer(self, success: bool, message: str) -> None:
         self.answers.append(RequestDone(self._token, success, message))
         self._token, self.wake_at = None, math.inf
+
+
+def mean(vectors: Sequence[Vector3]) -> Vector3:
+    """Of at least one, axis by axis."""
+    x, y, z = map(fmean, zip(*vectors, strict=True))
+    return x, y, z
+
+
+def deviation(vectors: Sequence[Vector3]) -> Vector3:
+    """Standard deviation of at least one, axis by axis."""
+    n = len(vectors)
+    x, y, z = (
+        math.dist(axis, (middle,) * n) / math.sqrt(n)
+        for axis, middle in zip(zip(*vectors, strict=True), mean(vectors), strict=True)
+    )
+    return x, y, z
 
 
 def _numbers(vector: Vector3) -> str:

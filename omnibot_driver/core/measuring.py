@@ -3,6 +3,8 @@
 """From readings to measurements: stamped, checked, integrated, corrected, counted.
 
 Composes the board's clock, plausibility, odometry and the IMU. Knows no commands and no modes.
+Readings of the IMU are measured with the read that brings them (``hear``), so that nobody waits for
+what else is made of it (``digest``).
 """
 
 from collections.abc import Sequence
@@ -18,7 +20,7 @@ from omnibot_driver.core.board import (
 from omnibot_driver.core.device_clock import DeviceClock
 from omnibot_driver.core.inertial import ImuCorrection, ImuEstimate, Inertial
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
-from omnibot_driver.core.plausibility import MotionLimits, Plausibility, Refused
+from omnibot_driver.core.plausibility import MotionLimits, Plausibility, Refused, Stamped
 from omnibot_driver.core.se2 import Signs
 from omnibot_driver.core.tally import Tally
 
@@ -44,6 +46,9 @@ class Measuring:
         self._board = board
         self._clock = DeviceClock(board.tick_s)
         self._plausibility = Plausibility(motion, board.tick_s)
+        self._uncounted: list[tuple[Sequence[Reading], float]] = []
+        """Of each read the readings, and how old the newest was."""
+        self._undigested: list[Stamped] = []
 
     def configure(
         self, odometry: OdometrySettings, motion: MotionLimits, imu: ImuCorrection
@@ -70,22 +75,39 @@ class Measuring:
         """What the board does from here on has nothing to do with what it did before."""
         self._clock.restart()
 
-    def take_in(self, readings: Sequence[Reading], now: float) -> list[Measured]:
-        """What is sure of these, which came in at ``now``, and of those before that waited."""
+    def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
+        """What is sure of the IMU by these, which came in at ``now``; the rest is for ``digest``.
+
+        A reading does not overtake one of another kind.
+        """
         stamps_s = self._clock.stamps(readings, now, self._board.edge)
-        if readings:
-            self.tally.read(now - stamps_s[-1])
-        measured: list[Measured] = []
+        estimates = []
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
-            self.tally.hear(reading)
+            if self._undigested or not isinstance(reading, ImuReading):
+                self._undigested.append((reading, stamp_s))
+                continue
+            for sure, at_s in self._plausibility.admit_imu(reading, stamp_s):
+                estimates.append(self.inertial.estimate(sure, at_s))
+        if readings:
+            self._uncounted.append((readings, now - stamps_s[-1]))
+        return estimates
+
+    def digest(self) -> list[Measured]:
+        """What else is sure of all that was heard."""
+        for readings, delay_s in self._uncounted:
+            self.tally.read(readings, delay_s)
+        self._uncounted.clear()
+        measured: list[Measured] = []
+        for reading, stamp_s in self._undigested:
             for sure, at_s in self._plausibility.admit(reading, stamp_s):
                 measured.append((sure, self._estimates(sure, at_s)))
+        self._undigested.clear()
         return measured
 
     def release(self) -> list[Measured]:
         """What waited for readings that will not come."""
-        released = self._plausibility.release()
-        return [(reading, self._estimates(reading, stamp_s)) for reading, stamp_s in released]
+        measured, released = self.digest(), self._plausibility.release()
+        return measured + [(sure, self._estimates(sure, at_s)) for sure, at_s in released]
 
     def _estimates(self, reading: Reading, stamp_s: float) -> Sequence[Estimate]:
         match reading:

@@ -44,12 +44,12 @@ class Bulletin:
     def counted(self, lost: int, refused: Refused, now: float) -> Iterator[str]:
         """What was lost and refused since it was last told."""
         if more := self._lost.since_told(lost, now):
-            yield f"{more} odometry frames were lost on the line: check cable and hub"
+            yield f"odometry frames lost on the line: {more}; check cable and hub"
         total = refused.imu + refused.displacements + refused.poses
         if more := self._refused.since_told(total, now):
             yield (
-                f"{more} readings cannot be true and were refused (in all {refused.imu} imu,"
-                f" {refused.displacements} odometry, {refused.poses} poses): the line changes bits,"
+                f"readings refused that cannot be true: {more} (in all {refused.imu} imu,"
+                f" {refused.displacements} odometry, {refused.poses} poses); the line changes bits,"
                 " or a limit of motion is set too low"
             )
 

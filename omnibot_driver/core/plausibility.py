@@ -79,7 +79,7 @@ class Plausibility:
         self._tick_s = tick_s
         self._imu_leaps = _Leaps(STILL, knocked=3)
         self._motion_leaps = _Leaps(BACK, knocked=0)
-        self._held_imu: list[Stamped] = []
+        self._held_imu: list[tuple[ImuReading, float]] = []
         self._held_motion: list[Stamped] = []
         """A displacement that leaps, and the poses after it."""
         self._displaced_at_s: float | None = None
@@ -90,7 +90,7 @@ class Plausibility:
         """The readings that are sure now, each kind in the order in which it came."""
         match reading:
             case ImuReading():
-                return self._admit_imu(reading, stamp_s)
+                return list(self.admit_imu(reading, stamp_s))
             case DisplacementReading():
                 return self._admit_displacement(reading, stamp_s)
             case PoseReading() if self._held_motion:
@@ -109,7 +109,8 @@ class Plausibility:
         self._motion_leaps.forget()
         return released
 
-    def _admit_imu(self, reading: ImuReading, stamp_s: float) -> list[Stamped]:
+    def admit_imu(self, reading: ImuReading, stamp_s: float) -> list[tuple[ImuReading, float]]:
+        """``admit``, of the IMU."""
         force = self.limits.force_step_mps2
         turn = self.limits.fastest_radps2 * self._tick_s
         (x, y, z), (u, v, w) = reading.specific_force, reading.angular_velocity

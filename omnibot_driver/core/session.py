@@ -26,7 +26,7 @@ from omnibot_driver.core.driving import Driving, Wish
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import Event, Notice, StateChanged
 from omnibot_driver.core.helm import ControlMethod
-from omnibot_driver.core.inertial import ImuCorrection
+from omnibot_driver.core.inertial import ImuCorrection, ImuEstimate
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.measuring import Measured, Measuring
@@ -93,6 +93,7 @@ class Session:
         self._commands = self._driving.stream
         self._heard_at = self._came_at = -math.inf
         self._silent = False
+        self._last: Reading | None = None
         self._tell_at = -math.inf
         self._bulletin = Bulletin()
         self._events: list[Event] = []
@@ -176,7 +177,8 @@ class Session:
 
     def closed(self, now: float) -> None:
         """The port is gone."""
-        self._take_in(self._board.flush(now), now)
+        self._events += self._take_in(self._board.flush(now), now)
+        self.heed(now)
         self._react(self._measuring.release(), now)
         self._supervisor.closed()
         self._inertial.calibration.give_up(
@@ -186,11 +188,36 @@ class Session:
 
     def receive(self, data: bytes, now: float) -> None:
         """Bytes came in at ``now``."""
+        self._events += self.hear(data, now)
+        self.heed(now)
+
+    def hear(self, data: bytes, now: float) -> list[ImuEstimate]:
+        """``receive``, but for what can wait until these are told: ``heed`` is to follow.
+
+        Whoever commands in between is as one who came before the bytes. That must not be where they
+        change the mode, so there nothing waits.
+        """
         self._came_at = now
-        was_running = self._board.mode.running
-        self._take_in(self._board.receive(data, now), now)
-        if self._board.mode.running and not was_running:
+        before = self._board.mode
+        estimates = self._take_in(self._board.receive(data, now), now)
+        after = self._board.mode
+        if after is before:
+            return estimates
+        self._events += estimates
+        self.heed(now)
+        if after.running and not before.running:
             self._commands.halt(now)
+        return []
+
+    def heed(self, now: float) -> None:
+        """What comes of the bytes that were heard last."""
+        last, self._last = self._last, None
+        if last is None:
+            return
+        self._react(self._measuring.digest(), now)
+        self._tell(now)
+        if self._board.mode.running and not isinstance(last, PausedReading):
+            self._supervisor.heard_data(now)
 
     def tick(self, now: float) -> None:
         """Time passed."""
@@ -311,15 +338,10 @@ class Session:
     def _closed(self) -> bool:
         return self._supervisor.phase is Phase.CLOSED
 
-    def _take_in(self, readings: list[Reading], now: float) -> None:
-        measured = self._measuring.take_in(readings, now)
-        if not readings:
-            return
-        self._heard_at, self._silent = now, False
-        self._react(measured, now)
-        self._tell(now)
-        if self._board.mode.running and not isinstance(readings[-1], PausedReading):
-            self._supervisor.heard_data(now)
+    def _take_in(self, readings: list[Reading], now: float) -> list[ImuEstimate]:
+        if readings:
+            self._heard_at, self._silent, self._last = now, False, readings[-1]
+        return self._measuring.hear(readings, now)
 
     def _react(self, measured: list[Measured], now: float) -> None:
         for reading, estimates in measured:

@@ -4,6 +4,7 @@
 them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from omnibot_driver.core.board import (
@@ -40,29 +41,27 @@ class Tally:
     _force: Vector3 | None = field(default=None, repr=False)
     _rate: Vector3 | None = field(default=None, repr=False)
 
-    def read(self, delay_s: float) -> None:
-        """A read brought samples, the newest of which was so old."""
+    def read(self, readings: Sequence[Reading], delay_s: float) -> None:
+        """A read brought these, the newest of which was so old."""
         self.reads += 1
         self.delay_s += delay_s
         self.squared_delay_s2 += delay_s * delay_s
-
-    def hear(self, reading: Reading) -> None:
-        """One more."""
-        match reading:
-            case ImuReading(force, rate, lost):
-                self.imu += 1
-                self.lost_imu += lost
-                self.same_force = self.same_force + 1 if force == self._force else 0
-                self.same_rate = self.same_rate + 1 if rate == self._rate else 0
-                self._force, self._rate = force, rate
-            case DisplacementReading(lost=lost, restarted=restarted):
-                self.displacements += 1
-                self._miss(lost, restarted)
-            case PoseReading(lost=lost, restarted=restarted):
-                self.poses += 1
-                self._miss(lost, restarted)
-            case PausedReading():
-                self.same_force = self.same_rate = 0
+        for reading in readings:
+            match reading:
+                case ImuReading(force, rate, lost):
+                    self.imu += 1
+                    self.lost_imu += lost
+                    self.same_force = self.same_force + 1 if force == self._force else 0
+                    self.same_rate = self.same_rate + 1 if rate == self._rate else 0
+                    self._force, self._rate = force, rate
+                case DisplacementReading(lost=lost, restarted=restarted):
+                    self.displacements += 1
+                    self._miss(lost, restarted)
+                case PoseReading(lost=lost, restarted=restarted):
+                    self.poses += 1
+                    self._miss(lost, restarted)
+                case PausedReading():
+                    self.same_force = self.same_rate = 0
 
     def _miss(self, lost: int, restarted: bool) -> None:
         self.restarts += restarted

@@ -57,6 +57,7 @@ class TickLine:
         self._latest: deque[tuple[Point, bool]] = deque(maxlen=BLOCKS_KEPT)
         self._earliest: deque[Point] = deque(maxlen=BLOCKS_KEPT)
         self._best: tuple[Point, bool] | None = None
+        self._best_s = math.inf
         self._not_before: list[Point] = []
         self._block_from = first[0]
 
@@ -67,10 +68,12 @@ class TickLine:
     def see(self, latest: Point, *, cut: bool) -> None:
         """A read: its newest tick had come by ``latest``; whether the read ``cut`` it."""
         tick, arrival = latest
-        if arrival < self.at(tick):
+        anchor_tick, anchor_s = self._anchor
+        if arrival < anchor_s + self.slope_s * (tick - anchor_tick):
             self._anchor = latest
-        if self._best is None or self._height(latest) < self._height(self._best[0]):
-            self._best = latest, cut
+        height_s = arrival - self.slope_s * tick
+        if self._best is None or height_s < self._best_s:
+            self._best, self._best_s = (latest, cut), height_s
         if tick - self._block_from >= BLOCK_TICKS:
             self._end_block(*self._best)
             self._best, self._not_before, self._block_from = None, [], tick

@@ -67,6 +67,8 @@ def run(seconds: float, asked_to_end: Callable[[], bool]) -> None:
         if dashboard.possible:
             go_on_until(lambda: done_with() or robot.watched(), PATIENCE_S)
         if done_with():
+            dashboard.close()
+            print("The demo was ended before the robot drove.")
             return
         started_s, counts = time.monotonic(), (robot.imu.count, robot.odom.count)
         robot.driving = True

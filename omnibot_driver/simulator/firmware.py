@@ -1,15 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's firmware: modes, the 100 Hz control loop, odometry and what is sent when.
+"""The board's firmware: modes, the 100 Hz control loop, and what is sent when.
 
 Pure: bytes in, one tick at a time, bytes out; the same settings and input give the same output.
-Knows the manual's state machine, control and odometry equations. Must not know ports or real time.
+Knows the manual's state machine and control equations. Must not know ports or real time.
 
 Where the manual is silent:
 - The control loop runs from the end of the boot on, also while paused (motors off), so motion while
   paused is in the first 25 Hz difference afterwards. The rates count from the end of the boot.
-- A 25 Hz difference is that of the unrounded positions at two transmissions, rounded each time by
-  itself: rounding errors add up, as they do for anybody who sums what a board of this kind sends.
 - Pausing and emergency stop switch the motors off; friction stops the wheels within 0.3 s.
 - The number in the paused text starts from zero each time the board becomes paused.
 - With the switch on positional control (see `position`) the wheels' targets follow the goal.
@@ -19,12 +17,13 @@ Where the manual is silent:
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum
-from math import pi
 from typing import Literal
 
-from omnibot_driver.simulator.chassis import PlanarPose, Wheels, body_from_rims, rims_from_body
+from omnibot_driver.simulator import targets
+from omnibot_driver.simulator.chassis import PlanarPose, Wheels
 from omnibot_driver.simulator.imu import Mpu6050
 from omnibot_driver.simulator.motors import TICK_S, WheelController
+from omnibot_driver.simulator.odometry import Odometry
 from omnibot_driver.simulator.position import approach, commanded_pose
 from omnibot_driver.simulator.settings import BoardPose, BoardSettings
 from omnibot_driver.simulator.wire import (
@@ -117,7 +116,6 @@ class SimulatedBoard:
         self.received = bytearray()
         self._world = World(settings)
         self._imu = Mpu6050(settings)
-        self._rim_m_per_count = 2 * pi * settings.wheel_radius_m / settings.counts_per_revolution
         self._power_up(settings.initial_pose)
         if settings.running:
             self._receiver = CommandReceiver(awake=True)
@@ -134,10 +132,7 @@ class SimulatedBoard:
         self._ticks_since_boot = 0
         self._receiver = CommandReceiver()
         self._encoders = self._world.encoders
-        self._pose = PlanarPose(pose.x_mm / 1000, pose.y_mm / 1000, pose.theta_mrad / 1000)
-        self._pose_sent = self._pose
-        self._body_unsent = (0.0, 0.0, 0.0)
-        self._counts_unsent: Triple = (0, 0, 0)
+        self._odometry = Odometry(self.settings, pose)
         self._delta_seq = 0
         self._pose_seq = 0
         self._motors_off()
@@ -155,7 +150,7 @@ class SimulatedBoard:
     @property
     def odometry(self) -> BoardPose:
         """The board's own pose, in the units of the 5 Hz frame."""
-        return BoardPose(*(1000 * value for value in self._pose))
+        return BoardPose(*(1000 * value for value in self._odometry.pose))
 
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
         """Be held by somebody: tilted so much, and turned to the left so fast."""
@@ -220,29 +215,14 @@ class SimulatedBoard:
         else:
             self.estopped = False
             self._goal = None
-            if kind == "velocity" and self.settings.control == "position":
+            if kind == "wheels":
+                self._targets = targets.from_wheel_words(frame.values, self.settings)
+            elif self.settings.control == "velocity":
+                self._targets = targets.from_velocity_words(frame.values, self.settings)
+            else:
                 kind = "pose"
                 self._goal = commanded_pose(frame.values, self.settings)
-            else:
-                self._targets = self._wheel_targets(kind, frame.values)
         self.commands.append(ReceivedCommand(self.tick, kind, frame.values))
-
-    def _wheel_targets(self, kind: CommandKind, values: Triple) -> Wheels:
-        """Counts per tick, by the scales of the settings and the kinematics of the manual."""
-        linear, angular = self.settings.linear_scale, self.settings.angular_scale
-        a, b, c = values
-        x, y, yaw = self.settings.axis_signs
-        if kind == "wheels":
-            rims_mps = (a / linear, b / linear, c / linear)
-        else:
-            rims_mps = rims_from_body(
-                x * a / linear, y * b / linear, yaw * c / angular, self.settings.base_radius_m
-            )
-        return self._counts_per_tick(rims_mps)
-
-    def _counts_per_tick(self, rims_mps: Wheels) -> Wheels:
-        a, b, c = (v * TICK_S / self._rim_m_per_count for v in rims_mps)
-        return a, b, c
 
     def _run(self) -> None:
         self.mode = BoardMode.IMU_ONLY if self.settings.imu_only else BoardMode.NOMINAL
@@ -260,20 +240,17 @@ class SimulatedBoard:
         self._controllers = (WheelController(gains), WheelController(gains), WheelController(gains))
         self._pwm = _ALL_ZERO
 
-    # Control and odometry
+    # Control
 
     def _control(self) -> None:
         """One pass of the 100 Hz block (manual, Odometry equation and Wheel control)."""
         encoders = self._world.encoders
         a, b, c = (new - old for new, old in zip(encoders, self._encoders, strict=True))
         self._encoders = encoders
-        self._integrate((a, b, c))
+        self._odometry.integrate((a, b, c))
         if self._goal is not None:
-            x, y, yaw = self.settings.axis_signs
-            vx, vy, yaw_rate = approach(self._pose, self._goal)
-            self._targets = self._counts_per_tick(
-                rims_from_body(x * vx, y * vy, yaw * yaw_rate, self.settings.base_radius_m)
-            )
+            twist = approach(self._odometry.pose, self._goal)
+            self._targets = targets.from_twist(twist, self.settings)
         if self.mode in _RUNNING and not self.estopped:
             pwm_a, pwm_b, pwm_c = (
                 controller.update(target, measured)
@@ -282,18 +259,6 @@ class SimulatedBoard:
                 )
             )
             self._pwm = (pwm_a, pwm_b, pwm_c)
-
-    def _integrate(self, counts: Triple) -> None:
-        a_m, b_m, c_m = (n * self._rim_m_per_count for n in counts)
-        moved = body_from_rims((a_m, b_m, c_m), self.settings.base_radius_m)
-        dx, dy, dyaw = (
-            sign * way for sign, way in zip(self.settings.axis_signs, moved, strict=True)
-        )
-        self._pose = self._pose.moved(dx, dy, dyaw)
-        x, y, yaw = self._body_unsent
-        self._body_unsent = (x + dx, y + dy, yaw + dyaw)
-        a, b, c = self._counts_unsent
-        self._counts_unsent = (a + counts[0], b + counts[1], c + counts[2])
 
     # Output
 
@@ -316,19 +281,9 @@ class SimulatedBoard:
         return frames
 
     def _delta(self) -> bytes:
-        words = self._counts_unsent
-        if self.settings.frame == "body":
-            words = _tenths(self._body_unsent)
-        elif self.settings.frame == "earth":
-            x, y, yaw = self._pose
-            sent_x, sent_y, sent_yaw = self._pose_sent
-            words = _tenths((x - sent_x, y - sent_y, yaw - sent_yaw))
-        self._pose_sent = self._pose
-        self._body_unsent = (0.0, 0.0, 0.0)
-        self._counts_unsent = (0, 0, 0)
         seq = self._delta_seq
         self._delta_seq = (seq + 1) % 256
-        return delta_frame(words, seq)
+        return delta_frame(self._odometry.difference(), seq)
 
     def _absolute(self) -> bytes:
         pose = self.odometry
@@ -336,9 +291,3 @@ class SimulatedBoard:
         self._pose_seq = (seq + 1) % 256
         order = self.settings.pose_byte_order
         return pose_frame(pose.x_mm, pose.y_mm, pose.theta_mrad, seq, order)
-
-
-def _tenths(moved: tuple[float, float, float]) -> Triple:
-    """Tenths of a millimetre and of a milliradian, as far as a word goes."""
-    x, y, yaw = (max(-32768, min(32767, round(value * 10_000))) for value in moved)
-    return x, y, yaw

@@ -97,7 +97,13 @@ def _make_link(link: Path, target: str) -> None:
             f"{link} exists and is no symbolic link; choose another name for the simulator's link "
             "or remove it first"
         )
-    link.symlink_to(target)
+    try:
+        link.symlink_to(target)
+    except OSError as error:
+        raise type(error)(
+            f"cannot make the link {link} ({error.strerror}): "
+            "choose a folder that exists and is yours"
+        ) from error
 
 
 def _leads_to(link: Path, target: str) -> bool:

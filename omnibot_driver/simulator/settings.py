@@ -89,3 +89,8 @@ class BoardSettings:
     boot_time_s: float = 0.3
     initial_pose: BoardPose = BoardPose()
     running: bool = False
+
+    @property
+    def rim_m_per_count(self) -> float:
+        """What a wheel rolls in one encoder count, as the firmware believes (manual: 2πr/N)."""
+        return 2 * pi * self.wheel_radius_m / self.counts_per_revolution

@@ -8,7 +8,7 @@ commands or sends; the firmware reads the encoders and the IMU here, nothing els
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, pi, sqrt
+from math import exp, sqrt
 from random import Random
 from typing import NamedTuple
 
@@ -49,8 +49,9 @@ class World:
     def __init__(self, settings: BoardSettings) -> None:
         self._random = Random(f"slip {settings.seed}")
         self._motors = tuple(Motor(constants) for constants in settings.motors)
-        rim_m_per_count = 2 * pi * settings.wheel_radius_m / settings.counts_per_revolution
-        self._rim_m_per_count = [rim_m_per_count * scale for scale in settings.wheel_radius_scale]
+        self._rim_m_per_count = [
+            settings.rim_m_per_count * scale for scale in settings.wheel_radius_scale
+        ]
         self._base_radius_m = settings.base_radius_m * settings.base_radius_scale
         self._mean_slip = settings.slip
         self._slip = [settings.slip] * 3

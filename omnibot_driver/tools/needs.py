@@ -18,5 +18,5 @@ def need(module: str) -> ModuleType:
         if error.name != module.partition(".")[0]:
             raise
         raise ToolError(
-            f"this tool needs the Python library {error.name}: pip install 'omnibot_driver[tools]'"
+            f"this tool needs the Python library {error.name}: `pip install {error.name}`"
         ) from error

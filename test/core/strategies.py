@@ -36,18 +36,20 @@ frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_fram
 
 
 def believable(frame: Frame) -> bool:
-    """No pose at the end of the world; no IMU frame below 0.5 g with -6 among its accelerations."""
+    """No pose at the end of the world, no delta of more than 10 m/s, no look-alike below 0.5 g."""
     if isinstance(frame, PoseFrame):
         return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7
     if isinstance(frame, ImuFrame):
         return -6 not in frame.accel or sum(word * word for word in frame.accel) >= 8192**2
+    if isinstance(frame, DeltaFrame):
+        return max(abs(frame.dx), abs(frame.dy), abs(frame.dtheta)) <= 4000
     return True
 
 
 believable_frames = st.one_of(
     st.builds(ImuFrame, st.tuples(words, words, st.just(-16384)), triples),
     imu_frames.filter(believable),
-    delta_frames,
+    delta_frames.filter(believable),
     pose_frames.filter(believable),
     paused_frames,
 )

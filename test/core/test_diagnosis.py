@@ -110,7 +110,7 @@ FAULTS: list[tuple[Change, str, Level, str]] = [
     (lambda r: r.refuse("why"), "Commands", Level.WARN, "why"),
     (lambda r: r.board(saturated=1), "Commands", Level.WARN, "lower the scales"),
     (lambda r: r.command(estop=True), "E-stop", Level.WARN, "~/estop (data: false)"),
-    (lambda r: r.count(same_rate=100), "IMU", Level.ERROR, "the gyro always says the same"),
+    (lambda r: r.count(same_rate=100), "IMU", Level.ERROR, "always the same from the gyro"),
     (lambda r: r.count(same_force=100, same_rate=100), "IMU", Level.ERROR, "accelerometer and"),
     (lambda r: r.sensor(advice="set `accel_range` to 4"), "IMU", Level.WARN, "`accel_range` to 4"),
 ]  # fmt: skip

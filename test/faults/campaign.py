@@ -127,7 +127,7 @@ class Campaign:
                 self.run(row, case, rig, again=False)
 
     def random_input(self) -> None:
-        row = self.row(f"{FUZZ:,} random messages and calls")
+        row = self.row(f"{FUZZ:,} random messages and calls, 1,000 a second")
         with self.rig() as rig:
             self.run(row, lambda rig: fuzz(rig, FUZZ, Random(1)), rig)
             self.judge(rig)

@@ -223,9 +223,6 @@ def random_lines(seed: int) -> dict[str, Case[Rig]]:
     """Damage to bytes; the random numbers are the seed's."""
     random = Random(f"lines {seed}")
     return {
-        "1 byte in 1,000 lost, both ways": partial(
-            damaged, losing(1e-3, random), losing(1e-3, random), 5.0
-        ),
         "1 byte in 100 lost, both ways": partial(
             damaged, losing(1e-2, random), losing(1e-2, random), 5.0
         ),

@@ -114,6 +114,14 @@ def by_signal_while_a_call_is_pending(rig: Rig) -> None:
     rig.driver.process.send_signal(signal.SIGTERM)
 
 
+def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
+    """The robot drives on by what it was told before the cable came out."""
+    rig.unplug()
+    rig.probe.wait_for_state("disconnected")
+    rig.plug()
+    rig.driver.process.send_signal(signal.SIGINT)
+
+
 def while_full(end: Callable[[Rig], object], rig: Rig) -> None:
     """The port takes nothing until the driver has gone."""
     with rig.terminal.full(OLD_COMMAND):
@@ -127,6 +135,9 @@ ENDINGS: Final[dict[str, Ending]] = {
     "SIGTERM": Ending(by_signals(signal.SIGTERM)),
     "SIGHUP": Ending(by_signals(signal.SIGHUP)),
     "SIGQUIT": Ending(by_signals(signal.SIGQUIT)),
+    "ctrl-C, plugged in but not yet open again": Ending(
+        by_signal_before_a_lost_port_is_open_again, allowed_s=0.2
+    ),
     "SIGTERM while a call is pending": Ending(by_signal_while_a_call_is_pending),
     "SIGINT and SIGTERM to its process group": Ending(
         by_signals_to_its_group(signal.SIGINT, signal.SIGTERM), before=GROUP
@@ -161,11 +172,9 @@ ENDINGS: Final[dict[str, Ending]] = {
     "SIGKILL, the port full": Ending(
         partial(while_full, by_signals(signal.SIGKILL)), (-signal.SIGKILL,), (STOP, LAST_WORDS)
     ),
-    "SIGSEGV": Ending(by_signals(signal.SIGSEGV), (-signal.SIGSEGV,), LAST_WORDS),
-    "a null pointer": Ending(
+    "a segmentation fault": Ending(
         by_topic, (-signal.SIGSEGV,), LAST_WORDS, IN_A_CALLBACK.format("ctypes.string_at(0)")
     ),
-    "abort": Ending(by_signals(signal.SIGABRT), (-signal.SIGABRT,), LAST_WORDS),
     "a library that exits": Ending(by_topic, (3,), LAST_WORDS, IN_A_CALLBACK.format("os._exit(3)")),
 }
 

@@ -35,7 +35,7 @@ class Terminal(PtyBoard):
 
     def _receive(self, timeout_s: float) -> bytes:
         if self.deaf:
-            time.sleep(timeout_s)
+            time.sleep(timeout_s)  # in its place: the pause of a board's tick
             return b""
         return super()._receive(timeout_s)
 

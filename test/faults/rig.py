@@ -255,7 +255,9 @@ class Rig:
             )
         refused = sum(
             int(number)
-            for number in re.findall(r"(\d+) readings cannot be true", self.driver.output)
+            for number in re.findall(
+                r"readings refused that cannot be true: (\d+)", self.driver.output
+            )
         )
         self.findings.expect(  # what framing made up of damaged bytes may be among them
             refused <= len(imu) / one_in, f"{refused} readings were refused, and no bit was flipped"

@@ -10,6 +10,7 @@ from goals import GOAL_ENDINGS
 from rig import GoalRig, Rig
 
 SOME = (
+    "ctrl-C, plugged in but not yet open again",
     "SIGTERM while a call is pending",
     "SIGINT, SIGTERM, SIGKILL to its process group",
     "an exit in a callback",
@@ -17,9 +18,9 @@ SOME = (
     "a farewell that hangs, and ctrl-C",
     "an exception, the port full",
     "SIGKILL, the port full",
-    "a null pointer",
+    "a segmentation fault",
 )
-"""Others are in test_driver_lifecycle and test_driver_guard; ``make faults`` has them all."""
+"""Others are in test_driver_endings and test_driver_guard; ``make faults`` has them all."""
 
 
 @pytest.mark.parametrize("ending", [ENDINGS[name] for name in SOME], ids=SOME)

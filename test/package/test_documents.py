@@ -57,6 +57,14 @@ def test_every_link_leads_somewhere(page: Path) -> None:
         assert not anchor or anchor in anchors(file), target
 
 
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_no_row_has_lost_its_table(page: Path) -> None:
+    """A blank line in a table leaves the rows below it as plain text."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+    for block in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
+        assert re.search(r"\A.*\n\|[-:| ]+\|\n", block), block
+
+
 def test_every_page_can_be_reached_from_the_readme() -> None:
     """Nobody has to know that a page exists."""
     readme = (ROOT / "README.md").read_text()

@@ -184,6 +184,20 @@ def test_a_signal_on_the_way_ends_it_cleanly(number: signal.Signals) -> None:
     assert "Traceback" not in output
 
 
+def test_who_ends_it_before_it_drives_is_told_so() -> None:
+    """In one line, instead of a result."""
+    with running_demo() as (process, mark):
+        assert process.stdout is not None
+        for line in process.stdout:
+            if line.startswith("state "):
+                break
+        process.send_signal(signal.SIGINT)
+        output, _ = process.communicate(timeout=PATIENCE_S)
+        assert process.returncode == 0, output
+        assert marked(mark) == []
+    assert output.splitlines()[-1] == "The demo was ended before the robot drove."
+
+
 def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
     """The exit code is 1, the message names the driver, and the simulator is gone too."""
     with running_demo() as (process, mark):

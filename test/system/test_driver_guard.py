@@ -44,6 +44,7 @@ def still(board: SimulatedBoard) -> bool:
 
 
 def wait_until(predicate: Callable[[], object]) -> None:
+    """For processes and log lines, of which nobody is told."""
     end = time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end, "it did not come about"

@@ -15,12 +15,15 @@ import yaml
 from driver_process import Driver
 
 from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
-from omnibot_driver.tools.calibrate import robot as robot_module
+from omnibot_driver.tools.calibrate import listener
 from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.interruption import Interruption
 from omnibot_driver.tools.calibrate.robot import connect
 
 Answer = Callable[[str], str]
+
+BUSY_S = 3.0
+"""A machine that is busy for so long is no lost robot, and no program that was suspended."""
 
 
 def yes(_question: str) -> str:
@@ -66,9 +69,9 @@ def rig(
     with (
         pytest.MonkeyPatch.context() as patch,
         PtyBoard(board) as port,
-        Driver(port=port.path, **parameters or {}) as driver,
+        Driver(port=port.path, **{"cmd_vel_timeout": BUSY_S, **(parameters or {})}) as driver,
     ):
-        patch.setattr(robot_module, "LOST_S", 3.0)  # a busy machine is no lost robot
+        patch.setattr(listener, "LOST_S", BUSY_S)
         driver.wait_for_line("state: nominal|state: imu_only")
         yield Rig(port, driver, folder)
 

@@ -12,7 +12,10 @@ from driver_process import Driver
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.tools.calibrate.allan import allan, noise
+from omnibot_driver.tools.calibrate.files import write
+from omnibot_driver.tools.calibrate.imu import result
 from omnibot_driver.tools.calibrate.log import Imu, Log
 from omnibot_driver.tools.calibrate.rest import rest, still
 from omnibot_driver.tools.needs import ToolError
@@ -54,7 +57,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
     assert np.abs((densities - planted) / sigmas).mean() < 3
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.sampled_from([0.0, math.pi]))
 def test_level_is_the_turn_that_makes_gravity_point_up(
     roll: float, pitch: float, mounting: float
@@ -93,6 +96,15 @@ def test_a_bias_that_walks_is_known_less_well() -> None:
         found = rest(Imu(imu.stamp_s, imu.force_mps2, imu.rate_radps + walk))
         scores += list((found.bias_radps - BIAS - walk[-1]) / found.bias_sigma)
     assert 0.5 < np.std(scores) < 2.0
+
+
+def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
+    """Of noise, which no compression makes small."""
+    imu = sensor(120.0)
+    picture = tmp_path / "imu.png"
+    now = {name: parameter.default for name, parameter in BY_NAME.items()}
+    write(result(rest(imu), imu, now, 9.80665), tmp_path / "robot.yaml", picture)
+    assert picture.stat().st_size < 170_000
 
 
 def test_readings_that_say_nothing_are_turned_away() -> None:

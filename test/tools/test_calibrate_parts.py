@@ -15,7 +15,7 @@ from omnibot_driver import calibration
 from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.parameters import BY_NAME
-from omnibot_driver.tools.calibrate.__main__ import main, split_ros_arguments
+from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.console import Console, digits
 from omnibot_driver.tools.calibrate.files import output_file, picture_file, write
 from omnibot_driver.tools.calibrate.log import Log
@@ -41,7 +41,7 @@ def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:
     return Console(yes=yes, read=lambda _question: left.pop(0), file=shown), shown
 
 
-@given(commands, commands, st.floats(0.001, 0.1))
+@given(commands, commands, st.floats(0.002, 0.1))
 def test_a_command_changes_no_faster_than_allowed(
     now: tuple[float, float, float], wanted: tuple[float, float, float], seconds: float
 ) -> None:
@@ -68,12 +68,14 @@ def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, flo
 
 
 def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
-    """Too far, turned too much, too long."""
+    """Too far, turned too much, too long, nowhere."""
     BOUNDS.require_within(9.0, Pose(0.6, 0.6, -1.9))
     for seconds, pose, sentence in (
         (1.0, Pose(0.8, 0.8, 0.0), "1.13 m"),
         (1.0, Pose(0.0, 0.0, -2.1), "2.1 rad"),
         (11.0, Pose(), "11 s"),
+        (1.0, Pose(math.nan, 0.0, 0.0), "does not say where it is"),
+        (1.0, Pose(0.0, 0.0, math.inf), "does not say where it is"),
     ):
         with pytest.raises(ToolError, match=sentence):
             BOUNDS.require_within(seconds, pose)
@@ -85,8 +87,9 @@ def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
     watch("cmd_vel", (0.02, 0.0, 0.0), HALT)
     with pytest.raises(ToolError, match=r"does not move when told \(wheel_cmd\)"):
         watch("wheel_cmd", (0.0, 3.0, 0.0), (0.1, 0.1, 0.1))
-    with pytest.raises(ToolError, match=r"does not move when told \(cmd_vel\)"):
-        watch("cmd_vel", (0.2, 0.0, 0.4), (0.2, 0.0, 0.0))
+    for measured in ((0.2, 0.0, 0.0), (math.nan, 0.0, 0.4)):
+        with pytest.raises(ToolError, match=r"does not move when told \(cmd_vel\)"):
+            watch("cmd_vel", (0.2, 0.0, 0.4), measured)
 
 
 def test_stairs_are_climbed_one_by_one() -> None:
@@ -159,6 +162,16 @@ def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
     assert not path.exists()
 
 
+def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
+    """For the file and the picture; after ten minutes of driving is no time to refuse them."""
+    path, picture = tmp_path / "a" / "b" / "robot.yaml", tmp_path / "c" / "d" / "picture.png"
+    assert output_file(str(path), "") == path
+    assert picture_file(str(picture), "imu") == picture
+    write(result(linear_scale=80.5), path, picture)
+    assert path.exists()
+    assert picture.exists()
+
+
 def test_everything_that_may_be_written_is_a_parameter() -> None:
     """A name that the driver does not know would end it."""
     assert set(calibration.NAMES) <= set(BY_NAME)
@@ -179,14 +192,6 @@ def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -
         picture_file(str(tmp_path / "picture.doc"), "imu")
     assert picture_file(str(tmp_path), "imu") == tmp_path / "calibrate_imu.png"
     assert output_file(None, str(tmp_path / "own.yaml")) == tmp_path / "own.yaml"
-
-
-def test_ros_arguments_are_told_from_ours() -> None:
-    """As rclpy tells them."""
-    words = ["imu", "--yes", "--ros-args", "-r", "cmd_vel:=other", "--", "--minutes", "2"]
-    own, ros = split_ros_arguments(words)
-    assert own == ["imu", "--yes", "--minutes", "2"]
-    assert ros == ["--ros-args", "-r", "cmd_vel:=other", "--"]
 
 
 @pytest.mark.parametrize(

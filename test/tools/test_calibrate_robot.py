@@ -4,18 +4,21 @@
 
 import os
 import signal
+import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
-from calibrate_rig import Rig, rig
+from calibrate_rig import BUSY_S, Rig, rig
 from driver_process import PATIENCE_S
 from geometry_msgs.msg import Twist
-from std_msgs.msg import Bool
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Bool, Float32MultiArray
 
 from omnibot_driver.simulator import SimulatedBoard
-from omnibot_driver.tools.calibrate import client
-from omnibot_driver.tools.calibrate.__main__ import main
+from omnibot_driver.tools.calibrate import listener
+from omnibot_driver.tools.calibrate import robot as robot_module
 from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
 from omnibot_driver.tools.calibrate.motion import Bounds, steady
 from omnibot_driver.tools.calibrate.robot import Robot, connect
@@ -24,6 +27,7 @@ from omnibot_driver.tools.needs import ToolError
 SLOWLY = (0.15, 0.0, 0.0)
 BOUNDS = Bounds(speed=0.2, turning=0.5, way=0.8, turn=1.0, seconds=20.0, acceleration=1.0)
 AFTER_S = 0.4
+LOST_S = listener.LOST_S
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +81,7 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
         ("estop", "the e-stop is latched"),
         ("reboot", "the driver's state is or was"),
         ("other", "somebody else commands the robot on cmd_vel"),
+        ("wheels", "somebody else commands the robot on wheel_cmd"),
         ("signal", "interrupted: the robot is told to stand still"),
     ],
 )
@@ -87,10 +92,12 @@ def test_what_happens_on_the_way_ends_it_at_rest(
     node = robot._node
     estop = node.create_publisher(Bool, "estop", 10)
     other = node.create_publisher(Twist, "cmd_vel", 1)
+    wheels = node.create_publisher(Float32MultiArray, "wheel_cmd", 1)
     actions = {
         "estop": lambda: estop.publish(Bool(data=True)),
         "reboot": rigged.port.board.reboot,
         "other": lambda: other.publish(Twist()),
+        "wheels": lambda: wheels.publish(Float32MultiArray(data=[0.0, 0.0, 0.0])),
         "signal": lambda: os.kill(os.getpid(), signal.SIGINT),
     }
     with pytest.raises(ToolError, match=sentence) as caught:
@@ -125,21 +132,60 @@ def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> Non
     robot.set_parameters({"linear_scale": 70.0})
 
 
-def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
-    """A parameter out of range."""
-    with pytest.raises(ToolError, match="the driver refuses linear_scale: "):
-        robot.set_parameters({"linear_scale": -1.0})
-
-
-def test_a_wrong_namespace_names_the_drivers_there_are(
-    rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
+    robot: Robot, rigged: Rig
 ) -> None:
-    """With exit code 1."""
-    monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
-    assert main(["imu", "--yes", "--namespace", "nowhere"]) == 1
-    said = capsys.readouterr().err
-    assert "no driver is running in the namespace /nowhere; there are" in said
-    assert f"/{rigged.driver.namespace}/omnibot_driver" in said
+    """ctrl-Z, then fg: the driver has stopped the robot meanwhile, and there it stays."""
+    clock = SimpleNamespace(monotonic=time.monotonic)
+
+    def suspend() -> None:
+        clock.monotonic = lambda: time.monotonic() + BUSY_S
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(robot_module, "time", clock)
+        with pytest.raises(ToolError, match=r"this program was held up for 3\.\d s"):
+            robot.drive(steady(SLOWLY, 10.0), BOUNDS, show=once(suspend))
+    values = robot.log.commands.values
+    halted = int(np.flatnonzero(values[:, 0])[-1]) + 1
+    assert not values[halted:].any()
+    assert rigged.port.wait_for(stands, PATIENCE_S)
+
+
+def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
+    robot: Robot, rigged: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside whatever else is wrong."""
+    monkeypatch.setattr(robot_module, "STANDING", -1.0)
+    monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)
+    with pytest.raises(ToolError, match=r"^the robot was told to stand still and is not seen to"):
+        robot.drive(steady(SLOWLY, 0.5), BOUNDS)
+    near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
+    with pytest.raises(ToolError, match=r"it went too far .*; and the robot was told to stand"):
+        robot.drive(steady(SLOWLY, 10.0), near)
+
+
+def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
+    """Nor is a robot seen to stand by it."""
+    nonsense = Odometry()
+    nonsense.pose.pose.position.x = nonsense.twist.twist.linear.x = float("nan")
+
+    def spoil(seconds: float) -> None:
+        if seconds > AFTER_S:
+            robot._on_odometry(nonsense)
+
+    with pytest.raises(ToolError, match="does not say where it is"):
+        robot.drive(steady(SLOWLY, 10.0), BOUNDS, show=spoil)
+    assert rigged.port.wait_for(stands, PATIENCE_S)
+
+
+def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each topic that is wanted."""
+    monkeypatch.setattr(listener, "LOST_S", LOST_S)
+    heard_s = {listener.IMU: 10.0, listener.ODOMETRY: 9.9}
+    assert listener.silent(heard_s, listener.TOPICS, 10.19) == []
+    assert listener.silent(heard_s, listener.TOPICS, 10.21) == [listener.ODOMETRY]
+    assert listener.silent(heard_s, [listener.IMU], 10.29) == []
+    assert listener.silent(heard_s, listener.TOPICS, 10.31) == list(listener.TOPICS)
 
 
 def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixture[str]) -> None:
@@ -157,33 +203,31 @@ def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixtur
     assert not rigged.output.exists()
 
 
+def test_ctrl_c_at_an_open_question_ends_it(
+    rigged: Rig, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With the exit code of an interruption; nothing moves."""
+
+    def interrupt(_question: str) -> str:
+        os.kill(os.getpid(), signal.SIGINT)
+        return "y"
+
+    commands = len(rigged.port.board.commands)
+    assert rigged.calibrate("scale", answer=interrupt) == 130
+    assert "calibrate: interrupted: " in capsys.readouterr().err
+    assert all(one.kind != "velocity" for one in list(rigged.port.board.commands)[commands:])
+
+
 def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
-    """The last one of this module; its guard stops the robot."""
-    with pytest.raises(ToolError, match=r"nothing came on .*odom for"):
-        robot.drive(steady(SLOWLY, 30.0), BOUNDS, show=once(rigged.driver.process.kill))
+    """The last one of this module; its guard stops the robot, which nobody hears any more."""
+
+    def kill() -> None:
+        rigged.driver.process.kill()
+        patch.setattr(listener, "LOST_S", LOST_S)
+
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        pytest.raises(ToolError, match=r"nothing came on .*odom for 0.3 s.*cut its power"),
+    ):
+        robot.drive(steady(SLOWLY, 30.0), BOUNDS, show=once(kill))
     assert rigged.port.wait_for(stands, PATIENCE_S)
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["--namespace", "no/such name!"], "is no namespace"),
-        (["--ros-args", "--nonsense"], "ROS does not understand its arguments"),
-    ],
-)
-def test_what_ros_cannot_take_is_a_sentence(
-    words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """No traceback."""
-    assert main(["imu", "--plot", str(tmp_path), *words]) == 1
-    assert sentence in capsys.readouterr().err
-
-
-def test_no_driver_at_all_says_how_to_start_one(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In a domain where nobody is."""
-    monkeypatch.setattr(client, "FOUND_WITHIN_S", 0.2)
-    monkeypatch.setenv("ROS_DOMAIN_ID", "101" if os.environ["ROS_DOMAIN_ID"] != "101" else "100")
-    assert main(["imu", "--plot", str(tmp_path)]) == 1
-    assert "nor any other: start it (ros2 run omnibot_driver driver)" in capsys.readouterr().err

@@ -48,7 +48,7 @@ def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) ->
     return log
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.floats(30, 150), st.floats(200, 1000), st.integers(0, 1000))
 def test_any_scale_is_found_within_what_is_claimed(
     linear: float, angular: float, seed: int
@@ -110,8 +110,9 @@ def test_what_cannot_be_measured_is_an_error() -> None:
 def test_planted_scales_are_found_and_applied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Through wire and driver, in twenty seconds."""
-    with rig(tmp_path, linear_scale=80.0, angular_scale=430.0) as robot:
+    """Through wire and driver, in twenty seconds, with stamped commands."""
+    stamped = {"enable_stamped_cmd_vel": True}
+    with rig(tmp_path, stamped, linear_scale=80.0, angular_scale=430.0) as robot:
         words = ("--levels", "1", "--seconds", "0.7", "--speed", "0.2", "--turning", "0.4")
         assert robot.calibrate("scale", *words, "--apply") == 0
         applied = parameters_of(robot.driver)

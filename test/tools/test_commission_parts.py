@@ -117,7 +117,6 @@ def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
 # Gravity
 
 
-@settings(deadline=None)
 @given(angles, st.floats(-1.5, 1.5), angles, tilts, tilts)
 def test_any_mounting_is_found_from_three_postures(
     roll: float, pitch: float, yaw: float, nose_rad: float, left_rad: float
@@ -143,7 +142,7 @@ def test_a_sensor_on_its_edge_has_angles_too(pitch: float) -> None:
     assert rotation(*rpy(made)) == pytest.approx(made, abs=1e-9)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     st.tuples(st.sampled_from([0, math.pi]), st.just(0), st.sampled_from([0, 1, 2, 3])),
     st.lists(st.floats(-0.12, 0.12), min_size=4, max_size=4),

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.tools.monitor.teleop import (
+    ASLEEP_S,
+    DEAF_S,
     FIRST_S,
     HALT,
     MOTIONS,
@@ -24,7 +26,7 @@ def commands(dead_man: DeadMan, since_s: float, ticks: int) -> list[BodyTwist | 
     return [dead_man.command(since_s + tick * TICK_S) for tick in range(ticks)]
 
 
-@given(st.lists(st.tuples(keys, st.floats(0.0, 1.0)), min_size=1, max_size=20))
+@given(st.lists(st.tuples(keys, st.floats(0.0, ASLEEP_S - 0.01)), min_size=1, max_size=20))
 def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, float]]) -> None:
     """After FIRST_S at the latest: zeros, as many as promised, and then nothing for ever."""
     dead_man, now_s = DeadMan(), 0.0
@@ -56,6 +58,21 @@ def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
     dead_man.press("w", 0.595)
     assert dead_man.command(0.89) != HALT
     assert dead_man.command(0.90) == HALT
+
+
+@pytest.mark.parametrize("key_first", [True, False])
+def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) -> None:
+    """Whichever thread wakes up first; what is pressed afterwards steers again."""
+    dead_man = DeadMan()
+    dead_man.press("w", 0.0)
+    assert dead_man.command(0.0) not in (None, HALT)
+    if not key_first:
+        assert dead_man.command(10.0) == HALT
+    for number in range(20):
+        assert dead_man.press("w", 10.0 + 0.01 * number)
+        assert dead_man.command(10.0 + 0.01 * number) in (None, HALT)
+    dead_man.press("w", 10.01 + DEAF_S)
+    assert dead_man.command(10.02 + DEAF_S) not in (None, HALT)
 
 
 def test_stop_is_at_once() -> None:

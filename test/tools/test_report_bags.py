@@ -130,16 +130,6 @@ def test_what_is_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[st
         assert says in refused(tmp_path / name, capsys)
 
 
-@pytest.mark.parametrize("text", ["", "a: [", "rosbag2_bagfile_information: 7", "\x00"])
-def test_metadata_that_make_no_sense_are_told(
-    drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str
-) -> None:
-    """With the repair."""
-    bag = write(tmp_path / "bag", [drive])
-    (bag / "metadata.yaml").write_text(text)
-    assert "ros2 bag reindex" in refused(bag, capsys)
-
-
 def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Topics, but no message."""
     with Writer(tmp_path / "bag", version=9) as writer:
@@ -157,42 +147,6 @@ def test_a_bag_of_something_else_is_told(
         for topic in ("/chatter", "/odom"):
             writer.write(writer.add_connection(topic, kind, typestore=TYPES), 10**18, data)
     assert "no topic of a driver" in refused(tmp_path / "bag", capsys)
-
-
-@pytest.mark.parametrize("plugin", StoragePlugin)
-def test_an_unfinished_bag_is_read_and_called_so(
-    drive: Drive, tmp_path: Path, plugin: StoragePlugin, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The report is written, the end is not 0, and the repair is named."""
-    bag = write(tmp_path / "bag", [drive], plugin)
-    (bag / "metadata.yaml").unlink()
-    assert main([str(bag), "--output", str(tmp_path / "out")]) == 3
-    assert "never finished" in (text := capsys.readouterr().out)
-    assert f"ros2 bag reindex {bag}" in text
-    same(log_of(bag), drive.log())
-
-
-def test_a_file_that_breaks_off_is_told(
-    drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """An mcap without its end, as a power failure leaves it."""
-    bag = write(tmp_path / "bag", [drive])
-    (bag / "metadata.yaml").unlink()
-    data = (bag / "bag.mcap").read_bytes()
-    (bag / "bag.mcap").write_bytes(data[: len(data) // 2])
-    assert f"ros2 bag reindex {bag}" in refused(bag, capsys)
-
-
-def test_damaged_messages_are_counted_and_passed_over(drive: Drive, tmp_path: Path) -> None:
-    """One that is too short, in the middle."""
-    with Writer(tmp_path / "bag", version=9) as writer:
-        connections = {}
-        for number, (topic, kind, at_ns, told) in enumerate(drive.messages()):
-            if topic not in connections:
-                connections[topic] = writer.add_connection(topic, kind, typestore=TYPES)
-            data = bytes(TYPES.serialize_cdr(told, kind))
-            writer.write(connections[topic], at_ns, data[:20] if number == 500 else data)
-    assert log_of(tmp_path / "bag").troubles == ("1 message damaged, and passed over",)
 
 
 def test_a_robot_without_odometry_is_reported_on_and_is_not_healthy(

@@ -94,6 +94,18 @@ def test_uneven_stamps_are_noticed(drive: Drive) -> None:
     assert "steps between stamps of imu/data_raw vary" in jitter.text
 
 
+def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
+    """Nothing comes after it to step to."""
+    drive.imu.drop(17.0, 99.0)
+    gap = said(drive, "Gaps", "imu/data_raw has 1 gap, 301 messages")
+    assert gap.level is Level.BAD
+    assert "3.01 s at 17.0 s" in gap.text
+    drive.states.append((17.0, "paused"))
+    assert not [
+        finding for finding in judge(drive.log()) if finding.text.startswith("imu/data_raw has 1")
+    ]
+
+
 def test_a_wrong_rate_is_no_gap_but_a_wrong_rate(drive: Drive) -> None:
     """Every other reading."""
     for name in ("stamp_s", "values", "late_s"):

@@ -64,6 +64,28 @@ def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
     assert "base_radius" in said(drive, "IMU", "gyro turned 1.2").advice
 
 
+@pytest.mark.parametrize("lost", [("imu",), ("odom",), ("imu", "odom")], ids="+".join)
+def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
+    drive: Drive, lost: tuple[str, ...]
+) -> None:
+    """Two seconds of a turn, which the next pose takes in one step."""
+    for name in lost:
+        getattr(drive, name).drop(8.0, 10.0)
+    assert said(drive, "IMU", "gyro turned 1.000 times").level is Level.GOOD
+
+
+def test_a_gap_in_the_odometry_is_no_rest(drive: Drive) -> None:
+    """What the gyro turned meanwhile is not its bias."""
+    drive.odom.drop(8.0, 10.0)
+    assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
+
+
+def test_an_even_turn_is_no_rest_without_odometry(drive: Drive) -> None:
+    """The IMU alone tells rest then."""
+    drive.odom.drop(0.0, 99.0)
+    assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
+
+
 def test_a_sensor_that_stands_upright_is_noted(drive: Drive) -> None:
     """It turns as the wheels do."""
     drive.imu.values[:, 2] *= -1.0

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver.tools.report import page
+from omnibot_driver.tools.report.drawing import POINTS, envelope
 from omnibot_driver.tools.report.findings import span
 from omnibot_driver.tools.report.judge import judge
-from omnibot_driver.tools.report.plots import POINTS, envelope
 
 PICTURES = ["imu", "path", "spectrum", "timeline", "timing", "velocities"]
 

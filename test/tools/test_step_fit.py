@@ -40,7 +40,7 @@ def made_up(model: Model, values: tuple[float, ...], seed: int) -> list[Step]:
     return steps
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(st.floats(0.8, 1.2), st.floats(0.03, 0.2), st.floats(0.0, 0.06), st.integers(0, 2**32 - 1))
 def test_a_first_order_is_found(gain: float, lag_s: float, delay_s: float, seed: int) -> None:
     """Within five of the deviations that are claimed."""
@@ -50,7 +50,7 @@ def test_a_first_order_is_found(gain: float, lag_s: float, delay_s: float, seed:
     assert found.rms_radps == pytest.approx(NOISE_RADPS, rel=0.2)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(
     st.floats(20.0, 90.0), st.floats(0.03, 0.15), st.floats(0.0, 0.04), st.integers(0, 2**32 - 1)
 )

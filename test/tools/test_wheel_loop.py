@@ -71,7 +71,7 @@ def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
     assert (between[1:] > later[1:]).all()
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(wheel_motors, st.floats(0.02, 3.0))
 def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: float) -> None:
     """The gain from effort to speed, of which Ms is made, is that of a sine fed through."""
@@ -84,7 +84,7 @@ def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: floa
     assert 1 / abs(1 + loop) <= worst * (1 + 1e-3)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(st.floats(0.01, 0.3), st.floats(0.0, 0.08))
 def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: float) -> None:
     """Against an integral by numbers of scipy's own step response."""
@@ -93,7 +93,7 @@ def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: flo
     _check(first_order, np.array([time_constant_s, delay_s]), times_s, response, delay_s)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(
     st.floats(3.0, 40.0),
     st.floats(0.2, 3.0),
@@ -138,7 +138,7 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
     assert turned == pytest.approx([0.0, 0.0, speeds[0] * 0.01, speeds.sum() * 0.01])
 
 
-@settings(deadline=None, max_examples=5)
+@settings(max_examples=5)
 @given(wheel_motors)
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
     """Whatever the motor: robust, hardly overshooting, not nervous, closer to command and load."""

@@ -36,8 +36,6 @@ from omnibot_driver.core.omnibot.frames import (
 )
 from omnibot_driver.core.omnibot.lattice import Gap, Piece, read
 
-SURE: Final = 3.5
-"""One reading in thirty as likely as the best is too many."""
 SPOKEN_AGAINST: Final = 3.0
 """A content of this cost waits for what follows."""
 DOUBT_BYTES: Final = 170
@@ -159,58 +157,54 @@ class FrameDecoder:
         """Take frames from what is held, until nothing is left or more bytes must tell."""
         held = self._held
         while held:
-            if not closed and len(held) < min(self._wait_for, DOUBT_BYTES):
+            if not closed and len(held) < self._wait_for:
                 return
             if self._in_step and self._walk(found, closed):
                 return
             stretch = bytes(held[:DOUBT_BYTES])
             last = closed and len(stretch) == len(held)
             if not self._judge(stretch, found, closed=last):
-                self._wait_for = len(held) + 1 + len(held) // 16
+                self._wait_for = min(DOUBT_BYTES, len(held) + 1 + len(held) // 16)
                 return
 
     def _walk(self, found: list[Frame], closed: bool) -> bool:
         """In step: take the frames that nothing speaks against. Whether no doubt is left."""
-        held, weigh, order = self._held, self._expectation.weigh, self._pose_byte_order
-        context = self._context
+        held, gaps, expectation = self._held, self._gaps, self._expectation
+        order, context = self._pose_byte_order, self._context
         at, size = 0, len(held)
         walk = Walk()
-        idle = self._gaps[0][0] if self._gaps else size + 1
         while at < size:
-            if not self._gaps or self._gaps[-1][0] <= at:  # no pause within what follows
-                at, context = take_calm(held, at, context, self._expectation, walk)
+            if not gaps or gaps[-1][0] <= at:  # no pause within what follows
+                at, context = take_calm(held, at, context, expectation, order, walk)
                 if at == size:
-                    continue
+                    break
             length = measure(held, at)
             end = at + length
-            if idle < size and self._idle_within(at, end if length > 0 else size):
+            if gaps and self._idle_within(at, end if length > 0 else size):
+                return self._believe_but_the_last(walk, found)
+            if length == INCOMPLETE and not closed:
                 break
             if length <= 0:
-                if length == INCOMPLETE and not closed:
-                    self._take(walk, len(walk.frames), context, found)
-                    return True
-                break
+                return self._believe_but_the_last(walk, found)
             frame = decode_measured(held[at:end], order)
-            cost, after = weigh(frame, context)
+            cost, after = expectation.weigh(frame, context)
             if cost >= SPOKEN_AGAINST and (
                 cost >= evidence.LOOK_ALIKE or not self._goes_on(end, closed)
             ):
-                break
-            sharp = self._sharp >= PAUSES_TO_TRUST  # what is sent at once begins after a pause
-            last = sharp and (self._arrived >= length or not _more_is_due(frame, context))
-            lent = end == size and not last and _may_end_in_a_header(frame, context)
-            if lent and not closed:
-                self._take(walk, len(walk.frames), context, found)
-                return True
+                return self._believe_but_the_last(walk, found)
+            if end == size and not closed and _may_end_in_a_header(frame, context):
+                sharp = self._sharp >= PAUSES_TO_TRUST  # what is sent at once begins after a pause
+                if not sharp or (self._arrived < length and _more_is_due(frame, context)):
+                    break
             walk.add(end, frame, context)
             context = after
             at = end
-        else:
-            self._take(walk, len(walk.frames), context, found)
-            return True
-        believed = len(walk.frames) - len(
-            walk.before_last
-        )  # where it breaks, the last are in doubt
+        self._take(walk, len(walk.frames), context, found)
+        return True
+
+    def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
+        """Where it breaks, the last two frames are in doubt as well."""
+        believed = len(walk.frames) - len(walk.before_last)
         if believed > 0:
             self._take(walk, believed, Context._make(walk.before_last[0]), found)
         return False
@@ -235,14 +229,13 @@ class FrameDecoder:
             if number < count:
                 self._expectation.learn(frame, before)
         found += walk.frames[:count]
-        self.skipped += [self._dropped] + [0] * (count - 1)
+        self.skipped.append(self._dropped)
+        if count > 1:
+            self.skipped += [0] * (count - 1)
         self._dropped = 0
         self._context = after
         if self._gaps:
-            start = 0
-            for end in walk.ends[:count]:
-                self._compare_pauses(start, end)
-                start = end
+            self._compare_pauses(walk.ends[:count])
         self._forget(walk.ends[count - 1])
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
@@ -274,7 +267,7 @@ class FrameDecoder:
 
         What ends before ``until`` has waited long enough.
         """
-        last_sure = [n for n, piece in enumerate(pieces) if piece.margin >= SURE]
+        last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0
         in_step, end = self._in_step, -1
         for number, piece in enumerate(pieces):
@@ -284,7 +277,7 @@ class FrameDecoder:
                 or any(piece.end == after.start for after in pieces[number + 1 : number + 2])
                 or type(piece.frame) is PausedFrame
             )
-            sure = proved and piece.margin >= SURE
+            sure = proved and piece.sure
             if piece.end == size and not closed and _may_end_in_a_header(piece.frame, piece.before):
                 return
             if not (sure or closed or number < settled_before or piece.end <= until):
@@ -312,18 +305,25 @@ class FrameDecoder:
             self._gaps = [(a - count, b - count, p) for a, b, p in self._gaps if a >= count]
 
     def _idle_within(self, start: int, end: int) -> bool:
-        return any(start < first < end and before <= end for first, before, _ in self._gaps)
+        for first, before, _ in self._gaps:  # noqa: SIM110 - the call of a generator costs more
+            if start < first < end and before <= end:
+                return True
+        return False
 
-    def _compare_pauses(self, start: int, end: int) -> None:
+    def _compare_pauses(self, ends: list[int]) -> None:
         """Do pauses end where frames begin? Then they are the line's, not the adapter's."""
-        for first, before, _ in self._gaps:
-            if start <= first < end:
-                self._trust(sharp=first == start, between=first == start or end < before)
+        start = 0
+        for end in ends:
+            for first, before, _ in self._gaps:
+                if start <= first < end:
+                    self._trust(sharp=first == start, between=first == start or end < before)
+            start = end
 
     def _trust(self, *, sharp: bool, between: bool) -> None:
         most = 2 * PAUSES_TO_TRUST
-        self._sharp = min(self._sharp + 1, most) if sharp else max(self._sharp - 4, 0)
-        self._between = min(self._between + 1, most) if between else max(self._between - 4, 0)
+        if not (sharp and between and self._sharp == self._between == most):
+            self._sharp = min(self._sharp + 1, most) if sharp else max(self._sharp - 4, 0)
+            self._between = min(self._between + 1, most) if between else max(self._between - 4, 0)
 
 
 def _may_end_in_a_header(frame: Frame, before: Context) -> bool:

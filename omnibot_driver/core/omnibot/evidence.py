@@ -10,6 +10,7 @@ Content is soft evidence: all of a frame's together stays below what it costs to
 damaged, so a true shock between two whole frames is delivered.
 """
 
+from math import ceil, floor
 from typing import Final, NamedTuple
 
 from omnibot_driver.core.omnibot.frames import DeltaFrame, Frame, ImuFrame, PoseFrame, Words
@@ -113,9 +114,18 @@ class Expectation:
         self._gyro_scatter = 100.0
         self._accel_limit = 2400.0
         self._gyro_limit = 800.0
-        self.calm = self._lightest, self._heaviest, self._accel_limit, self._gyro_limit
+        self.calm = self._calm()
         """Between the first two the squared norm of an acceleration costs nothing; nor does a step
-        of less than the third in one of its words, or than the fourth in one of the gyro's."""
+        of less than the third in one of its words, or than the fourth in one of the gyro's. In
+        whole numbers, with which Python compares twice as fast."""
+
+    def _calm(self) -> tuple[int, int, int, int]:
+        return (
+            floor(self._lightest),
+            ceil(self._heaviest),
+            ceil(self._accel_limit),
+            ceil(self._gyro_limit),
+        )
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
         """The cost of a whole frame's content, and what is known after it."""
@@ -187,13 +197,15 @@ class Expectation:
 
     def learn(self, frame: ImuFrame, last: ImuFrame) -> None:
         """Two frames in a row that were believed."""
-        d_accel = max(abs(a - b) for a, b in zip(frame.accel, last.accel, strict=True))
-        d_gyro = max(abs(a - b) for a, b in zip(frame.gyro, last.gyro, strict=True))
+        (x, y, z), (px, py, pz) = frame.accel, last.accel
+        (u, v, w), (pu, pv, pw) = frame.gyro, last.gyro
+        d_accel = max(abs(x - px), abs(y - py), abs(z - pz))
+        d_gyro = max(abs(u - pu), abs(v - pv), abs(w - pw))
         self._accel_scatter += (d_accel - self._accel_scatter) / 8
         self._gyro_scatter += (d_gyro - self._gyro_scatter) / 8
         self._accel_limit = 6 * self._accel_scatter + 100
         self._gyro_limit = 6 * self._gyro_scatter + 30
-        self.calm = self._lightest, self._heaviest, self._accel_limit, self._gyro_limit
+        self.calm = self._calm()
 
 
 def _leaps(now: Words, before: Words, limit: float) -> int:

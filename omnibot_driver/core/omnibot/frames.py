@@ -38,10 +38,11 @@ _HEADER_BEGIN: Final = IMU_HEADER[0]
 _TEXT_BEGIN: Final = _PAUSED_WORD[0]
 IMU_LENGTH: Final = _IMU.size
 DELTA_LENGTH: Final = _DELTA.size
+POSE_LENGTH: Final = _POSE["big"].size
 _LENGTH_BY_TYPE: Final[dict[int, int]] = {
-    IMU_HEADER[1]: _IMU.size,
-    DELTA_HEADER[1]: _DELTA.size,
-    POSE_HEADER[1]: _POSE["big"].size,
+    IMU_HEADER[1]: IMU_LENGTH,
+    DELTA_HEADER[1]: DELTA_LENGTH,
+    POSE_HEADER[1]: POSE_LENGTH,
 }
 
 INCOMPLETE: Final = 0

@@ -1,29 +1,43 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""All readings of a stretch of bytes at once, the cheapest of them, and how far it is ahead.
+"""All readings of a stretch of bytes at once, the cheapest of them, and what is sure in it.
 
 Nodes are the places between bytes, each twice: as a boundary of frames, and within a bad run.
-Edges are whole frames, damaged ones, bad bytes. A shortest path is the best reading; the shortest
-path that reads the same byte in another way tells how sure a frame of it is. This module knows the
-shapes that a line gives to frames; prices are in ``evidence``. Work and memory are proportional to
-the stretch.
+Edges are whole frames, damaged ones, bad bytes. A shortest path is the best reading; a frame of it
+is sure where every path that reads its first byte in another way is dearer by ``SURE``. This module
+knows the shapes that a line gives to frames; prices are in ``evidence``. Work and memory are
+proportional to the stretch.
 
 The context of a node (for the price of content) is that of the cheapest way to it.
+
+Most edges lie on no path that is nearly as cheap as the best. So the search leaves out what would
+cost more than a limit in all, by the least that the rest can cost (``bounds``), and takes a higher
+limit until nothing that matters is beyond it. The outcome is that of searching everything.
 """
 
+from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import inf
 from typing import Final
 
 from omnibot_driver.core.omnibot import evidence
+from omnibot_driver.core.omnibot.bounds import DAMAGE, least_costs
 from omnibot_driver.core.omnibot.evidence import Context, Expectation
 from omnibot_driver.core.omnibot.frames import (
+    INCOMPLETE,
     ByteOrder,
     Frame,
     decode_measured,
     measure,
 )
+from omnibot_driver.core.values import value
+
+SURE: Final = 3.5
+"""One reading in thirty as likely as the best is too many."""
+STEP: Final = 5.5
+"""What the limit is above the bound at first; then twice that, and so on."""
+BEYOND: Final = 0.025
+"""Half the grid of the prices: no sum is at the limit itself, so rounding decides nothing."""
 
 Gap = tuple[int, int, float]
 """Somewhere from the first place on, and before the second, the line was idle; and the price of a
@@ -31,29 +45,46 @@ frame around it."""
 
 _LENGTHS: Final = {0xFA: 14, 0xFB: 9, 0xFC: 15}
 _HEADERS: Final = tuple(bytes((0xFF, kind)) for kind in _LENGTHS)
-_MISFITS: Final = (
-    (-1, evidence.ONE_BYTE),
-    (1, evidence.ONE_BYTE),
-    (-2, evidence.TWO_BYTES),
-    (2, evidence.TWO_BYTES),
-)
+_Shapes = tuple[tuple[int, float], ...]
+"""Lengths, and what each costs."""
+
+
+def _misfits(length: int, gained: float) -> _Shapes:
+    one, two = evidence.ONE_BYTE, evidence.TWO_BYTES
+    return (
+        (length - 1, one),
+        (length + 1, one + gained),
+        (length - 2, two),
+        (length + 2, two + gained),
+    )
+
+
+_MISFITS: Final = {length: _misfits(length, 0.0) for length in _LENGTHS.values()}
+_MISFITS_FOLLOWED: Final = {
+    length: _misfits(length, evidence.HEADER_IN_PLACE) for length in _LENGTHS.values()
+}
+_HEADLESS: Final = {
+    0xFF: ((13, evidence.HEADER_BYTE), (8, evidence.HEADER_BYTE), (14, evidence.HEADER_BYTE)),
+    **{kind: ((length - 1, evidence.HEADER_BYTE),) for kind, length in _LENGTHS.items()},
+}
+"""By the half of the header that is left."""
 _HEADER: Final = 0xFF
 _TEXT: Final = 0x50
 
 
-@dataclass(frozen=True, slots=True)
+@value(frozen=True, slots=True)
 class Piece:
-    """A whole frame of the best reading; ``margin``: what any other reading of it costs more."""
+    """A whole frame of the best reading; ``sure``: any other reading of it is clearly dearer."""
 
     start: int
     end: int
     frame: Frame
     before: Context
     after: Context
-    margin: float
+    sure: bool
 
 
-_Edge = tuple[int, int, float, Frame | None, Context]
+_Edge = tuple[int, int, float, Frame | None, Context | None]
 """From node, to node, price, the whole frame, context after it."""
 
 
@@ -72,7 +103,7 @@ def read(
     ``in_step``: a frame ended right before; ``closed``: nothing follows, ever.
     """
     search = _Search(data, context, expectation, gaps, pose_byte_order)
-    search.forward(in_step, closed)
+    search.run(in_step, closed)
     return search.pieces()
 
 
@@ -89,95 +120,119 @@ class _Search:
         self._expectation = expectation
         self._gaps = gaps
         self._pose_byte_order = pose_byte_order
-        size = len(data)
         # Node 2 n: in a bad run before byte n; 2 n + 1: at a boundary there; the last: the end.
-        self._end = 2 * size + 2
-        self._cost = [inf] * (self._end + 1)
-        self._by = [-1] * (self._end + 1)
-        self._contexts = [context] * (self._end + 1)
-        self._edges: list[_Edge] = []
+        self._end = 2 * len(data) + 2
+        self._start_context = context
+        self._least: list[float]
+        self._limit: float
+        self._cost: list[float]
+        self._by: list[_Edge | None]
+        self._edges: list[_Edge]
+        self._contexts: dict[int, Context]
 
-    def forward(self, in_step: bool, closed: bool) -> None:
-        data, cost, size = self._data, self._cost, len(self._data)
+    def run(self, in_step: bool, closed: bool) -> None:
+        """Find the best reading, and all that are nearly as cheap."""
+        self._least = [0.0] * (self._end + 1) if closed else least_costs(self._data)
+        step = STEP
+        limit = self._least[1] + step + BEYOND
+        while True:
+            self._forward(in_step, closed, limit)
+            best = self._cost[self._end]
+            if best + SURE <= limit:
+                return
+            if best < inf:
+                limit = best + SURE + BEYOND
+            else:
+                limit, step = limit + step, 2 * step
+
+    def _forward(self, in_step: bool, closed: bool, limit: float) -> None:
+        data, size, least = self._data, len(self._data), self._least
+        self._limit = limit
+        self._cost = cost = [inf] * (self._end + 1)
+        self._by = by = [None] * (self._end + 1)
+        self._edges = edges = []
+        self._contexts = {0: self._start_context, 1: self._start_context}
         cost[0], cost[1] = inf if in_step else evidence.UNKNOWN_START, 0.0
-        for at in range(size):
-            byte = data[at]
-            bad, boundary = 2 * at, 2 * at + 1
-            header = byte == _HEADER and at + 1 < size and data[at + 1] in _LENGTHS
-            price = evidence.BAD_BYTE
-            if byte == _TEXT and measure(data, at) > 0:
-                price += evidence.BAD_TEXT
-            if cost[bad] < inf:
-                if byte in (_HEADER, _TEXT):
-                    self._edge(bad, boundary, 0.0)
-                self._edge(bad, bad + 2, price + evidence.BAD_HEADER if header else price)
-            if cost[boundary] < inf:
-                price += evidence.BAD_RUN if header else evidence.BAD_RUN + evidence.BAD_TAIL
-                self._edge(boundary, bad + 2, price, None, self._contexts[boundary].damaged())
-                self._frames_from(at, closed)
+        for at, byte in enumerate(data):
+            bad = 2 * at
+            run = cost[bad]
+            if run == inf and cost[bad + 1] == inf:
+                continue
+            begins = byte == _HEADER or byte == _TEXT
+            price, begin_run = evidence.BAD_BYTE, evidence.BAD_RUN + evidence.BAD_TAIL
+            onward = price
+            if begins:
+                if byte == _TEXT:
+                    price += evidence.BAD_TEXT if measure(data, at) > 0 else 0.0
+                    onward = price
+                elif at + 1 < size and data[at + 1] in _LENGTHS:
+                    onward, begin_run = price + evidence.BAD_HEADER, evidence.BAD_RUN
+                if run < inf:
+                    self._edge(bad, bad + 1, 0.0)
+            if run + onward + least[bad + 2] <= limit:
+                cost[bad + 2] = run + onward
+                by[bad + 2] = edge = (bad, bad + 2, onward, None, None)
+                edges.append(edge)
+            here = cost[bad + 1]
+            if here < inf:
+                price += begin_run
+                if here + price + least[bad + 2] <= limit:
+                    self._edge(bad + 1, bad + 2, price)
+                if begins:
+                    self._undamaged(at, closed)
+                if here + DAMAGE <= limit and (byte == _HEADER or byte in _LENGTHS):
+                    self._damaged(at, closed)
         unexplained = evidence.ENDS_IN_NOISE if closed else 0.0
         for node, price in ((2 * size, unexplained), (2 * size + 1, 0.0)):
             if cost[node] < inf:
                 self._edge(node, self._end, price)
 
-    def _frames_from(self, at: int, closed: bool) -> None:
-        data, size = self._data, len(self._data)
-        byte = data[at]
-        node = 2 * at + 1
-        if byte == _TEXT:
-            length = measure(data, at)
-            if length > 0:
-                self._whole(at, length)
-            elif length == 0:
-                self._open(at, evidence.CUT_SHORT if closed else 0.0)
-        elif byte == _HEADER:
-            if at + 1 == size:
-                self._open(at, evidence.CUT_SHORT if closed else 0.0)
-                return
-            length = _LENGTHS.get(data[at + 1], 0)
-            if length:
-                if at + length <= size:
-                    self._whole(at, length)
-                else:
-                    self._open(at, evidence.CUT_SHORT if closed else 0.0)
-                followed = data[at + length : at + length + 2] in _HEADERS
+    def _undamaged(self, at: int, closed: bool) -> None:
+        """The whole frame or text that begins here."""
+        data, node = self._data, 2 * at + 1
+        length = measure(data, at)
+        if length == INCOMPLETE:
+            self._open(at, evidence.CUT_SHORT if closed else 0.0)
+        end = at + length
+        if length <= 0 or self._cost[node] + self._least[2 * end + 1] > self._limit:
+            return
+        frame = decode_measured(data[at:end], self._pose_byte_order)
+        price, after = self._expectation.weigh(frame, self._context(node))
+        self._edge(node, 2 * end + 1, price + self._idle_within(at, end), frame, after)
+
+    def _damaged(self, at: int, closed: bool) -> None:
+        """What may have been a frame that begins here, before the line damaged it."""
+        data, size, node = self._data, len(self._data), 2 * at + 1
+        spare = self._limit - self._cost[node]
+        first = data[at]
+        length = _LENGTHS.get(data[at + 1], 0) if first == _HEADER and at + 1 < size else 0
+        if length:
+            if evidence.BROKEN_OFF <= spare:
                 for end in range(at + 2, min(at + length - 2, size - 1)):
                     if data[end] == _HEADER and data[end + 1] in _LENGTHS:
-                        self._damaged(node, at, end, evidence.BROKEN_OFF)
-                for more, price in _MISFITS:
-                    if followed and more > 0:
-                        price += evidence.HEADER_IN_PLACE
-                    if at + length + more <= size:
-                        self._damaged(node, at, at + length + more, price)
-                    elif not closed:
-                        self._open(at, price)
-            else:
-                for length in (13, 8, 14):
-                    self._headless(node, at, length, closed)
-        elif byte in _LENGTHS:
-            self._headless(node, at, _LENGTHS[byte] - 1, closed)
-
-    def _headless(self, node: int, at: int, length: int, closed: bool) -> None:
-        if at + length <= len(self._data):
-            self._damaged(node, at, at + length, evidence.HEADER_BYTE)
-        elif not closed:
-            self._open(at, evidence.HEADER_BYTE)
-
-    def _whole(self, at: int, length: int) -> None:
-        frame = decode_measured(self._data[at : at + length], self._pose_byte_order)
-        price, after = self._expectation.weigh(frame, self._contexts[2 * at + 1])
-        price += self._idle_within(at, at + length)
-        self._edge(2 * at + 1, 2 * (at + length) + 1, price, frame, after)
-
-    def _damaged(self, node: int, at: int, end: int, price: float) -> None:
-        price += self._idle_within(at, end)
-        self._edge(node, 2 * end + 1, price, None, self._contexts[node].damaged())
+                        price = evidence.BROKEN_OFF + self._idle_within(at, end)
+                        self._edge(node, 2 * end + 1, price)
+            followed = data[at + length : at + length + 2] in _HEADERS
+            shapes = (_MISFITS_FOLLOWED if followed else _MISFITS)[length]
+        elif first == _HEADER and at + 1 == size:
+            return
+        else:
+            shapes = _HEADLESS[first]
+        for length, price in shapes:
+            end = at + length
+            if end > size:
+                if not closed:
+                    self._open(at, price)
+            elif price + self._least[2 * end + 1] <= spare:
+                self._edge(node, 2 * end + 1, price + self._idle_within(at, end))
 
     def _open(self, at: int, price: float) -> None:
         """A frame, whole or damaged, whose end has not come yet."""
         self._edge(2 * at + 1, self._end, price + self._idle_within(at, len(self._data)))
 
     def _idle_within(self, start: int, end: int) -> float:
+        if not self._gaps:
+            return 0.0
         return sum(
             price for first, before, price in self._gaps if start < first < end and before <= end
         )
@@ -190,52 +245,55 @@ class _Search:
         frame: Frame | None = None,
         after: Context | None = None,
     ) -> None:
-        context = self._contexts[start] if after is None else after
         total = self._cost[start] + price
+        if total + self._least[end] > self._limit:
+            return
+        edge = (start, end, price, frame, after)
         if total < self._cost[end]:
             self._cost[end] = total
-            self._by[end] = len(self._edges)
-            self._contexts[end] = context
-        self._edges.append((start, end, price, frame, context))
+            self._by[end] = edge
+        self._edges.append(edge)
+
+    def _context(self, node: int) -> Context:
+        """On the cheapest way to this node; after a bad run or a damaged frame little is known."""
+        found, damaged, at = self._contexts.get(node), False, node
+        while found is None:
+            edge = self._by[at]
+            assert edge is not None
+            at, _, _, _, found = edge
+            if found is None:
+                damaged = damaged or at % 2 == 1
+                found = self._contexts.get(at)
+        self._contexts[node] = found = found.damaged() if damaged else found
+        return found
 
     def pieces(self) -> list[Piece]:
         """Walk the best path back, then ask every edge what the best path through it costs."""
-        edges, cost = self._edges, self._cost
-        path: list[int] = []
-        node = self._end
-        while self._by[node] >= 0:
-            path.append(self._by[node])
-            node = edges[path[-1]][0]
-        path = [index for index in reversed(path) if edges[index][3] is not None]
-        if not path:
-            return []
-        starts = [edges[index][0] >> 1 for index in path]
-        next_piece = [0] * (len(self._data) + 2)
-        number = 0
-        for at in range(len(next_piece)):
-            while number < len(starts) and starts[number] < at:
-                number += 1
-            next_piece[at] = number
+        cost = self._cost
+        path: list[_Edge] = []
+        edge = self._by[self._end]
+        while edge is not None:
+            if edge[3] is not None:
+                path.append(edge)
+            edge = self._by[edge[0]]
+        path.reverse()
+        starts = [edge[0] >> 1 for edge in path]
         rest = [inf] * (self._end + 1)
         rest[self._end] = 0.0
-        others = [inf] * len(path)
-        for index in range(len(edges) - 1, -1, -1):
-            start, end, price, _, _ = edges[index]
+        sure = [True] * len(path)
+        best = cost[self._end]
+        for edge in reversed(self._edges):
+            start, end, price, _, _ = edge
             onward = price + rest[end]
+            if onward == inf:
+                continue
             if onward < rest[start]:
                 rest[start] = onward
-            covers_to = end >> 1
-            number = next_piece[start >> 1]
-            while number < len(starts) and starts[number] < covers_to:
-                if path[number] != index and cost[start] + onward < others[number]:
-                    others[number] = cost[start] + onward
-                number += 1
-        best = cost[self._end]
-        found = []
-        for number, index in enumerate(path):
-            start, end, _, frame, after = edges[index]
-            assert frame is not None
-            before = self._contexts[start]
-            margin = others[number] - best
-            found.append(Piece(start >> 1, end >> 1, frame, before, after, margin))
-        return found
+            if cost[start] + onward - best < SURE:
+                for number in range(bisect_left(starts, start >> 1), bisect_left(starts, end >> 1)):
+                    sure[number] = sure[number] and path[number] is edge
+        return [
+            Piece(start >> 1, end >> 1, frame, self._context(start), after, is_sure)
+            for (start, end, _, frame, after), is_sure in zip(path, sure, strict=True)
+            if frame is not None and after is not None
+        ]

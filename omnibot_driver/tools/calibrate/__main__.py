@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
 from omnibot_driver.tools.needs import ToolError, need
+from omnibot_driver.tools.ros_arguments import split_ros_arguments
 
 SUBCOMMANDS: Final = {
     "commission": "which way round everything is: a guided walk, wheels off the ground",
@@ -109,20 +110,6 @@ def _calibrate(
         if arguments.apply:
             robot.apply(result.parameters)
             console.say("Applied to the running driver.")
-
-
-def split_ros_arguments(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Ours, and what stands between ``--ros-args`` and ``--`` (or the end), with that marker."""
-    own: list[str] = []
-    ros: list[str] = []
-    into = own
-    for word in arguments:
-        if word == "--ros-args":
-            into = ros
-        into.append(word)
-        if word == "--" and into is ros:
-            into = own
-    return own, ros
 
 
 def _module(subcommand: str) -> Any:

@@ -35,34 +35,53 @@ class Client:
         self.parameters = self._get_parameters()
 
     def _find(self) -> str:
-        own = self._node.get_namespace().rstrip("/")
-        found: list[str] = []
+        here: list[str] = []
 
-        def here() -> list[str]:
-            found[:] = drivers(self._node)
-            return [name for name in found if name.rpartition("/")[0] == own]
+        def look() -> list[str]:
+            here[:] = self._here()
+            return here
 
-        if not self._wait(here, FOUND_WITHIN_S):
-            place = f"in the namespace {own}" if own else "without a namespace"
-            others = (
-                f"there are {', '.join(found)}: choose by --namespace"
-                if found
-                else "nor any other: start it (ros2 run omnibot_driver driver), and check that"
-                " ROS_DOMAIN_ID is the same"
+        if self._wait(look, FOUND_WITHIN_S):
+            return here[0]
+        if not (others := drivers(self._node)):
+            raise ToolError(
+                "no driver is running: start one (ros2 run omnibot_driver driver), or set"
+                " ROS_DOMAIN_ID as it is where the driver runs"
             )
-            raise ToolError(f"no driver is running {place}; {others}")
-        if len(here()) > 1:
-            raise ToolError(f"there are several drivers here: {', '.join(here())}; end all but one")
-        return here()[0]
+        own = self._namespace()
+        place = f"in the namespace {own}" if own else "without a namespace"
+        raise ToolError(
+            f"no driver is running {place}, but {', '.join(others)}: choose by --namespace"
+        )
+
+    def _require_alone(self) -> None:
+        """Two drivers in one namespace would both obey."""
+        here = [
+            name
+            for name in self._here()
+            for _ in self._node.get_publishers_info_by_topic(f"{name}/state")
+        ]
+        if len(here) > 1:
+            raise ToolError(f"there are several drivers here: {', '.join(here)}; end all but one")
+
+    def _here(self) -> list[str]:
+        return [
+            name for name in drivers(self._node) if name.rpartition("/")[0] == self._namespace()
+        ]
+
+    def _namespace(self) -> str:
+        return self._node.get_namespace().rstrip("/")
 
     def _get_parameters(self) -> dict[str, Value]:
         names = [parameter.name for parameter in PARAMETERS]
         request = GetParameters.Request(names=names)
         answer = self._call(GetParameters, f"{self.driver}/get_parameters", request)
         values = [parameter_value_to_python(value) for value in answer.values]
+        if len(values) != len(names):
+            raise ToolError(f"{self.driver} is of another version than this tool: update the older")
         return {
             name: list(value) if isinstance(value, Sequence) and type(value) is not str else value
-            for name, value in zip(names, values, strict=False)
+            for name, value in zip(names, values, strict=True)
         }
 
     def set_parameters(self, values: Mapping[str, Value]) -> None:

@@ -115,6 +115,7 @@ class Console:
         try:
             return self._read(question).strip()
         except EOFError:
+            self.say()
             raise ToolError(
                 f"nobody answered “{question.strip()}”: run it in a terminal, or pipe answers in"
             ) from None

@@ -61,11 +61,12 @@ def write(result: Result, output: Path, picture: Path) -> None:
     FigureCanvasAgg(figure)
     result.draw(figure)
     try:
-        figure.savefig(picture, dpi=110)
+        for name, value in result.parameters.items():
+            BY_NAME[name].check(value)
         if result.parameters or result.record:
-            for name, value in result.parameters.items():
-                BY_NAME[name].check(value)
             calibration.save(output, {**result.record, **result.parameters})
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(picture, dpi=110)
     except (OSError, ParameterError) as error:
         raise ToolError(f"the result cannot be written: {error}") from error
 

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from omnibot_driver.core.se2 import Pose
+from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.tools.calibrate.arguments import positive, whole
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.geometry_figure import draw
@@ -23,11 +24,12 @@ from omnibot_driver.tools.needs import ToolError
 
 PLAIN: Final = 0.005
 """A wheel that differs from the others by more is worth a word."""
-INTRODUCTION: Final = """\
-You need a tape measure, something to mark the floor with, and a plumb or a fixed point under the
-robot's centre. Before each drive mark where the centre is and where the front points; after it you
-are asked where the robot has got to, seen from those marks: forward and left count as positive,
-back and right as negative. Let it go where it goes, and do not push it."""
+INTRODUCTION: Final = (
+    "You need a tape measure, something to mark the floor with, and a plumb or a fixed point under"
+    " the robot's centre. Before each drive mark where the centre is and where the front points;"
+    " after it you are asked where the robot has got to, seen from those marks: forward and left"
+    " count as positive, back and right as negative. Let it go where it goes, and do not push it."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +86,26 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
         path = _drive(robot, console, drive, arguments)
         readings.append(_reading(console, drive, path, arguments))
     now = robot.parameters
-    return result(readings, fit(readings, now["base_radius"], now["odom_wheel_drift"]), now)
+    found = fit(readings, believed(now)["base_radius"], now["odom_wheel_drift"])
+    return result(readings, found, now)
+
+
+def believed(now: Mapping[str, Any]) -> dict[str, float]:
+    """Sizes in m and scales that make ``odom`` what it is, by the names of their parameters.
+
+    The board computes with sizes of its own, those of the manual, and the driver scales what comes
+    of it; from wheel counts the driver computes by itself.
+    """
+    if now["delta_frame"] == "wheel_counts":
+        return {name: now[name] for name in ("wheel_radius", "base_radius")}
+    linear, angular = now["odom_linear_scale"], now["odom_angular_scale"]
+    wheel_m, base_m = (BY_NAME[name].default for name in ("wheel_radius", "base_radius"))
+    return {
+        "wheel_radius": wheel_m * linear,
+        "base_radius": base_m * linear / angular,
+        "odom_linear_scale": linear,
+        "odom_angular_scale": angular,
+    }
 
 
 def plan(side_m: float, turns: int, *, squares: bool) -> list[Drive]:
@@ -151,27 +172,26 @@ def _reading(
 
 def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any]) -> Result:
     """What to show and to write of a geometry; ``now`` are the driver's parameters."""
-    wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance)[:2])
+    wheels_sigma, base_sigma = map(float, np.sqrt(np.diag(found.covariance)[:2]))
     factors = {
-        "wheel_radius": (found.wheels, float(wheels_sigma), "m"),
-        "base_radius": (found.base, float(base_sigma), "m"),
+        "wheel_radius": (found.wheels, wheels_sigma, "m"),
+        "base_radius": (found.base, base_sigma, "m"),
+        "odom_linear_scale": (found.wheels, wheels_sigma, "m/m"),
+        "odom_angular_scale": (found.turn, found.turn_sigma, "rad/rad"),
     }
-    if now["delta_frame"] != "wheel_counts":  # the board computes with sizes of its own
-        factors["odom_linear_scale"] = (found.wheels, float(wheels_sigma), "m/m")
-        factors["odom_angular_scale"] = (found.turn, found.turn_sigma, "rad/rad")
+    was = believed(now)
     findings = [
-        Finding(
-            name=name, value=now[name] * factor, sigma=now[name] * sigma, unit=unit,
-            before=now[name],
-        )
-        for name, (factor, sigma, unit) in factors.items()
+        Finding(name=name, value=size * factors[name][0], sigma=size * factors[name][1],
+                unit=factors[name][2], before=now[name])
+        for name, size in was.items()
     ]  # fmt: skip
+    parameters = {name: size * factors[name][0] for name, size in was.items()}
     findings += [
         Finding(name=f"wheel {wheel} over the mean", value=100 * float(more),
                 sigma=100 * float(sigma), unit="%")
         for wheel, more, sigma in zip("ABC", found.unlike, found.unlike_sigma, strict=True)
     ]  # fmt: skip
-    before, after = misses(readings, found, now["base_radius"])
+    before, after = misses(readings, found, was["base_radius"])
     notes = [
         f"The odometry was off by {before * 1000:.0f} mm in the mean; with these values it would"
         f" have been by {after * 1000:.0f} mm.",
@@ -191,9 +211,9 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
         )
     return Result(
         findings=findings,
-        parameters={name: now[name] * factor for name, (factor, _, _) in factors.items()},
+        parameters=parameters,
         notes=notes,
-        draw=lambda figure: draw(figure, readings, found, now["base_radius"]),
+        draw=lambda figure: draw(figure, readings, found, was["base_radius"]),
     )
 
 

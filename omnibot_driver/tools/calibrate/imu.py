@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 AXES: Final = "xyz"
 COLOURS: Final = ("tab:red", "tab:green", "tab:blue")
+DRAWN: Final = 1000
+"""Readings at the most; of more the picture is larger, not clearer."""
 GRAVITY_SIGMA: Final = 0.01
 """m/s²: how well a user knows the local value."""
 
@@ -146,7 +148,7 @@ def draw(figure: "Figure", found: Rest, imu: Imu) -> None:
     grid = figure.add_gridspec(2, 2)
     rates, forces = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[1, 0])
     seconds = imu.stamp_s - imu.stamp_s[0]
-    step = max(1, len(seconds) // 3000)
+    step = math.ceil(len(seconds) / DRAWN)
     for n, (axis, colour) in enumerate(zip(AXES, COLOURS, strict=True)):
         rates.plot(seconds[::step], np.degrees(imu.rate_radps[::step, n]), ".", ms=1, color=colour)
         rates.axhline(math.degrees(found.bias_radps[n]), color=colour, label=axis)

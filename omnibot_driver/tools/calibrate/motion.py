@@ -63,6 +63,11 @@ class Bounds:
 
     def require_within(self, seconds: float, pose: Pose) -> None:
         """Raises ToolError for a robot that is further, or drives longer, than it should."""
+        if not pose.finite:
+            raise ToolError(
+                "the robot was stopped, `odom` does not say where it is (NaN or infinite): see who"
+                " publishes that"
+            )
         if pose.way_m > self.way:
             where = f"{pose.way_m:.2f} m from where it began, {self.way:.2f} m allowed"
         elif abs(pose.yaw_rad) > self.turn:
@@ -111,7 +116,7 @@ class Obedience:
         told_ways, done_ways = self._told, self._done
         self._began_s, self._told, self._done = now_s, [0.0, 0.0], [0.0, 0.0]
         for told, done, plain in zip(told_ways, done_ways, PLAIN[self._topic], strict=True):
-            if told > plain * LOOK_S and done < OBEYED_PART * told:
+            if told > plain * LOOK_S and not done >= OBEYED_PART * told:  # NaN is no motion
                 raise ToolError(
                     f"the robot does not move when told ({self._topic}): check the motors' power,"
                     " the switch of the board, `linear_scale` and `angular_scale`, and what the"

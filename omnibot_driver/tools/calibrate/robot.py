@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot as a calibration has it: a client of the running driver. Must not know what is found.
+"""The robot as a calibration has it: what is heard of it, and moved. Must not know what is found.
 
 Every motion is `drive`, whatever happens ends in commands to stand still; and if this process dies,
 the driver's watchdog stops the robot.
@@ -11,38 +11,36 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, Final
 
 import rclpy
 from geometry_msgs.msg import Twist, TwistStamped
-from nav_msgs.msg import Odometry
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.context import Context
 from rclpy.exceptions import InvalidNamespaceException
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
-from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Bool, Float32MultiArray, String
+from std_msgs.msg import Float32MultiArray
 
 from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.se2 import Pose
-from omnibot_driver.tools.calibrate.client import FOUND_WITHIN_S, Client
 from omnibot_driver.tools.calibrate.interruption import Interruption
+from omnibot_driver.tools.calibrate.listener import ODOMETRY, Listener
 from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.motion import HALT, Bounds, Law, Obedience, Topic
 from omnibot_driver.tools.needs import ToolError
 
 PERIOD_S: Final = 0.02
 """Between commands."""
-LOST_S: Final = 0.3
-"""A robot that is not heard for so long is driven no further."""
 STANDS_WITHIN_S: Final = 3.0
 STOOD_S: Final = 0.3
 """Standing for so long is standing still."""
 STANDING: Final = 0.01
 """m/s and rad/s: slower is standing."""
-LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+UNRULY: Final = (
+    "the robot was told to stand still and is not seen to: cut its power, then see docs/safety.md"
+)
 
 
 @contextmanager
@@ -69,119 +67,23 @@ def connect(
         rclpy.shutdown(context=context)
 
 
-class Robot(Client):
-    """``log`` is of the motion or rest that is under way, or was last."""
+class Robot(Listener):
+    """Rests and drives."""
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
         super().__init__(node, context, interruption)
-        self.log = Log()
-        self._states: list[str] = []
-        self._estop = False
-        self._imu_at = self._odometry_at = -math.inf
-        self._pose, self._twist = Pose(), HALT
-        self._wheel_rates = HALT
-        self._sent: Counter[Vector3] = Counter()
-        self._foreign = False
-        self._listen()
-        if not self._wait(lambda: self._states and self._imu_at > 0, FOUND_WITHIN_S):
-            state = self._states[-1] if self._states else "unknown"
-            raise ToolError(
-                f"{self.driver} sends no imu/data_raw (state: {state}): see what it logs, and"
-                " docs/troubleshooting.md"
-            )
-
-    # Hearing
-
-    def _listen(self) -> None:
-        node = self._node
-        node.create_subscription(Imu, "imu/data_raw", self._on_imu, 50)
-        node.create_subscription(Odometry, "odom", self._on_odometry, 50)
-        node.create_subscription(JointState, "joint_states", self._on_wheels, 50)
-        node.create_subscription(String, f"{self.driver}/state", self._on_state, LATCHED)
-        node.create_subscription(Bool, f"{self.driver}/estop_active", self._on_estop, LATCHED)
         self._stamped = bool(self.parameters["enable_stamped_cmd_vel"])
-        kind = TwistStamped if self._stamped else Twist
-        self._publishers = {
-            "cmd_vel": node.create_publisher(kind, "cmd_vel", 1),
-            "wheel_cmd": node.create_publisher(Float32MultiArray, "wheel_cmd", 1),
+        self._unanswered: Counter[tuple[Topic, tuple[float, ...]]] = Counter()
+        """Commands that were sent and not yet heard again; below zero is somebody else's."""
+        self._foreign: Topic | None = None
+        kinds: dict[Topic, Any] = {
+            "cmd_vel": TwistStamped if self._stamped else Twist,
+            "wheel_cmd": Float32MultiArray,
         }
-        node.create_subscription(kind, "cmd_vel", self._on_cmd_vel, 10)
-
-    def _on_imu(self, message: Imu) -> None:
-        self._imu_at = time.monotonic()
-        force, rate = message.linear_acceleration, message.angular_velocity
-        self.log.imu_rows.append(
-            (_seconds(message), force.x, force.y, force.z, rate.x, rate.y, rate.z)
-        )
-
-    def _on_odometry(self, message: Odometry) -> None:
-        self._odometry_at = time.monotonic()
-        position, turn = message.pose.pose.position, message.pose.pose.orientation
-        twist = message.twist.twist
-        yaw_rad = 2 * math.atan2(turn.z, turn.w)
-        yaw_rad = self._pose.yaw_rad + math.remainder(yaw_rad - self._pose.yaw_rad, math.tau)
-        self._pose = Pose(position.x, position.y, yaw_rad)
-        self._twist = (twist.linear.x, twist.linear.y, twist.angular.z)
-        self.log.odometry_rows.append(
-            (_seconds(message), position.x, position.y, yaw_rad, *self._twist)
-        )
-
-    def _on_wheels(self, message: JointState) -> None:
-        rates = tuple(message.velocity) if len(message.velocity) == 3 else (math.nan,) * 3
-        if not math.isnan(rates[0]):
-            self._wheel_rates = rates
-        self.log.wheel_rows.append((_seconds(message), *message.position, *rates))
-
-    def _on_state(self, message: String) -> None:
-        self._states.append(message.data)
-
-    def _on_estop(self, message: Bool) -> None:
-        self._estop = message.data
-
-    def _on_cmd_vel(self, message: Any) -> None:
-        twist = message.twist if self._stamped else message
-        command = (twist.linear.x, twist.linear.y, twist.angular.z)
-        self._sent[command] -= 1
-        self._foreign = self._foreign or self._sent[command] < 0
-
-    # Watching
-
-    def _unheard(self, at: str) -> bool:
-        """Not for too long; what waits to be read is read first, for we may have been slow."""
-        if time.monotonic() - getattr(self, at) > LOST_S:
-            for _ in range(100):
-                self._executor.spin_once(timeout_sec=0.0)
-        return time.monotonic() - float(getattr(self, at)) > LOST_S
-
-    def _require_sound(self, states: Sequence[str] = ("nominal",)) -> None:
-        if self._estop:
-            raise ToolError("the e-stop is latched: release it with ~/estop, then begin again")
-        for state in self._states:
-            if state not in states:
-                raise ToolError(
-                    f"the driver's state is or was {state}, not {' or '.join(states)}: see what it"
-                    " logs; ~/start starts a paused board"
-                )
-        lost = [
-            topic
-            for topic, at in (("imu/data_raw", "_imu_at"), ("odom", "_odometry_at"))
-            if self._unheard(at) and not (topic == "odom" and self._states[-1] == "imu_only")
-        ]
-        if lost:
-            raise ToolError(
-                f"nothing came on {' and '.join(lost)} for {LOST_S:g} s: is the driver still there,"
-                " the computer too busy, the network too slow?"
-            )
-
-    def _begin(self, states: Sequence[str]) -> None:
-        """Hear the robot anew: while a person was asked, nothing was heard."""
-        self._imu_at = self._odometry_at = -math.inf
-        self._wait(lambda: self._imu_at > 0 and self._odometry_at > 0, 1.0)
-        del self._states[:-1]
-        self._require_sound(states)
-        self.log = Log()
-
-    # Resting and moving
+        self._publishers = {}
+        for topic, kind in kinds.items():
+            self._publishers[topic] = node.create_publisher(kind, topic, 1)
+            node.create_subscription(kind, topic, partial(self._on_command, topic), 10)
 
     def rest(
         self,
@@ -220,18 +122,21 @@ class Robot(Client):
                 "this needs the board's switch on velocity control and `control_method: velocity`"
             )
         self._begin(("nominal",))
-        self._sent.clear()
-        self._foreign = False
+        self._unanswered.clear()
+        self._foreign = None
+        stands = False
         try:
-            self._follow(law, bounds, topic, obeys, show)
-        finally:
-            stands = self._halt(topic)
-        self._require_sound()
+            try:
+                self._follow(law, bounds, topic, obeys, show)
+            finally:
+                stands = self._halt(topic)
+            self._require_sound()
+        except ToolError as error:
+            if stands:
+                raise
+            raise type(error)(f"{error}; and {UNRULY}") from error
         if not stands:
-            raise ToolError(
-                "the robot was told to stand still and moves: cut its power, then see"
-                " docs/safety.md"
-            )
+            raise ToolError(UNRULY)
         return self.log
 
     def _follow(
@@ -247,6 +152,7 @@ class Robot(Client):
         command, wanted = HALT, law(0.0, Pose())
         while wanted is not None or command != HALT:
             now_s = time.monotonic()
+            self._require_unforgotten(now_s - last_s)
             target = HALT if wanted is None else wanted
             bounds.require_allowed(topic, target)
             command = bounds.approach(topic, command, target, max(PERIOD_S, now_s - last_s))
@@ -268,43 +174,63 @@ class Robot(Client):
         """Whether the robot stands. Not interrupted by anything; short where it is not heard."""
         began_s = now_s = time.monotonic()
         standing_since_s = math.inf
-        while now_s < max(began_s, min(self._odometry_at, began_s + STANDS_WITHIN_S)) + 2 * STOOD_S:
+        while now_s < (
+            max(began_s, min(self._heard_s[ODOMETRY], began_s + STANDS_WITHIN_S)) + 2 * STOOD_S
+        ):
             self._send(topic, HALT)
             self._hear(PERIOD_S)
             now_s = time.monotonic()
-            moves = max(map(abs, self._twist)) > STANDING
-            standing_since_s = math.inf if moves else min(standing_since_s, now_s)
+            stands = all(abs(speed) <= STANDING for speed in self._twist)  # NaN does not
+            standing_since_s = min(standing_since_s, now_s) if stands else math.inf
             if now_s - standing_since_s > STOOD_S:
                 return True
         return False
 
     def _send(self, topic: Topic, command: Vector3) -> None:
+        now = self._node.get_clock().now()
         if topic == "wheel_cmd":
             message = Float32MultiArray(data=command)
         else:
-            twist = Twist()
-            twist.linear.x, twist.linear.y, twist.angular.z = command
-            message = twist
+            message = Twist()
+            message.linear.x, message.linear.y, message.angular.z = command
             if self._stamped:
-                message = TwistStamped(twist=twist)
-                message.header.stamp = self._node.get_clock().now().to_msg()
-            self._sent[command] += 1
-        sent_s = self._node.get_clock().now().nanoseconds * 1e-9
-        self.log.command_rows.append((sent_s, *command))
+                message = TwistStamped(twist=message)
+                message.header.stamp = now.to_msg()
+        self._unanswered[topic, _values(message)] += 1
+        self.log.command_rows.append((now.nanoseconds * 1e-9, *command))
         self._publishers[topic].publish(message)
+
+    def _on_command(self, topic: Topic, message: Any) -> None:
+        said = topic, _values(message)
+        self._unanswered[said] -= 1
+        if self._unanswered[said] < 0:
+            self._foreign = topic
 
     def _require_sole(self) -> None:
         if self._foreign:
             others = {
                 f"{info.node_namespace.rstrip('/')}/{info.node_name}"
-                for info in self._node.get_publishers_info_by_topic("cmd_vel")
+                for info in self._node.get_publishers_info_by_topic(
+                    self._node.resolve_topic_name(self._foreign)
+                )
             } - {self._node.get_fully_qualified_name()}
             raise ToolError(
-                f"somebody else commands the robot on cmd_vel ({', '.join(sorted(others))}): end"
-                " that first"
+                f"somebody else commands the robot on {self._foreign}"
+                f" ({', '.join(sorted(others))}): end that first"
+            )
+
+    def _require_unforgotten(self, silence_s: float) -> None:
+        """A program that was suspended moves no robot when it wakes up."""
+        if silence_s > self.parameters["cmd_vel_timeout"]:
+            raise ToolError(
+                f"this program was held up for {silence_s:.1f} s, and the driver has stopped the"
+                " robot meanwhile: begin again, on a computer with less to do"
             )
 
 
-def _seconds(message: Any) -> float:
-    stamp = message.header.stamp
-    return float(stamp.sec + stamp.nanosec * 1e-9)
+def _values(message: Any) -> tuple[float, ...]:
+    """Of a command, as it is on the wire."""
+    if isinstance(message, Float32MultiArray):
+        return tuple(message.data)
+    twist = message.twist if isinstance(message, TwistStamped) else message
+    return twist.linear.x, twist.linear.y, twist.angular.z

@@ -16,12 +16,12 @@ from omnibot_driver.tools.monitor.rates import WINDOW_S
 from omnibot_driver.tools.monitor.screen import has_screen
 from omnibot_driver.tools.monitor.teleop import DeadMan
 from omnibot_driver.tools.needs import ToolError, need
+from omnibot_driver.tools.ros_arguments import split_ros_arguments
 
 if TYPE_CHECKING:
     from omnibot_driver.tools.monitor.feed import Feed
 
 LOOK_EVERY_S: Final = 0.05
-ROS_ARGUMENTS: Final = "--ros-args"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -62,15 +62,14 @@ def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
         metavar="S",
         help="wait so long for the driver, inf for ever (default: %(default)g)",
     )
-    ours = list(arguments)
-    ros = ours.index(ROS_ARGUMENTS) if ROS_ARGUMENTS in ours else len(ours)
-    options = parser.parse_args(ours[:ros])
+    ours, ros = split_ros_arguments(arguments)
+    options = parser.parse_args(ours)
     options.once |= options.json
     if not options.timeout > 0.0:
         parser.error("--timeout must be a number above 0")
     if options.once and options.teleop:
         parser.error("--teleop needs the screen: leave --once and --json out")
-    return options, ours[ros:]
+    return options, ros
 
 
 def _run(options: argparse.Namespace, ros_arguments: list[str]) -> int:

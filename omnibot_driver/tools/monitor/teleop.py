@@ -15,6 +15,10 @@ FIRST_S: Final = 0.6
 """A key pressed anew moves the robot so long: most keyboards repeat after 0.25 s to 0.6 s."""
 REPEAT_S: Final = 0.3
 """After a repetition: several of them may get lost or be late."""
+ASLEEP_S: Final = 0.5
+"""Who has not been asked for so long was suspended: keys that waited were meant for then."""
+DEAF_S: Final = 0.3
+"""So long nobody steers after that; what waited is read within it."""
 ZEROS: Final = 5
 """So many commands to stand still, and then none: others may want to drive."""
 LEVELS: Final = 10
@@ -33,7 +37,7 @@ MOTIONS: Final = {
 
 
 class DeadMan:
-    """What is to be driven now, by the keys that were pressed.
+    """What is to be driven now, by the keys that were pressed; to be asked all the time.
 
     Keys may come from another thread than the one that asks: what they change is one reference.
     """
@@ -45,11 +49,16 @@ class DeadMan:
         self.has_driven = False
         self._held = NOTHING
         self._zeros = 0
+        self._asked_s = math.inf
+        self._deaf_until_s = -math.inf
 
     def press(self, key: str, now_s: float) -> bool:
-        """Whether this key steers; if so, it does from now on."""
+        """Whether this key is one that steers; it does from now on, unless it has waited."""
         if key not in MOTIONS:
             return False
+        self._notice_sleep(now_s)
+        if now_s < self._deaf_until_s:
+            return True
         before, until_s = self._held
         lasts_s = REPEAT_S if key == before and now_s < until_s else FIRST_S
         self._held = key, now_s + lasts_s
@@ -71,6 +80,8 @@ class DeadMan:
 
     def command(self, now_s: float) -> BodyTwist | None:
         """What is to be published now: a motion, then a few times to stand still, then nothing."""
+        self._notice_sleep(now_s)
+        self._asked_s = now_s
         key, until_s = self._held
         if now_s < until_s:
             self._zeros, self.has_driven = ZEROS, True
@@ -81,3 +92,7 @@ class DeadMan:
             self._zeros -= 1
             return HALT
         return None
+
+    def _notice_sleep(self, now_s: float) -> None:
+        if now_s - self._asked_s > ASLEEP_S:
+            self._held, self._deaf_until_s = NOTHING, now_s + DEAF_S

@@ -5,13 +5,16 @@
 from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Final
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader
+from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_typestore
 
 from omnibot_driver.tools.needs import ToolError
+from omnibot_driver.tools.report import salvage
 from omnibot_driver.tools.report.findings import counted
 from omnibot_driver.tools.report.log import Log
 from omnibot_driver.tools.report.recorder import Recorder
@@ -64,46 +67,60 @@ def _messages(
     wanted = [item for item in reader.connections if item.topic in topics]
     if not wanted:
         return
+    storage = reader.storage
     try:
-        yield from reader.messages(wanted)
+        if isinstance(storage, McapReader) and not storage.chunks:
+            # Without an index ``messages`` insists on the order of time, which nobody promises.
+            yield from storage.messages_scan(wanted)
+        else:
+            yield from reader.messages(wanted)
     except Exception as error:  # whatever a damaged file makes the library stumble over
         troubles.append(f"{reader.path} cannot be read to its end: {_in_a_line(error)}")
 
 
 def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
-    """What can be opened, and what cannot."""
+    """What can be opened, and what is wrong with it."""
     if not path.exists():
         raise ToolError(f"there is no {path}: give the folder of a bag, or its .mcap or .db3 file")
-    if path.is_dir() and not (path / "metadata.yaml").exists():
-        return _open_unfinished(path, stack)
-    if not path.is_dir() and path.suffix not in STORAGES:
+    files, troubles = [path], []
+    if path.is_dir():
+        files = sorted(file for file in path.iterdir() if file.suffix in STORAGES)
+        if (path / "metadata.yaml").exists():
+            try:
+                return [stack.enter_context(Reader(path))], []
+            except Exception as error:
+                troubles.append(f"the bag is damaged ({_in_a_line(error)})")
+        elif files:
+            troubles.append("the bag was never finished (metadata.yaml is missing)")
+        else:
+            raise ToolError(
+                f"{path} is no bag: it has neither metadata.yaml nor a .mcap or .db3 file"
+            )
+    elif path.suffix not in STORAGES:
         raise ToolError(f"{path} is no bag: give the folder of a bag, or its .mcap or .db3 file")
-    try:
-        return [stack.enter_context(Reader(path))], []
-    except Exception as error:
-        raise ToolError(
-            f"{path} cannot be read: {_in_a_line(error)}. If its recorder was killed,"
-            f" repair it with `ros2 bag reindex {path if path.is_dir() else path.parent}`"
-        ) from error
-
-
-def _open_unfinished(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
-    files = sorted(file for file in path.iterdir() if file.suffix in STORAGES)
-    if not files:
-        raise ToolError(f"{path} is no bag: it has neither metadata.yaml nor a .mcap or .db3 file")
     readers: list[Reader] = []
-    troubles = [
-        "the bag was never finished (metadata.yaml is missing):"
-        f" `ros2 bag reindex {path}` repairs it"
-    ]
     for file in files:
         try:
-            readers.append(stack.enter_context(Reader(file)))
+            readers.append(_open_file(file, stack, troubles))
         except Exception as error:
             troubles.append(f"{file.name} cannot be read: {_in_a_line(error)}")
+    repair = f"`ros2 bag reindex {path if path.is_dir() else path.parent}` may repair it"
     if not readers:
-        raise ToolError(f"{path} cannot be read: {'; '.join(troubles)}")
-    return readers, troubles
+        raise ToolError(f"{path} cannot be read: {'; '.join(troubles)}; {repair}")
+    return readers, [f"{trouble}: {repair}" for trouble in troubles]
+
+
+def _open_file(file: Path, stack: ExitStack, troubles: list[str]) -> Reader:
+    """A file by itself, or a copy of it that is whole."""
+    broken = file.suffix == ".mcap" and salvage.breaks_off(file)
+    whole = file
+    if broken or salvage.has_journal(file):
+        make_whole = salvage.cut_to_records if broken else salvage.with_journal
+        whole = make_whole(file, Path(stack.enter_context(TemporaryDirectory())))
+    reader = stack.enter_context(Reader(whole))
+    if broken:
+        troubles.append(f"the file {file.name} breaks off; what is whole of it is reported on")
+    return reader
 
 
 def _in_a_line(error: Exception) -> str:

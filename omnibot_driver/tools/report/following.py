@@ -28,40 +28,48 @@ class Pair:
 
     topic: str
     axes: tuple[str, str, str]
-    unit: str
+    units: tuple[str, str, str]
     weights: tuple[float, float, float]
     scales: tuple[str, str, str]
     commands: Series
     measured: Series
 
 
+def twists(log: Log) -> Pair:
+    """cmd_vel and the twist of odom, without what is not finite."""
+    odom = _sampled(log.odom)
+    return Pair(
+        "cmd_vel",
+        ("vx", "vy", "yaw rate"),
+        ("m/s", "m/s", "rad/s"),
+        (1.0, 1.0, 0.143),
+        ("linear_scale", "linear_scale", "angular_scale"),
+        log.cmd_vel.only(log.cmd_vel.finite),
+        Series(odom.arrived_s, odom.stamp_s, odom.values[:, 3:]),
+    )
+
+
 def pairs(log: Log) -> list[Pair]:
     """Those of which the log has both sides, without what is not finite."""
-    finite = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
-    twist = Series(finite.arrived_s, finite.stamp_s, finite.values[:, 3:])
-    wheels = log.joint_states.only(log.joint_states.finite & np.isfinite(log.joint_states.stamp_s))
-    linear, angular = "linear_scale", "angular_scale"
-    found = [
-        Pair(
-            "cmd_vel",
-            ("vx", "vy", "yaw rate"),
-            "m/s, rad/s",
-            (1.0, 1.0, 0.143),
-            (linear, linear, angular),
-            log.cmd_vel.only(log.cmd_vel.finite),
-            twist,
-        ),
-        Pair(
-            "wheel_cmd",
-            ("wheel A", "wheel B", "wheel C"),
-            "rad/s",
-            (0.029,) * 3,
-            (linear,) * 3,
-            log.wheel_cmd.only(log.wheel_cmd.finite),
-            wheels,
-        ),
-    ]
-    return [pair for pair in found if len(pair.commands) and len(pair.measured) > 1]
+    wheels = Pair(
+        "wheel_cmd",
+        ("wheel A", "wheel B", "wheel C"),
+        ("rad/s",) * 3,
+        (0.029,) * 3,
+        ("linear_scale",) * 3,
+        log.wheel_cmd.only(log.wheel_cmd.finite),
+        _sampled(log.joint_states),
+    )
+    return [pair for pair in (twists(log), wheels) if len(pair.commands) and len(pair.measured) > 1]
+
+
+def shown(log: Log) -> list[Pair]:
+    """Those, or what was measured without a command."""
+    return pairs(log) or [twists(log)]
+
+
+def _sampled(series: Series) -> Series:
+    return series.only(series.finite & np.isfinite(series.stamp_s))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
-from omnibot_driver.tools.report import plots
+from omnibot_driver.tools.report import following, plots
 from omnibot_driver.tools.report.findings import Finding, Level, headline, span
 from omnibot_driver.tools.report.log import Log
 
@@ -41,7 +41,7 @@ PICTURES: Final[tuple[tuple[str, str, Draw, Callable[[Log], int], str], ...]] = 
         "velocities",
         "Velocities",
         plots.velocities,
-        lambda log: len(log.odom) + len(log.joint_states),
+        lambda log: len(following.shown(log)[0].measured),
         "A command counts as zero 0.5 s after it came (the default of cmd_vel_timeout).",
     ),
     (

@@ -11,104 +11,51 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from omnibot_driver.tools.report import following, rhythm, sensing
+from omnibot_driver.tools.report import following, rhythm, sensing, travel
+from omnibot_driver.tools.report.drawing import (
+    COMMAND,
+    GREY,
+    POINTS,
+    RED,
+    STATES,
+    X,
+    Y,
+    Z,
+    dots,
+    dress,
+    legend,
+    legend_below,
+    line,
+    new_figure,
+    shade,
+    time_axis,
+)
 from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Series, Span
 
-X, Y, Z, COMMAND, RED, GREY = "#0072B2", "#D55E00", "#009E73", "#222222", "#C0272D", "#8A8F98"
-STATES: Final = {
-    "nominal": "#7FC8A9",
-    "imu_only": "#B9D67A",
-    "paused": "#F2C14E",
-    "connecting": "#F08A4B",
-    "disconnected": "#C0272D",
-}
+HOLE_S: Final = 1.0
+"""What was not heard for longer is not drawn as a way."""
 LEVELS: Final = ("#7FC8A9", "#F2C14E", "#C0272D", "#C9CDD3")
-WIDTH_IN: Final = 10.0
-POINTS: Final = 3000
-"""A line of more points is drawn as its envelope."""
 SHORT_WAY_M: Final = 0.05
 ARROWS: Final = 24
 SHOWN: Final = 1.5
 """Times the spread of 99 in 100 is shown; what lies beyond is drawn at the edge."""
 
 
-def _figure(height_in: float) -> Figure:
-    return Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
-
-
-def _dress(axes: Axes, label: str, title: str = "") -> None:
-    axes.set_ylabel(label)
-    axes.grid(True, color="#E3E6EA", linewidth=0.7)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
-    if title:
-        axes.set_title(title, loc="left", fontsize=11, fontweight="bold")
-
-
-def _legend(axes: Axes) -> None:
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="upper right", ncols=4, frameon=False, fontsize=9, borderaxespad=0.1)
-
-
-def _legend_below(axes: Axes) -> None:
-    """Out of the way of what is drawn."""
-    if axes.get_legend_handles_labels()[0]:
-        place = (0.5, -0.14)
-        axes.legend(loc="upper center", bbox_to_anchor=place, ncols=3, frameon=False, fontsize=9)
-
-
-def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
-    """As many points as are seen: least and greatest of each stretch, in the order of time."""
-    if len(times_s) <= POINTS:
-        return times_s, values
-    size = -(-len(times_s) // (POINTS // 2))
-    whole = len(times_s) // size * size
-    rows = values[:whole].reshape(-1, size)
-    both = np.sort(np.stack([rows.argmin(axis=1), rows.argmax(axis=1)], axis=1), axis=1)
-    picked = (both + np.arange(len(rows))[:, None] * size).ravel()
-    return times_s[picked], values[picked]
-
-
-def _line(
-    axes: Axes, times_s: Array, values: Array, colour: str, label: str, **more: float
-) -> None:
-    """Broken where nothing came for a while."""
-    times_s, values = envelope(times_s, values)
-    if len(times_s) > 1:
-        steps_s = np.diff(times_s)
-        holes = np.flatnonzero(steps_s > max(1.0, 5 * float(np.median(steps_s)))) + 1
-        times_s, values = np.insert(times_s, holes, np.nan), np.insert(values, holes, np.nan)
-    axes.plot(times_s, values, color=colour, label=label, **{"linewidth": 1.1, **more})  # type: ignore[arg-type]
-
-
-def _shade(axes: Axes, log: Log) -> None:
-    """E-stop red; whatever is not running in the colour of its state."""
-    for span in log.latched:
-        axes.axvspan(span.begin_s, span.end_s, color=RED, alpha=0.18, linewidth=0)
-    for span in log.states:
-        if span.what not in ("nominal", "imu_only"):
-            colour = STATES.get(span.what, GREY)
-            axes.axvspan(span.begin_s, span.end_s, color=colour, alpha=0.25, linewidth=0)
-
-
-def _time_axis(axes: Axes, log: Log) -> None:
-    axes.set_xlim(0.0, max(log.duration_s, 1e-3))
-    axes.set_xlabel("time in s")
-
-
 def path(log: Log) -> Figure:
     """From above, coloured by time, with the heading; beside it x, y and yaw over time."""
-    figure = _figure(5.2)
+    figure = new_figure(5.2)
     left, right = np.ravel(np.asarray(figure.subfigures(1, 2, width_ratios=(1.2, 1.0))))
     above = left.subplots()
     odom = log.odom.only(log.odom.finite)
     x, y, yaw = odom.values[:, :3].T
     every = max(1, len(odom) // POINTS)
     points = np.stack([x[::every], y[::every]], axis=1)
+    unknown = travel.steps(odom).leap | (np.diff(odom.stamp_s) > HOLE_S)
+    joined = np.diff(np.insert(np.cumsum(unknown), 0, 0)[::every]) == 0
     lines = LineCollection(
-        list(np.stack([points[:-1], points[1:]], axis=1)), cmap="viridis", linewidths=2.5
+        list(np.stack([points[:-1], points[1:]], axis=1)[joined]), cmap="viridis", linewidths=2.5
     )
-    lines.set_array(odom.stamp_s[::every][:-1])
+    lines.set_array(odom.stamp_s[::every][:-1][joined])
     above.add_collection(lines)
     above.set_aspect("equal", adjustable="datalim")
     above.autoscale_view()
@@ -122,36 +69,26 @@ def path(log: Log) -> Figure:
     for row, name, colour in ((0, "begin", Z), (-1, "end", RED)):
         above.plot(x[row], y[row], "o", color=colour, markersize=9, zorder=4, label=name)
     above.margins(0.12)
-    _dress(above, "y in m", "Path in odom; the arrows are headings")
+    dress(above, "y in m", "Path in odom; the arrows are headings")
     above.set_xlabel("x in m")
-    _legend_below(above)
+    legend_below(above)
     left.colorbar(lines, ax=above, shrink=0.8, pad=0.02, label="time in s")
     axes_of = right.subplots(3, 1, sharex=True)
     unwrapped = np.degrees(np.unwrap(yaw))
     for axes, label, values, colour in zip(
         axes_of, ("x in m", "y in m", "yaw in °"), (x, y, unwrapped), (X, Y, Z), strict=True
     ):
-        _line(axes, odom.stamp_s, values, colour, "")
-        _shade(axes, log)
-        _dress(axes, label)
-    _time_axis(axes_of[-1], log)
+        line(axes, odom.stamp_s, values, colour, "")
+        shade(axes, log)
+        dress(axes, label)
+    time_axis(axes_of[-1], log)
     return figure
 
 
 def velocities(log: Log) -> Figure:
     """Measured over commanded, an axis each, for every pair that there is."""
-    found = following.pairs(log)
-    if not found:
-        found = [
-            following.Pair(
-                *("cmd_vel", ("vx", "vy", "yaw rate"), "m/s, rad/s", (1.0, 1.0, 1.0), ("",) * 3),
-                *(
-                    log.cmd_vel,
-                    Series(log.odom.arrived_s, log.odom.stamp_s, log.odom.values[:, 3:]),
-                ),
-            )
-        ]
-    figure = _figure(1.9 * 3 * len(found))
+    found = following.shown(log)
+    figure = new_figure(1.9 * 3 * len(found))
     grid = np.atleast_1d(figure.subplots(3 * len(found), 1, sharex=True))
     for number, pair in enumerate(found):
         times_s = pair.measured.stamp_s
@@ -159,23 +96,22 @@ def velocities(log: Log) -> Figure:
         told = pair.commands.held(edges) if len(pair.commands) else None
         for axis in range(3):
             axes = grid[3 * number + axis]
-            _shade(axes, log)
-            _line(axes, times_s, pair.measured.values[:, axis], (X, Y, Z)[axis], "measured")
+            shade(axes, log)
+            line(axes, times_s, pair.measured.values[:, axis], (X, Y, Z)[axis], "measured")
             if told is not None:
-                _line(axes, edges, told[:, axis], COMMAND, "commanded", linewidth=0.9, alpha=0.8)
-            unit = "rad/s" if "rate" in pair.axes[axis] or "wheel" in pair.axes[axis] else "m/s"
+                line(axes, edges, told[:, axis], COMMAND, "commanded", linewidth=0.9, alpha=0.8)
             title = f"{pair.topic}: commanded and measured" if axis == 0 else ""
-            _dress(axes, f"{pair.axes[axis]} in {unit}", title)
+            dress(axes, f"{pair.axes[axis]} in {pair.units[axis]}", title)
             axes.margins(y=0.25)
             if axis == 0:
-                _legend(axes)
-    _time_axis(grid[-1], log)
+                legend(axes)
+    time_axis(grid[-1], log)
     return figure
 
 
 def inertia(log: Log) -> Figure:
     """Angular velocity and specific force in the sensor's axes; the latter less its medians."""
-    figure = _figure(5.0)
+    figure = new_figure(5.0)
     rows = figure.subplots(2, 1, sharex=True)
     imu = log.imu.only(log.imu.finite)
     middle = np.median(imu.values, axis=0) * ([0.0] * 3 + [1.0] * 3)
@@ -183,21 +119,21 @@ def inertia(log: Log) -> Figure:
         (rows[0], 0, "rad/s", "Angular velocity, in the sensor's axes"),
         (rows[1], 3, "m/s²", "Specific force, less the median"),
     ):
-        _shade(axes, log)
+        shade(axes, log)
         for column, colour in zip(range(first, first + 3), (X, Y, Z), strict=True):
             label = "xyz"[column % 3] + (f" (median {middle[column]:+.2f})" if first else "")
             values = imu.values[:, column] - middle[column]
-            _line(axes, imu.stamp_s, values, colour, label, linewidth=0.8)
-        _dress(axes, unit, title)
+            line(axes, imu.stamp_s, values, colour, label, linewidth=0.8)
+        dress(axes, unit, title)
         axes.margins(y=0.25)
-        _legend(axes)
-    _time_axis(rows[1], log)
+        legend(axes)
+    time_axis(rows[1], log)
     return figure
 
 
 def spectra(log: Log) -> Figure:
     """Amplitude spectral densities at rest and in motion."""
-    figure = _figure(4.2)
+    figure = new_figure(4.2)
     columns = figure.subplots(1, 2)
     imu = log.imu.only(log.imu.finite & np.isfinite(log.imu.stamp_s))
     rest = sensing.at_rest(log, imu)
@@ -215,16 +151,16 @@ def spectra(log: Log) -> Figure:
                 axes.semilogy(
                     found.frequency_hz, density, style, color=colour, linewidth=width, label=name
                 )
-        _dress(axes, unit, title)
+        dress(axes, unit, title)
         axes.set_xlabel("frequency in Hz")
         axes.set_xlim(0.0, sensing.RATE_HZ / 2)
-        _legend_below(axes)
+        legend_below(axes)
     return figure
 
 
 def timing(log: Log) -> Figure:
     """Steps between stamps, delay of arrival over the least, each over time and as a histogram."""
-    figure = _figure(5.6)
+    figure = new_figure(5.6)
     grid = figure.subplots(2, 2, width_ratios=(2.6, 1.0), sharey="row")
     names: list[tuple[str, str]] = []
     told: tuple[list[tuple[Array, Array]], ...] = ([], [])
@@ -240,23 +176,20 @@ def timing(log: Log) -> Figure:
         low = -high if row == 0 else 0.0
         for (name, colour), (times_s, values) in zip(names, told[row], strict=True):
             values = np.clip(values, low, high)
-            shown_s, shown = envelope(times_s, values)
-            grid[row, 0].plot(
-                shown_s, shown, ".", color=colour, markersize=2.5, label=name, alpha=0.7
-            )
+            dots(grid[row, 0], times_s, values, colour, name)
             bins = list(np.linspace(low, high, 61))
             grid[row, 1].hist(
                 values, bins, orientation="horizontal", color=colour, alpha=0.55, density=True
             )
         grid[row, 0].set_ylim(low - 0.04 * (high - low), high + 0.18 * (high - low))
-    _dress(grid[0, 0], "ms", "Step between stamps, less the usual one")
-    _dress(grid[1, 0], "ms", "Arrival after the stamp, over the least delay")
+    dress(grid[0, 0], "ms", "Step between stamps, less the usual one")
+    dress(grid[1, 0], "ms", "Arrival after the stamp, over the least delay")
     for axes in grid[:, 1]:
-        _dress(axes, "", "Distribution")
+        dress(axes, "", "Distribution")
         axes.set_xticks([])
     for axes in grid[:, 0]:
-        _shade(axes, log)
-        _time_axis(axes, log)
+        shade(axes, log)
+        time_axis(axes, log)
         axes.legend(loc="upper right", frameon=False, fontsize=9, markerscale=4, ncols=2)
     return figure
 
@@ -270,7 +203,7 @@ def timeline(log: Log) -> Figure:
     ]
     names = list(dict.fromkeys((status.hardware_id, status.name) for status in log.diagnostics))
     rows = 4 + len(gaps) + len(names)
-    figure = _figure(0.8 + 0.3 * rows)
+    figure = new_figure(0.8 + 0.3 * rows)
     axes = figure.subplots()
     labels: list[str] = []
 
@@ -303,9 +236,9 @@ def timeline(log: Log) -> Figure:
     axes.set_yticks(range(len(labels)), labels)
     axes.set_ylim(len(labels) - 0.4, -0.6)
     axes.yaxis.set_tick_params(length=0)
-    _dress(axes, "", "State, stops, commands, gaps and /diagnostics")
+    dress(axes, "", "State, stops, commands, gaps and /diagnostics")
     axes.xaxis.set_major_locator(MaxNLocator(10))
-    _time_axis(axes, log)
+    time_axis(axes, log)
     return figure
 
 

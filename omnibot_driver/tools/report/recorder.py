@@ -86,9 +86,9 @@ class _Column:
     def hear(self, kind: str, arrived_ns: int, message: Any) -> None:
         header = getattr(message, "header", None)
         stamp_ns = header.stamp.sec * 10**9 + header.stamp.nanosec if header else 0
+        self.values.extend(self.role.read[kind](message))
         self.arrived_ns.append(arrived_ns)
         self.stamp_ns.append(stamp_ns or NO_STAMP)
-        self.values.extend(self.role.read[kind](message))
 
     def series(self, start_ns: int) -> Series:
         arrived_ns, stamp_ns = (
@@ -120,13 +120,14 @@ class Recorder:
         self.count += 1
 
     def log(self, troubles: tuple[str, ...] = (), *, alone: bool = True) -> Log:
-        """All of it. There must have been a message."""
+        """All of it in the order of arrival. There must have been a message."""
         times = [
-            *(time for column in self._columns.values() for time in column.arrived_ns[:1]),
-            *(time for column in self._columns.values() for time in column.arrived_ns[-1:]),
+            *(time for column in self._columns.values() for time in column.arrived_ns),
             *(time for events in self._events.values() for time, _ in events),
         ]
         start_ns, end_s = min(times), (max(times) - min(times)) / 1e9
+        for events in self._events.values():
+            events.sort(key=lambda event: event[0])
         series = {name: column.series(start_ns) for name, column in self._columns.items()}
         absent = tuple(name for name in SERIES if not len(series[name]))
         return Log(
@@ -153,7 +154,7 @@ class Recorder:
     ) -> tuple[Span, ...]:
         """Equal ones after each other are one."""
         spans: list[Span] = []
-        for arrived_ns, value in sorted(self._events[role], key=lambda event: event[0]):
+        for arrived_ns, value in self._events[role]:
             at_s, what = (arrived_ns - start_ns) / 1e9, name(value)
             if spans and spans[-1].what == what:
                 continue

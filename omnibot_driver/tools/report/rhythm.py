@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnibot_driver.tools.report.findings import Finding, Level, counted, span
-from omnibot_driver.tools.report.log import Array, Log, Series
+from omnibot_driver.tools.report.log import Array, Log, Series, Span
 
 GAP: Final = 1.5
 """Periods between two stamps from which on something is missing."""
@@ -84,19 +84,30 @@ def measure(log: Log, series: Series, stream: Stream) -> Rhythm:
         not log.interrupted(at_s[row], at_s[row] + steps_s[row], stream.running) for row in wide
     ]
     true = (missing >= 1.0) & np.array(told, dtype=bool)
-    gaps = wide[true]
+    gap_at_s, gap_s, missing = at_s[wide[true]], steps_s[wide[true]], missing[true]
+    if len(stamped) and (ended := _ended(log, stamped, stream)) is not None:
+        gap_at_s, gap_s = np.append(gap_at_s, ended.begin_s), np.append(gap_s, ended.length_s)
+        missing = np.append(missing, np.rint(ended.length_s / period_s))
     return Rhythm(
         at_s=at_s,
         steps_s=steps_s,
         period_s=period_s,
-        gap_at_s=at_s[gaps],
-        gap_s=steps_s[gaps],
-        missing=missing[true],
+        gap_at_s=gap_at_s,
+        gap_s=gap_s,
+        missing=missing,
         leap_at_s=at_s[leaps],
         leap_s=steps_s[leaps],
         arrived_s=stamped.arrived_s,
         late_s=stamped.arrived_s - stamped.stamp_s,
     )
+
+
+def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
+    """From the last message to the end of the log, where more should have come."""
+    rest = Span(float(stamped.arrived_s[-1]), log.duration_s, "")
+    if rest.length_s < LONG_GAP_S or log.interrupted(rest.begin_s, rest.end_s, stream.running):
+        return None
+    return rest
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:

@@ -12,7 +12,7 @@ from scipy import signal
 
 from omnibot_driver.tools.report.findings import Finding, Level, counted
 from omnibot_driver.tools.report.log import Array, Log, Mask, Series
-from omnibot_driver.tools.report.travel import moving, steps
+from omnibot_driver.tools.report.travel import SHORT_GAP_S, moving, steps
 
 GRAVITY_MPS2: Final = 9.80665
 SLIGHT_ERROR: Final = 0.03
@@ -25,10 +25,14 @@ LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
 STILL_GYRO_RADPS: Final = 0.01
 STILL_FORCE_MPS2: Final = 0.3
+TURNING_RADPS: Final = 0.1
+"""An even turn without odometry: it might be a bias, but a rare one."""
 LARGEST_BIAS_RADPS: Final = 0.01
 LARGEST_TILT_DEG: Final = 5.0
 LEAST_TURN_RAD: Final = 1.5
 TURN_TOLERANCE: Final = 0.05
+MOSTLY: Final = 0.9
+"""Of a step of the odometry the gyro must have been heard."""
 STRONG_VIBRATION_MPS2: Final = 3.0
 VIBRATION_HZ: Final = 5.0
 """Below, it is driving that shows."""
@@ -39,16 +43,24 @@ RATE_HZ: Final = 100.0
 def at_rest(log: Log, imu: Series) -> Mask:
     """By the wheels; where there are none, by the IMU itself, second by second."""
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
-    if len(odom):
-        edges = odom.stamp_s[moving(odom)]
+    if len(odom) > 1:
+        unheard = np.diff(odom.stamp_s) > SHORT_GAP_S
+        restless = moving(odom)
+        restless[1:] |= unheard
+        restless[:-1] |= unheard
+        edges = odom.stamp_s[restless]
         after = np.append(edges, np.inf)[np.searchsorted(edges, imu.stamp_s)]
         before = np.insert(edges, 0, -np.inf)[np.searchsorted(edges, imu.stamp_s)]
         known = (imu.stamp_s > odom.stamp_s[0]) & (imu.stamp_s < odom.stamp_s[-1])
+        step = np.searchsorted(odom.stamp_s, imu.stamp_s) - 1
+        known &= ~unheard[np.clip(step, 0, len(unheard) - 1)]
         return np.asarray(known & (after - imu.stamp_s > REST_S) & (imu.stamp_s - before > REST_S))
     rest = np.zeros(len(imu), dtype=bool)
     whole = len(imu) // BLOCK * BLOCK
-    spread = imu.values[:whole].reshape(-1, BLOCK, 6).std(axis=1)
-    still = (spread[:, :3] < STILL_GYRO_RADPS).all(axis=1)
+    blocks = imu.values[:whole].reshape(-1, BLOCK, 6)
+    spread = blocks.std(axis=1)
+    still = (np.abs(blocks.mean(axis=1)[:, :3]) < TURNING_RADPS).all(axis=1)
+    still &= (spread[:, :3] < STILL_GYRO_RADPS).all(axis=1)
     still &= (spread[:, 3:] < STILL_FORCE_MPS2).all(axis=1)
     rest[:whole] = np.repeat(still, BLOCK)
     return rest
@@ -175,15 +187,20 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 
 
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
-    """Gyro z over the yaw of the odometry: the ratio, and how much was turned in all, in rad."""
+    """Gyro z over the yaw of the odometry where both were heard: their ratio, and rad in all."""
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:
         return None
     rate = imu.values[:, 2] - (imu.values[rest, 2].mean() if rest.any() else 0.0)
-    steps_s = np.clip(np.diff(imu.stamp_s, prepend=imu.stamp_s[0]), 0.0, 0.1)
-    angle = np.interp(odom.stamp_s, imu.stamp_s, np.cumsum(rate * steps_s))
-    by_wheels = steps(odom).turned_rad
-    by_gyro = np.diff(angle)
+    steps_s = np.diff(imu.stamp_s, prepend=imu.stamp_s[0])
+    heard_s = np.where(steps_s < SHORT_GAP_S, steps_s, 0.0)
+    angle, heard = (
+        np.diff(np.interp(odom.stamp_s, imu.stamp_s, np.cumsum(column)))
+        for column in (rate * heard_s, heard_s)
+    )
+    between_s = np.diff(odom.stamp_s)
+    known = (between_s < SHORT_GAP_S) & (heard > MOSTLY * between_s)
+    by_wheels, by_gyro = steps(odom).turned_rad[known], angle[known]
     total = float(np.abs(by_wheels).sum())
     square = float((by_wheels**2).sum())
     return (float((by_wheels * by_gyro).sum()) / square, total) if square else None

@@ -1,0 +1,61 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the firmware makes of its encoders (manual, Odometry equation).
+
+Knows counts, the geometry as the firmware believes it, and the words of the 25 Hz frame. Must not
+know modes, time, or where the robot truly is.
+
+A 25 Hz difference is that of the unrounded positions at two transmissions, rounded each time by
+itself: rounding errors add up, as they do for anybody who sums what a board of this kind sends.
+"""
+
+from omnibot_driver.simulator.chassis import PlanarPose, body_from_rims
+from omnibot_driver.simulator.settings import BoardPose, BoardSettings
+from omnibot_driver.simulator.wire import Triple
+
+
+class Odometry:
+    """The board's own pose in its earth frame, and what has not been sent of it."""
+
+    _body_unsent: tuple[float, float, float]
+    _counts_unsent: Triple
+
+    def __init__(self, settings: BoardSettings, pose: BoardPose) -> None:
+        self.pose = PlanarPose(pose.x_mm / 1000, pose.y_mm / 1000, pose.theta_mrad / 1000)
+        self._settings = settings
+        self._begin_difference()
+
+    def integrate(self, counts: Triple) -> None:
+        """Take what the encoders of wheels A, B, C counted in one control tick."""
+        settings = self._settings
+        a_m, b_m, c_m = (n * settings.rim_m_per_count for n in counts)
+        moved = body_from_rims((a_m, b_m, c_m), settings.base_radius_m)
+        dx, dy, dyaw = (sign * way for sign, way in zip(settings.axis_signs, moved, strict=True))
+        self.pose = self.pose.moved(dx, dy, dyaw)
+        x, y, yaw = self._body_unsent
+        self._body_unsent = (x + dx, y + dy, yaw + dyaw)
+        a, b, c = self._counts_unsent
+        self._counts_unsent = (a + counts[0], b + counts[1], c + counts[2])
+
+    def difference(self) -> Triple:
+        """The words of the 25 Hz frame; the next ones are counted from here."""
+        words = self._counts_unsent
+        if self._settings.frame == "body":
+            words = _tenths(self._body_unsent)
+        elif self._settings.frame == "earth":
+            x, y, yaw = self.pose
+            sent_x, sent_y, sent_yaw = self._pose_sent
+            words = _tenths((x - sent_x, y - sent_y, yaw - sent_yaw))
+        self._begin_difference()
+        return words
+
+    def _begin_difference(self) -> None:
+        self._pose_sent = self.pose
+        self._body_unsent = (0.0, 0.0, 0.0)
+        self._counts_unsent = (0, 0, 0)
+
+
+def _tenths(moved: tuple[float, float, float]) -> Triple:
+    """Tenths of a millimetre and of a milliradian, as far as a word goes."""
+    x, y, yaw = (max(-32768, min(32767, round(value * 10_000))) for value in moved)
+    return x, y, yaw

@@ -1,0 +1,35 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the wheels are told (manual, Control equation), in encoder counts per control tick.
+
+Knows scales, signs and the kinematics. Must not know modes, nor when a wheel is told.
+"""
+
+from omnibot_driver.simulator.chassis import Wheels, rims_from_body
+from omnibot_driver.simulator.motors import TICK_S
+from omnibot_driver.simulator.settings import BoardSettings
+from omnibot_driver.simulator.wire import Triple
+
+
+def from_wheel_words(values: Triple, settings: BoardSettings) -> Wheels:
+    """The words of a control frame of mode 2: v_A, v_B, v_C."""
+    a, b, c = (value / settings.linear_scale for value in values)
+    return _counts_per_tick((a, b, c), settings)
+
+
+def from_velocity_words(values: Triple, settings: BoardSettings) -> Wheels:
+    """The words of a control frame of mode 1, with the switch on velocity: Vx, Vy, Omega."""
+    x, y, omega = values
+    linear, angular = settings.linear_scale, settings.angular_scale
+    return from_twist((x / linear, y / linear, omega / angular), settings)
+
+
+def from_twist(twist: tuple[float, float, float], settings: BoardSettings) -> Wheels:
+    """Velocities in m/s and rad/s along the axes that the board believes in."""
+    x, y, yaw = (sign * speed for sign, speed in zip(settings.axis_signs, twist, strict=True))
+    return _counts_per_tick(rims_from_body(x, y, yaw, settings.base_radius_m), settings)
+
+
+def _counts_per_tick(rims_mps: Wheels, settings: BoardSettings) -> Wheels:
+    a, b, c = (speed * TICK_S / settings.rim_m_per_count for speed in rims_mps)
+    return a, b, c

@@ -1,0 +1,126 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a calibration hears of the robot, and whether that is as it should be. Commands nothing."""
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from nav_msgs.msg import Odometry
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Bool, String
+
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.tools.calibrate.client import FOUND_WITHIN_S, Client
+from omnibot_driver.tools.calibrate.interruption import Interruption
+from omnibot_driver.tools.calibrate.log import Log
+from omnibot_driver.tools.calibrate.motion import HALT
+from omnibot_driver.tools.needs import ToolError
+
+IMU, ODOMETRY = TOPICS = "imu/data_raw", "odom"
+LOST_S: Final = 0.3
+"""A robot that is not heard for so long is driven no further."""
+AT_ONCE: Final = 100
+"""Messages that may wait to be read."""
+LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Listener(Client):
+    """``log`` is of the motion or rest that is under way, or was last."""
+
+    def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
+        super().__init__(node, context, interruption)
+        self.log = Log()
+        self._states: list[str] = []
+        self._estop = False
+        self._heard_s = dict.fromkeys(TOPICS, -math.inf)
+        self._pose, self._twist = Pose(), HALT
+        self._wheel_rates = HALT
+        node.create_subscription(Imu, IMU, self._on_imu, 50)
+        node.create_subscription(Odometry, ODOMETRY, self._on_odometry, 50)
+        node.create_subscription(JointState, "joint_states", self._on_wheels, 50)
+        node.create_subscription(String, f"{self.driver}/state", self._on_state, LATCHED)
+        node.create_subscription(Bool, f"{self.driver}/estop_active", self._on_estop, LATCHED)
+        if not self._wait(lambda: self._states and self._heard_s[IMU] > 0, FOUND_WITHIN_S):
+            state = self._states[-1] if self._states else "unknown"
+            raise ToolError(
+                f"{self.driver} sends no {IMU} (state: {state}): see what it logs, and"
+                " docs/troubleshooting.md"
+            )
+
+    def _on_imu(self, message: Imu) -> None:
+        self._heard_s[IMU] = time.monotonic()
+        force, rate = message.linear_acceleration, message.angular_velocity
+        self.log.imu_rows.append(
+            (_seconds(message), force.x, force.y, force.z, rate.x, rate.y, rate.z)
+        )
+
+    def _on_odometry(self, message: Odometry) -> None:
+        self._heard_s[ODOMETRY] = time.monotonic()
+        position, turn = message.pose.pose.position, message.pose.pose.orientation
+        twist = message.twist.twist
+        yaw_rad = 2 * math.atan2(turn.z, turn.w)
+        yaw_rad = self._pose.yaw_rad + math.remainder(yaw_rad - self._pose.yaw_rad, math.tau)
+        self._pose = Pose(position.x, position.y, yaw_rad)
+        self._twist = (twist.linear.x, twist.linear.y, twist.angular.z)
+        self.log.odometry_rows.append(
+            (_seconds(message), position.x, position.y, yaw_rad, *self._twist)
+        )
+
+    def _on_wheels(self, message: JointState) -> None:
+        rates = tuple(message.velocity) if len(message.velocity) == 3 else (math.nan,) * 3
+        if not math.isnan(rates[0]):
+            self._wheel_rates = rates
+        self.log.wheel_rows.append((_seconds(message), *message.position, *rates))
+
+    def _on_state(self, message: String) -> None:
+        self._states.append(message.data)
+
+    def _on_estop(self, message: Bool) -> None:
+        self._estop = message.data
+
+    def _begin(self, states: Sequence[str]) -> None:
+        """Hear the robot anew: while a person was asked, nothing was heard."""
+        self._require_alone()
+        self._heard_s = dict.fromkeys(TOPICS, -math.inf)
+        self._wait(lambda: min(self._heard_s.values()) > 0, 1.0)
+        del self._states[:-1]
+        self._require_sound(states)
+        self.log = Log()
+
+    def _require_sound(self, states: Sequence[str] = ("nominal",)) -> None:
+        if self._estop:
+            raise ToolError("the e-stop is latched: release it with ~/estop, then begin again")
+        for state in self._states:
+            if state not in states:
+                raise ToolError(
+                    f"the driver's state is or was {state}, not {' or '.join(states)}: see what it"
+                    " logs; ~/start starts a paused board"
+                )
+        if lost := self._lost():
+            raise ToolError(
+                f"nothing came on {' and '.join(lost)} for {LOST_S:g} s: is the driver still there,"
+                " the computer too busy, the network too slow?"
+            )
+
+    def _lost(self) -> list[str]:
+        """Topics that are silent; what waits to be read is read first, for we may be slow."""
+        wanted = (IMU,) if self._states[-1] == "imu_only" else TOPICS
+        if silent(self._heard_s, wanted, time.monotonic()):
+            for _ in range(AT_ONCE):
+                self._executor.spin_once(timeout_sec=0.0)
+        return silent(self._heard_s, wanted, time.monotonic())
+
+
+def silent(heard_s: Mapping[str, float], wanted: Sequence[str], now_s: float) -> list[str]:
+    """Which of the wanted topics were heard too long ago."""
+    return [topic for topic in wanted if now_s - heard_s[topic] > LOST_S]
+
+
+def _seconds(message: Any) -> float:
+    stamp = message.header.stamp
+    return float(stamp.sec + stamp.nanosec * 1e-9)

@@ -1,0 +1,108 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The simulated MPU6050: gravity, motion, bias, noise, range."""
+
+import struct
+from math import degrees
+
+import pytest
+from board_talk import (
+    IMU,
+    RUNNING,
+    run,
+    sent,
+    velocity,
+    wheels,
+)
+
+from omnibot_driver.simulator import (
+    BoardSettings,
+    SimulatedBoard,
+)
+
+
+def readings(board: SimulatedBoard, seconds: float) -> list[tuple[float, ...]]:
+    """IMU readings in g and degrees per second, taken while the time passes."""
+    board.sent.clear()
+    run(board, seconds)
+    raw = [struct.unpack(">6h", frame[2:]) for frame in sent(board, IMU)]
+    return [(*(a / 16384 for a in one[:3]), *(w / 131 for w in one[3:])) for one in raw]
+
+
+def mean(values: list[tuple[float, ...]]) -> tuple[float, ...]:
+    """The mean of each column."""
+    return tuple(sum(column) / len(values) for column in zip(*values, strict=True))
+
+
+def rms(values: list[tuple[float, ...]]) -> tuple[float, ...]:
+    """The deviation of each column from its mean."""
+    means = mean(values)
+    return tuple(
+        (sum((value - middle) ** 2 for value in column) / len(values)) ** 0.5
+        for column, middle in zip(zip(*values, strict=True), means, strict=True)
+    )
+
+
+def test_at_rest_the_upside_down_sensor_feels_minus_one_g() -> None:
+    """Gravity stands on -z of the sensor; bias and noise are those of the settings."""
+    board = SimulatedBoard(BoardSettings(running=True, gyro_bias_dps=(1.0, -2.0, 3.0)))
+    values = readings(board, 20.0)
+    assert mean(values) == pytest.approx((0.0, 0.0, -1.0, 1.0, -2.0, 3.0), abs=0.005)
+    assert rms(values)[:3] == pytest.approx([0.0028] * 3, rel=0.1)
+    assert rms(values)[3:] == pytest.approx([0.05] * 3, rel=0.1)
+
+
+def test_the_gyro_at_rest_reads_like_frame_headers_by_default() -> None:
+    """The mean raw counts are -6, -5 and -4."""
+    values = mean(readings(SimulatedBoard(RUNNING), 20.0))
+    assert [rate * 131 for rate in values[3:]] == pytest.approx([-6, -5, -4], abs=0.5)
+
+
+def test_turning_left_is_negative_on_the_upside_down_gyro() -> None:
+    """A yaw rate of 0.5 rad/s reads -0.5 on z."""
+    board = SimulatedBoard(BoardSettings(running=True, gyro_bias_dps=(0.0, 0.0, 0.0)))
+    board.receive(velocity(0, 0, 250))
+    run(board, 2.0)
+    *_, rate_z = mean(readings(board, 2.0))
+    assert rate_z == pytest.approx(-degrees(0.5), rel=0.01)
+
+
+def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
+    """Accelerations while speeding up add to the speed, along x as it is and along y reversed."""
+    board = SimulatedBoard(BoardSettings(running=True, accel_noise_g=0.0))
+    board.receive(velocity(14, 28, 0))
+    values = readings(board, 1.0)
+    gained_mps = [sum(column) * 9.80665 * 0.01 for column in zip(*values, strict=True)]
+    assert gained_mps[:2] == pytest.approx((0.2, -0.4), abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "felt_mps2"), [(35, 0, (0.0, -0.5)), (0, 35, (-0.5, 0.0))], ids=["ahead", "left"]
+)
+def test_a_curve_is_felt_as_centripetal_acceleration(
+    x: int, y: int, felt_mps2: tuple[float, float]
+) -> None:
+    """Turning left at 1 rad/s presses 0.5 m/s² to the left of the motion, y reversed."""
+    board = SimulatedBoard(RUNNING)
+    board.receive(velocity(x, y, 500))
+    run(board, 2.0)
+    values = mean(readings(board, 5.0))
+    assert values[:2] == pytest.approx([felt / 9.80665 for felt in felt_mps2], abs=0.002)
+
+
+def test_readings_saturate_at_the_range_of_the_sensor() -> None:
+    """Beyond 250 degrees per second the gyro stays at the end of its int16."""
+    board = SimulatedBoard(RUNNING)
+    board.receive(wheels(60, 60, 60))
+    run(board, 1.0)
+    assert readings(board, 0.1)[0][5] == 32767 / 131
+
+
+def test_a_stuck_gyro_reads_its_counts_whatever_the_motion() -> None:
+    """All three words stay, while the accelerometer goes on."""
+    board = SimulatedBoard(BoardSettings(running=True, gyro_stuck=(-6, -5, -4)))
+    board.receive(velocity(0, 0, 250))
+    run(board, 1.0)
+    frames = sent(board, IMU)
+    assert {frame[8:] for frame in frames} == {bytes.fromhex("FF FA FF FB FF FC")}
+    assert len({frame[:8] for frame in frames}) > 50

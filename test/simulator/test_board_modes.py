@@ -1,0 +1,188 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The manual's state machine: booting, paused, nominal, IMU only; what is heard in each."""
+
+import pytest
+from board_talk import (
+    ESTOP,
+    IMU,
+    RUNNING,
+    STOP,
+    WAKE_UP,
+    booted,
+    deltas,
+    mode_of,
+    poses,
+    run,
+    velocity,
+    wheels,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from omnibot_driver.simulator import (
+    BoardMode,
+    BoardPose,
+    BoardSettings,
+    ReceivedCommand,
+    SimulatedBoard,
+)
+
+
+def test_a_booting_board_is_dead_and_then_says_that_it_is_paused() -> None:
+    """Nothing is sent and nothing is heard before the boot is over; then a text comes at once."""
+    board = SimulatedBoard(BoardSettings(boot_time_s=0.3))
+    board.receive(WAKE_UP + b"S")
+    assert run(board, 0.29) == b""
+    assert mode_of(board) is BoardMode.BOOTING
+    assert board.step() == b"Paused: 0 \n"
+    assert mode_of(board) is BoardMode.PAUSED
+
+
+def test_a_paused_board_counts_once_a_second() -> None:
+    """The number is a uint8 that ascends from zero and wraps."""
+    board = booted(BoardSettings())
+    assert run(board, 2.0) == b"Paused: 1 \nPaused: 2 \n"
+    assert run(board, 254.0).endswith(b"Paused: 255 \nPaused: 0 \n")
+
+
+def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
+    """The first S after the boot is lost when fewer than three bytes went before."""
+    board = booted(BoardSettings())
+    board.receive(b"SSS")
+    assert mode_of(board) is BoardMode.PAUSED
+    board.receive(b"S")
+    assert mode_of(board) is BoardMode.NOMINAL
+
+
+def test_p_pauses_and_unpauses() -> None:
+    """The same letter toggles, and each pause begins with a text."""
+    board = SimulatedBoard(RUNNING)
+    board.receive(b"P")
+    assert mode_of(board) is BoardMode.PAUSED
+    assert board.step() == b"Paused: 0 \n"
+    board.receive(b"P")
+    assert mode_of(board) is BoardMode.NOMINAL
+    assert board.step().startswith(IMU)
+
+
+def test_s_starts_a_paused_board_and_leaves_a_running_one_alone() -> None:
+    """Start is idempotent, and a motion goes on through it."""
+    board = booted(BoardSettings())
+    board.receive(WAKE_UP + b"SS" + velocity(35, 0, 0))
+    run(board, 1.0)
+    board.receive(b"S")
+    run(board, 1.0)
+    assert mode_of(board) is BoardMode.NOMINAL
+    assert board.truth.vx_mps == pytest.approx(0.5, rel=0.02)
+
+
+def test_r_reboots_the_board_but_not_the_robot() -> None:
+    """Odometry, SEQ and the wake-up start afresh; the true pose stays."""
+    board = SimulatedBoard(RUNNING)
+    board.receive(velocity(35, 0, 0))
+    run(board, 2.0)
+    board.receive(b"R" + velocity(35, 0, 0))
+    assert mode_of(board) is BoardMode.BOOTING
+    run(board, 1.0)
+    at_rest = board.truth
+    assert at_rest.x_m > 0.9
+    assert at_rest.vx_mps == 0.0
+    assert board.odometry == BoardPose(0.0, 0.0, 0.0)
+    board.sent.clear()
+    board.receive(WAKE_UP + b"S")
+    run(board, 0.2)
+    assert [seq for *_, seq in deltas(board)] == [0, 1, 2, 3, 4]
+    assert poses(board) == [(0.0, 0.0, 0.0, 0)]
+    assert board.truth == at_rest
+
+
+def test_a_power_cycle_does_what_r_does() -> None:
+    """`reboot` and the letter end in the same state."""
+    by_letter, by_power = SimulatedBoard(RUNNING), SimulatedBoard(RUNNING)
+    by_letter.receive(b"R")
+    by_power.reboot()
+    assert run(by_letter, 3.0) == run(by_power, 3.0)
+    assert mode_of(by_letter) is mode_of(by_power) is BoardMode.PAUSED
+
+
+def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
+    """A 0x52 within a command resets a paused board, a 0x50 sets it running."""
+    board = booted(BoardSettings())
+    board.receive(WAKE_UP + velocity(0x52, 0, 0))
+    assert mode_of(board) is BoardMode.BOOTING
+    run(board, 1.0)
+    board.receive(WAKE_UP + velocity(0, 0x50, 0))
+    assert mode_of(board) is BoardMode.NOMINAL
+    run(board, 1.0)
+    assert board.truth.vy_mps == 0.0
+
+
+def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
+    """The frame that wakes the board can reset it, too."""
+    board = booted(BoardSettings())
+    board.receive(velocity(0x52, 0, 0))
+    assert [command.kind for command in board.commands] == ["reset"]
+    assert mode_of(board) is BoardMode.BOOTING
+
+
+def test_a_running_board_takes_no_letters_out_of_frames() -> None:
+    """Within a control frame 0x50, 0x52 and 0x53 are numbers."""
+    board = SimulatedBoard(RUNNING)
+    board.receive(wheels(0x50, 0x52, 0x53))
+    assert list(board.commands) == [ReceivedCommand(0, "wheels", (0x50, 0x52, 0x53))]
+    assert mode_of(board) is BoardMode.NOMINAL
+
+
+def test_an_unknown_control_mode_is_ignored() -> None:
+    """Its frame is taken whole and changes nothing."""
+    board = SimulatedBoard(RUNNING)
+    board.receive(bytes.fromhex("FF FE 03 00 50 00 50 00 50"))
+    assert not board.commands
+    assert mode_of(board) is BoardMode.NOMINAL
+
+
+def test_what_was_received_and_obeyed_is_on_record() -> None:
+    """Bytes in full, commands with tick, kind and values."""
+    board = SimulatedBoard(RUNNING)
+    run(board, 0.05)
+    data = velocity(1, -2, 3) + b"x" + STOP
+    board.receive(data)
+    assert board.received == data
+    assert list(board.commands) == [
+        ReceivedCommand(5, "velocity", (1, -2, 3)),
+        ReceivedCommand(5, "wheels", (0, 0, 0)),
+    ]
+
+
+def test_the_record_of_received_bytes_is_bounded() -> None:
+    """Of very much input the newest is kept."""
+    board = SimulatedBoard(RUNNING)
+    for _ in range(30):
+        board.receive(bytes(100_000))
+    board.receive(b"end")
+    assert len(board.received) < 1_100_000
+    assert board.received.endswith(b"end")
+
+
+command_bytes = st.lists(
+    st.one_of(
+        st.sampled_from([b"S", b"P", b"R", STOP, ESTOP, velocity(0x50, 0x52, 0x53)]),
+        st.binary(max_size=12),
+    ),
+    max_size=12,
+).map(b"".join)
+
+
+@given(command_bytes, st.data())
+@settings(max_examples=60)
+def test_the_chunking_of_the_input_does_not_matter(stream: bytes, data: st.DataObject) -> None:
+    """The same bytes within one tick, however cut, are obeyed alike and answered alike."""
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=10)))
+    whole, cut = SimulatedBoard(RUNNING), SimulatedBoard(RUNNING)
+    whole.receive(stream)
+    for start, end in zip([0, *cuts], [*cuts, len(stream)], strict=True):
+        cut.receive(stream[start:end])
+    assert cut.commands == whole.commands
+    assert cut.mode is whole.mode
+    assert run(cut, 0.5) == run(whole, 0.5)

@@ -1,0 +1,200 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a running board sends, when, and what its odometry makes of the encoders."""
+
+from math import hypot, pi
+from random import Random
+
+import pytest
+from board_talk import (
+    DELTA,
+    IMU,
+    POSE,
+    RUNNING,
+    STOP,
+    WAKE_UP,
+    booted,
+    deltas,
+    mode_of,
+    poses,
+    run,
+    sent,
+    velocity,
+    wheels,
+)
+
+from omnibot_driver.simulator import BoardMode, BoardPose, BoardSettings, SimulatedBoard, TruePose
+
+
+def test_a_nominal_board_sends_at_100_25_and_5_hz() -> None:
+    """Ten seconds hold 1000 IMU frames, 250 deltas and 50 poses, and nothing else."""
+    board = SimulatedBoard(RUNNING)
+    data = run(board, 10.0)
+    counts = [len(sent(board, header)) for header in (IMU, DELTA, POSE)]
+    assert counts == [1000, 250, 50]
+    assert len(data) == 1000 * 14 + 250 * 9 + 50 * 15
+
+
+def test_an_imu_only_board_sends_imu_frames_alone_and_obeys_motion() -> None:
+    """The third mode of the manual listens like the second."""
+    board = booted(BoardSettings(imu_only=True))
+    board.receive(WAKE_UP + b"S" + velocity(35, 0, 0))
+    data = run(board, 2.0)
+    assert mode_of(board) is BoardMode.IMU_ONLY
+    assert len(data) == 200 * 14
+    assert board.truth.vx_mps == pytest.approx(0.5, abs=0.005)
+
+
+def test_within_a_tick_the_order_is_imu_delta_pose() -> None:
+    """The twentieth tick carries all three."""
+    board = SimulatedBoard(RUNNING)
+    run(board, 0.19)
+    tick = board.step()
+    assert len(tick) == 14 + 9 + 15
+    assert (tick[:2], tick[14:16], tick[23:25]) == (IMU, DELTA, POSE)
+
+
+def test_the_record_of_what_was_sent_is_what_was_sent() -> None:
+    """Its frames in order are the bytes that left the board."""
+    board = SimulatedBoard(BoardSettings())
+    first = run(board, 1.0)
+    board.receive(WAKE_UP + b"S")
+    assert first + run(board, 1.0) == b"".join(frame.data for frame in board.sent)
+
+
+def test_both_sequences_count_by_themselves_and_wrap() -> None:
+    """Each SEQ is its own uint8, from zero."""
+    board = SimulatedBoard(RUNNING)
+    run(board, 52.0)
+    assert [seq for *_, seq in deltas(board)] == [n % 256 for n in range(1300)]
+    assert [seq for *_, seq in poses(board)] == [n % 256 for n in range(260)]
+
+
+def test_a_sequence_goes_on_after_a_pause() -> None:
+    """Only a reboot sets SEQ to zero, and motion while paused is in the next delta."""
+    board = SimulatedBoard(RUNNING)
+    board.receive(velocity(35, 0, 0))
+    run(board, 2.0)
+    board.receive(b"P")
+    run(board, 1.0)
+    board.receive(b"P")
+    run(board, 0.2)
+    assert [seq for *_, seq in deltas(board)] == list(range(55))
+    assert deltas(board)[50][0] > 200
+    assert sum(dx for dx, *_ in deltas(board)) == pytest.approx(
+        10 * board.odometry.x_mm, abs=0.5 * 55
+    )
+
+
+def drive_square(board: SimulatedBoard) -> None:
+    """Four sides of a metre, two of them sideways, turned by 90 degrees half way."""
+    legs = [velocity(35, 0, 0), velocity(0, 35, 0)] * 2
+    for leg, command in enumerate(legs):
+        board.receive(command)
+        run(board, 2.0)
+        board.receive(STOP)
+        run(board, 1.0)
+        if leg == 1:
+            board.receive(velocity(0, 0, 250))
+            run(board, pi)
+            board.receive(STOP)
+            run(board, 1.0)
+
+
+def test_the_odometry_is_the_truth_but_for_quantisation() -> None:
+    """Without slip and scale errors the two agree after four metres to a millimetre."""
+    board = SimulatedBoard(RUNNING)
+    drive_square(board)
+    truth, odometry = board.truth, board.odometry
+    assert truth.yaw_rad == pytest.approx(pi / 2, abs=0.01)
+    assert hypot(truth.x_m, truth.y_m) > 1.9
+    assert odometry.x_mm == pytest.approx(1000 * truth.x_m, abs=1.0)
+    assert odometry.y_mm == pytest.approx(1000 * truth.y_m, abs=1.0)
+    assert odometry.theta_mrad == pytest.approx(1000 * truth.yaw_rad, abs=1.0)
+
+
+def test_slip_and_scale_errors_part_the_odometry_from_the_truth() -> None:
+    """The board believes in its wheels, the truth does not."""
+    board = SimulatedBoard(
+        BoardSettings(running=True, slip=0.05, wheel_radius_scale=(1.0, 1.01, 1.0))
+    )
+    drive_square(board)
+    apart_mm = hypot(
+        board.odometry.x_mm - 1000 * board.truth.x_m, board.odometry.y_mm - 1000 * board.truth.y_m
+    )
+    assert apart_mm > 20
+
+
+def test_earth_frame_deltas_add_up_to_the_pose() -> None:
+    """Summed unrotated, they are the board's own pose to half an LSB for each."""
+    board = SimulatedBoard(RUNNING)
+    drive_square(board)
+    run(board, 0.2 - 0.01 * (board.tick % 20))
+    received = deltas(board)
+    x_mm, y_mm, theta_mrad, _ = poses(board)[-1]
+    bound = 0.5 * len(received)
+    assert sum(dx for dx, *_ in received) == pytest.approx(10 * x_mm, abs=bound)
+    assert sum(dy for _, dy, *_ in received) == pytest.approx(10 * y_mm, abs=bound)
+    assert sum(dth for *_, dth, _ in received) == pytest.approx(10 * theta_mrad, abs=bound)
+
+
+@pytest.mark.parametrize(
+    ("frame", "expected"), [("earth", (0, 200, 0)), ("body", (200, 0, 0))], ids=["earth", "body"]
+)
+def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
+    frame: str, expected: tuple[int, int, int]
+) -> None:
+    """Driving forward at 0.5 m/s, headed along the earth's y: 20 mm, along y or along x."""
+    board = SimulatedBoard(
+        BoardSettings(
+            running=True,
+            frame="earth" if frame == "earth" else "body",
+            initial_pose=BoardPose(3000.0, 0.0, 1000 * pi / 2),
+        )
+    )
+    board.receive(velocity(35, 0, 0))
+    run(board, 3.0)
+    assert deltas(board)[-1][:3] == pytest.approx(expected, abs=2)
+
+
+def test_an_initial_pose_is_the_boards_own_and_not_a_movement() -> None:
+    """A board that has already driven sends its pose, and deltas of zero while it stands."""
+    board = SimulatedBoard(
+        BoardSettings(running=True, initial_pose=BoardPose(1500.0, -250.0, 8000.0))
+    )
+    run(board, 0.2)
+    assert poses(board) == [(1500.0, -250.0, 8000.0, 0)]
+    assert {delta[:3] for delta in deltas(board)} == {(0, 0, 0)}
+    assert board.truth == TruePose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def test_the_heading_is_sent_unwrapped() -> None:
+    """Two turns are more than 2 pi, in mrad."""
+    board = SimulatedBoard(RUNNING)
+    board.receive(wheels(-40, -40, -40))
+    run(board, 4.0)
+    assert poses(board)[-1][2] > 2 * 2000 * pi
+
+
+def test_the_pose_can_be_sent_little_endian() -> None:
+    """The setting turns the bytes of the floats round."""
+    pose = BoardPose(1000.0, 0.0, 0.0)
+    board = SimulatedBoard(BoardSettings(running=True, pose_byte_order="little", initial_pose=pose))
+    run(board, 0.2)
+    assert sent(board, POSE)[0][2:6] == bytes.fromhex("00 00 7A 44")
+
+
+def test_equal_settings_and_input_give_equal_bytes() -> None:
+    """The seed decides over everything random."""
+
+    def stream(seed: int) -> bytes:
+        board = SimulatedBoard(BoardSettings(seed=seed, running=True, slip=0.1))
+        commands = Random(1)
+        data = b""
+        for _ in range(10):
+            board.receive(velocity(*(commands.randrange(-30, 31) for _ in range(3))))
+            data += run(board, 0.5)
+        return data
+
+    assert stream(1) == stream(1)
+    assert stream(1) != stream(2)

@@ -1,0 +1,158 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""However the driver is ended, Stop is the last word, and the exit code tells why."""
+
+import contextlib
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from driver_process import Driver
+from geometry_msgs.msg import Twist
+from probe import Probe
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool
+from terminal import fill
+
+from omnibot_driver.simulator import BoardMode, PtyBoard
+
+Start = Callable[..., Any]
+STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+LAST_WORDS = bytes(8) + STOP + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+
+
+def driving(probe: Probe, board: PtyBoard) -> None:
+    commands = probe.publisher(Twist, "cmd_vel")
+    twist = Twist()
+    twist.linear.x = 0.3
+    commands.publish(twist)
+    assert board.wait_for(lambda b: b.commands[-1].kind == "velocity", 20.0)
+
+
+@pytest.mark.parametrize(
+    "signals",
+    [
+        [signal.SIGINT],
+        [signal.SIGTERM],
+        [signal.SIGINT, signal.SIGINT],
+        [signal.SIGTERM, signal.SIGINT, signal.SIGINT],
+        [signal.SIGHUP],
+    ],
+    ids=lambda signals: "+".join(number.name for number in signals),
+)
+def test_a_signal_while_driving_ends_with_the_stop_frame_and_exit_code_zero(
+    start_board: Start, start_driver: Start, probe_of: Start, signals: list[signal.Signals]
+) -> None:
+    """Ctrl-C on ``ros2 launch`` arrives twice; the stop frame goes out all the same."""
+    board = start_board()
+    driver: Driver = start_driver(board.path)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    driving(probe, board)
+    assert driver.end(*signals) == 0
+    assert "Traceback" not in driver.output
+    assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), 20.0)
+
+
+EXPLODES = """
+import omnibot_driver.node as node
+def explode(self, message):
+    raise ZeroDivisionError("a defect in a callback")
+node.OmniBotDriver._on_estop_topic = explode
+"""
+
+
+SHUTS_DOWN = """
+import rclpy, omnibot_driver.node as node
+node.OmniBotDriver._on_estop_topic = lambda self, message: rclpy.shutdown()
+"""
+
+
+@pytest.mark.parametrize(("before", "exit_code"), [(EXPLODES, 1), (SHUTS_DOWN, 0)])
+def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
+    start_board: Start, start_driver: Start, probe_of: Start, before: str, exit_code: int
+) -> None:
+    """The exit code tells which of them it was."""
+    board = start_board()
+    driver: Driver = start_driver(board.path, before=before, cmd_vel_timeout=10.0)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    driving(probe, board)
+    probe.publisher(Bool, "estop").publish(Bool(data=True))
+    assert driver.process.wait(20.0) == exit_code, driver.output
+    assert ("a defect in a callback" in driver.output) == bool(exit_code)
+    assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), 20.0)
+
+
+def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
+    start_driver: Start, probe_of: Start, silent_terminal: tuple[int, str]
+) -> None:
+    """The kernel's buffer is full, so the farewell does not fit in; the guard goes on trying."""
+    far, path = silent_terminal
+    driver: Driver = start_driver(path, auto_start=False)
+    probe_of(driver).wait_for_state("connecting")
+    assert os.read(far, 100).endswith(STOP)
+    fill_terminal(path)
+    assert driver.end(signal.SIGINT) == 0
+    heard = b""
+    while LAST_WORDS not in heard:
+        assert select.select([far], [], [], 20.0)[0], heard
+        heard += os.read(far, 4096)
+
+
+def fill_terminal(path: str) -> None:
+    """From the side of a program that opened it."""
+    descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    fill(descriptor)
+    os.close(descriptor)
+
+
+@pytest.mark.parametrize(
+    ("on_exit", "mode"), [("pause", BoardMode.PAUSED), ("reset", BoardMode.PAUSED)]
+)
+def test_the_board_can_be_left_paused_or_reset(
+    start_board: Start, start_driver: Start, probe_of: Start, on_exit: str, mode: BoardMode
+) -> None:
+    """``on_exit``: after the stop frame, P or R."""
+    board = start_board()
+    driver: Driver = start_driver(board.path, on_exit=on_exit)
+    probe_of(driver).wait_for_state("nominal")
+    assert driver.end(signal.SIGINT) == 0
+    assert board.wait_for(lambda b: b.commands[-1].kind == on_exit, 20.0)
+    assert board.wait_for(lambda b: b.mode is mode, 20.0)
+
+
+def test_a_log_that_nobody_reads_does_not_keep_the_robot_moving(start_board: Start) -> None:
+    """A terminal held by ctrl-S, a hung pipe: watchdog, e-stop and SIGTERM still work."""
+    board = start_board(running=True)
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writing, b"x" * 4096)
+    os.set_blocking(writing, True)
+    namespace = "unread"
+    command = [sys.executable, "-m", "omnibot_driver.driver", "--ros-args"]
+    command += ["-p", f"port:={board.path}", "-r", f"__ns:=/{namespace}"]
+    process = subprocess.Popen(command, stdout=writing, stderr=writing)
+    try:
+        with Probe(namespace) as probe:
+            probe.wait_for_state("nominal")
+            driving(probe, board)
+            bad = Twist()
+            bad.linear.x = float("nan")
+            probe.publisher(Twist, "cmd_vel").publish(bad)
+            assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), 20.0)
+            assert probe.call(SetBool, "estop", data=True).success
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(20.0) == 0
+    finally:
+        process.kill()
+        process.wait()
+        os.close(reading)
+        os.close(writing)

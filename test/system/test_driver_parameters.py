@@ -1,0 +1,118 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Parameters and arguments of the running node: refused at the start, changed later."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from driver_process import Driver
+from geometry_msgs.msg import Twist
+from probe import Probe
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import DescribeParameters, SetParameters
+
+from omnibot_driver.parameters import PARAMETERS
+
+Start = Callable[..., Any]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"max_liner_speed": 0.3}, "no parameter 'max_liner_speed'.*nearest is 'max_linear_speed'"),
+        ({"command_rate": 500.0}, "'command_rate' must be 1 to 50 Hz"),
+        ({"cmd_vel_timeout": float("nan")}, "'cmd_vel_timeout' must be"),
+        ({"on_exit": "explode"}, "'on_exit' must be one of stop, pause, reset"),
+        ({"axis_signs": "[1, 2, 1]"}, "'axis_signs' must be three numbers"),
+        ({"baudrate": "fast"}, "'baudrate' must be a value of type int"),
+        ({"odom_frame": "/odom"}, "leading slash"),
+        ({"use_sim_times": True}, "no parameter 'use_sim_times'"),
+        ({"use_sim_time": 5}, "cannot start.*use_sim_time"),
+    ],
+)
+def test_wrong_parameters_end_the_start_with_a_sentence(
+    start_driver: Start, parameters: dict[str, object], message: str
+) -> None:
+    """Exit code 2, no traceback."""
+    driver: Driver = start_driver("/dev/null", **parameters)
+    driver.wait_for_line(message)
+    assert driver.process.wait(20.0) == 2
+    assert "Traceback" not in driver.output
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["/dev/ttyUSB0"],
+        ["--help"],
+        ["--port", "x"],
+        ["--ros-args", "-r", "__node:=bad name"],
+        ["--ros-args", "--log-level", "nonsense"],
+    ],
+)
+def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -> None:
+    """Ignored, they would leave the user with another port than the one that was meant."""
+    command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+    assert ended.returncode == 2
+    assert "omnibot_driver cannot start: " in ended.stderr
+    assert "Traceback" not in ended.stderr
+
+
+def test_integers_are_taken_for_real_numbers(start_board: Start, start_driver: Start) -> None:
+    """``max_linear_speed: 1`` in a YAML file is no mistake worth refusing."""
+    board = start_board()
+    driver: Driver = start_driver(board.path, max_linear_speed=1)
+    driver.wait_for_line("state: nominal")
+
+
+def set_parameter(probe: Probe, name: str, value: ParameterValue) -> Any:
+    request = [Parameter(name=name, value=value)]
+    return probe.call(SetParameters, "set_parameters", parameters=request).results[0]
+
+
+def real(value: float) -> ParameterValue:
+    return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+
+
+def test_tuning_changes_while_running_and_identity_does_not(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """A new scale is in the next command; another port is refused; so are values out of range."""
+    board = start_board()
+    probe: Probe = probe_of(start_driver(board.path))
+    probe.wait_for_state("nominal")
+    assert set_parameter(probe, "linear_scale", real(100.0)).successful
+    whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=1)
+    assert set_parameter(probe, "cmd_vel_timeout", whole).successful
+    twist = Twist()
+    twist.linear.x = 0.3
+    probe.publisher(Twist, "cmd_vel").publish(twist)
+    assert board.wait_for(lambda b: b.commands[-1].values == (30, 0, 0), 20.0)
+    text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value="/dev/ttyUSB1")
+    assert "read-only" in set_parameter(probe, "port", text).reason
+    for value in (0.0, -1.0, float("nan"), 1e9):
+        result = set_parameter(probe, "linear_scale", real(value))
+        assert not result.successful
+    result = set_parameter(probe, "linear_scale", text)
+    assert not result.successful
+    assert "linear_scale" in result.reason
+
+
+def test_every_parameter_is_described(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """Description, unit and range, for ``ros2 param describe`` and rqt."""
+    probe: Probe = probe_of(start_driver(start_board().path))
+    names = [parameter.name for parameter in PARAMETERS]
+    descriptors = probe.call(DescribeParameters, "describe_parameters", names=names).descriptors
+    for parameter, descriptor in zip(PARAMETERS, descriptors, strict=True):
+        assert parameter.description in descriptor.description
+        assert parameter.unit in descriptor.description
+        assert descriptor.read_only == parameter.fixed
+        if parameter.low is not None:
+            (span,) = [*descriptor.floating_point_range, *descriptor.integer_range]
+            assert (span.from_value, span.to_value) == (parameter.low, parameter.high)

@@ -1,0 +1,116 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Ports that are missing, busy, wrong, come late or say nothing that makes sense."""
+
+import os
+import signal
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from driver_process import Driver
+from probe import Probe
+from sensor_msgs.msg import Imu
+
+from omnibot_driver.simulator import PtyBoard, SimulatedBoard
+
+Start = Callable[..., Any]
+
+
+def test_a_missing_port_is_named_once_and_the_driver_waits_for_it(
+    start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
+) -> None:
+    """Plugged in later, the board is found and started without anybody's help."""
+    link = tmp_path / "omnibot"
+    driver: Driver = start_driver(str(link), reconnect_interval=0.05)
+    driver.wait_for_line("does not exist.*by-id")
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("disconnected")
+    start_board(link=str(link))
+    probe.wait_for_state("nominal")
+    assert driver.output.count("does not exist") == 1
+
+
+def test_an_unplugged_board_is_found_again(
+    start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
+) -> None:
+    """The same node goes on with another terminal behind the same name, without a leak."""
+    link = tmp_path / "omnibot"
+    descriptors = []
+    with PtyBoard(SimulatedBoard(), str(link)):
+        driver: Driver = start_driver(str(link), reconnect_interval=0.05)
+        probe: Probe = probe_of(driver)
+        probe.wait_for_state("nominal")
+        descriptors.append(len(os.listdir(f"/proc/{driver.process.pid}/fd")))
+    probe.wait_for_state("disconnected")
+    with PtyBoard(SimulatedBoard(), str(link)):
+        probe.wait_for_state("nominal")
+    probe.wait_for_state("disconnected")
+    start_board(link=str(link))
+    probe.wait_for_state("nominal")
+    descriptors.append(len(os.listdir(f"/proc/{driver.process.pid}/fd")))
+    assert descriptors[0] == descriptors[1]
+    assert driver.output.count("lost") == 2
+
+
+def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
+    start_board: Start, start_driver: Start
+) -> None:
+    """Two masters of one robot would be worse than none."""
+    board = start_board()
+    first: Driver = start_driver(board.path)
+    first.wait_for_line("is open")
+    second: Driver = start_driver(board.path)
+    second.wait_for_line("in use by another program.*fuser")
+
+
+@pytest.mark.parametrize(
+    ("port", "reason"),
+    [
+        ("nonsense://board", "not understood.*socket://"),
+        ("/", "check the parameter"),
+        ("/dev/null", "no serial port.*by-id"),
+        ("socket://nohost", "not understood.*socket://"),
+        ("socket://localhost:99999", "not understood.*socket://"),
+        ("socket://localhost:1", "cannot open.*refused"),
+    ],
+)
+def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
+    start_driver: Start, port: str, reason: str
+) -> None:
+    """It goes on trying and ends like any other when asked to."""
+    driver: Driver = start_driver(port)
+    driver.wait_for_line(reason)
+    assert driver.process.poll() is None
+    assert driver.end(signal.SIGINT) == 0
+
+
+def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
+    start_driver: Start, probe_of: Start, silent_port: str, write_to_silent_port: Start
+) -> None:
+    """A wrong baud rate looks like this."""
+    driver: Driver = start_driver(silent_port)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("connecting")
+    driver.wait_for_line("nothing comes from the board.*power")
+    imu = probe.listen(Imu, "imu/data_raw")
+    write_to_silent_port(bytes(range(256)) * 40)
+    write_to_silent_port(bytes.fromhex("FF FA 00 00 00 00 40 00 00 01 00 02 00 03") * 3)
+    probe.wait_for(lambda: len(imu) >= 2)
+    assert [message.linear_acceleration.z for message in imu] == pytest.approx([9.80665] * len(imu))
+
+
+def test_a_port_that_flaps_is_told_once(start_driver: Start) -> None:
+    """A server that hangs up at once, again and again."""
+    server = socket.create_server(("127.0.0.1", 0))
+    port = f"socket://127.0.0.1:{server.getsockname()[1]}"
+    driver: Driver = start_driver(port, reconnect_interval=0.05)
+    for _ in range(8):
+        peer, _ = server.accept()
+        peer.close()
+    server.close()
+    driver.wait_for_line("cannot open.*refused")
+    assert driver.output.count("is open") == 1
+    assert driver.output.count("lost") <= 2

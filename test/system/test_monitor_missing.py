@@ -1,0 +1,142 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the monitor says of what is missing or wrong: a sentence, and an exit code."""
+
+import os
+import subprocess
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from nav_msgs.msg import Odometry
+from probe import Probe
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Bool, String
+
+from omnibot_driver.tools.monitor.__main__ import main
+from omnibot_driver.tools.monitor.feed import Feed
+
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+QUICKLY = ["--timeout", "1"]
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def fake(stack: ExitStack) -> Probe:
+    """Says that it is a driver that runs, and nothing else."""
+    probe = stack.enter_context(Probe("fake"))
+    for kind, topic, value in ((String, "state", "nominal"), (Bool, "estop_active", False)):
+        publisher = probe.node.create_publisher(kind, f"omnibot_driver/{topic}", LATCHED)
+        publisher.publish(kind(data=value))
+    return probe
+
+
+def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
+    """By topic where the service is missing, until the driver shows the latch."""
+    said = fake.listen(Bool, "estop")
+    feed = Feed([], "fake", "omnibot_driver")
+    try:
+        fake.wait_for_graph(lambda: feed.view().state)
+        feed.estop()
+        assert feed.view().estop_asked
+        assert "nobody offers /fake/omnibot_driver/estop" in feed.view().said
+        fake.wait_for(lambda: len(said) >= 3 and all(message.data for message in said))
+        latch = fake.node.create_publisher(Bool, "omnibot_driver/estop_active", LATCHED)
+        latch.publish(Bool(data=True))
+        fake.wait_for_graph(lambda: feed.view().estop and not feed.view().estop_asked)
+    finally:
+        feed.close()
+
+
+def sentence(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """What it says on stderr when it cannot do what is wanted: one line."""
+    assert main(arguments) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    return line
+
+
+def test_without_a_driver_one_sentence_says_how_to_start_one(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the domain that was searched."""
+    domain = str((int(os.environ["ROS_DOMAIN_ID"]) + 50) % 101 + 1)
+    monkeypatch.setenv("ROS_DOMAIN_ID", domain)
+    said = sentence(capsys, "--once", *QUICKLY)
+    assert f"no driver is running in ROS domain {domain}: start one" in said
+
+
+def test_in_a_wrong_namespace_the_drivers_that_are_there_are_named(
+    fake: Probe, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With the option that leads to the first of them."""
+    said = sentence(capsys, "--once", "--namespace", "elsewhere", *QUICKLY)
+    assert "no driver /elsewhere/omnibot_driver here, but /fake/omnibot_driver" in said
+    assert said.endswith("try --namespace /fake")
+
+
+def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
+    """What there is is printed all the same."""
+    assert main(["--once", "--namespace", "fake", *QUICKLY]) == 1
+    output = capsys.readouterr()
+    assert output.out.startswith("/fake/omnibot_driver  nominal")
+    assert "nothing comes on imu/data_raw, odom" in output.err
+
+
+def test_nan_is_named_and_shown(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
+    """Where a number would be, and in one sentence."""
+    bad = Odometry()
+    bad.pose.pose.position.x = bad.twist.twist.linear.y = float("nan")
+    publisher = fake.node.create_publisher(Odometry, "odom", 10)
+    fake.node.create_timer(0.02, lambda: publisher.publish(bad))
+    assert main(["--once", "--namespace", "fake", *QUICKLY]) == 1
+    output = capsys.readouterr()
+    assert "nan" in output.out
+    assert "not a finite number: pose x, measured y" in output.err
+
+
+def test_a_pipe_cannot_steer(capsys: pytest.CaptureFixture[str]) -> None:
+    """It has no keys."""
+    assert "--teleop needs a terminal" in sentence(capsys, "--teleop")
+
+
+def test_a_pipe_gets_a_snapshot(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
+    """As with --once, and one sentence says so."""
+    main(["--namespace", "fake", *QUICKLY])
+    output = capsys.readouterr()
+    assert output.out.startswith("/fake/omnibot_driver")
+    assert "no terminal here, so this is a snapshot" in output.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--namespace", "a b"], "no such driver can be"),
+        (["--once", "--ros-args", "--nonsense"], "ROS does not start"),
+    ],
+)
+def test_names_that_are_none_are_refused(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In a sentence, not in a traceback."""
+    assert main(arguments) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_without_ros_one_sentence_says_so() -> None:
+    """A Python without site-packages has no rclpy: no traceback, exit code 1."""
+    command = [sys.executable, "-ES", "-m", "omnibot_driver.tools.monitor", "--once"]
+    ended = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=20.0)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith("monitor: this needs ROS 2 Jazzy's Python packages")
+    assert ended.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("wrong", [["--timeout", "0"], ["--teleop", "--once"], ["--nonsense"]])
+def test_wrong_usage_has_exit_code_2(wrong: list[str], capsys: Any) -> None:
+    """And the usage is shown."""
+    with pytest.raises(SystemExit) as ended:
+        main(wrong)
+    assert ended.value.code == 2
+    assert "usage: monitor" in capsys.readouterr().err

@@ -1,0 +1,105 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A link whose port takes nothing any more: Stop comes first when it does again."""
+
+import os
+import threading
+from collections.abc import Iterator
+
+import pytest
+from listener import (
+    LAST_WORDS,
+    PATIENCE_S,
+    STOP,
+    Listener,
+    link_to,
+    nothing_left_behind,
+    session,
+    wait_for_the_end_of,
+)
+from terminal import Terminal
+
+from omnibot_driver.core.inertial import ImuEstimate
+
+
+@pytest.fixture
+def terminal() -> Iterator[Terminal]:
+    terminal = Terminal()
+    yield terminal
+    terminal.close()
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left_behind() -> Iterator[None]:
+    """Every link and port that a test opens gives its threads and descriptors back."""
+    with nothing_left_behind():
+        yield
+
+
+def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
+    terminal: Terminal,
+) -> None:
+    """A board that hung may hold half a command; S, which found no room, is not what it needs.
+
+    The first Stop is there before the port is opened anew: it may resume sooner.
+    """
+    listener = Listener()
+    link = link_to(terminal.path, listener, session())
+    link.start()
+    terminal.read_until(STOP + b"S")
+    terminal.fill()
+    listener.wait_for(lambda: any("while writing" in str(text) for text in listener.reports))
+    heard = terminal.read_until(STOP + b"S")
+    assert heard.lstrip(b"x").startswith(2 * (bytes(8) + STOP) + b"S")
+    link.close("stop")
+
+
+def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) -> None:
+    """Closing does not hang; the robot is stopped as soon as the board listens again."""
+    listener, ours = Listener(), session(run=False)
+    link = link_to(terminal.path, listener, ours)
+    link.start()
+    terminal.read_until(STOP)
+    terminal.fill()
+    link.close("stop")
+    terminal.read_until(LAST_WORDS)
+    wait_for_the_end_of("omnibot-reader", "omnibot-pacer")
+
+
+def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
+    """Whoever pressed it is told; it is the first to be written once there is room."""
+    listener, ours = Listener(), session(run=False)
+    link = link_to(terminal.path, listener, ours)
+    link.start()
+    terminal.read_until(STOP)
+    assert not link.blocked
+    terminal.fill()
+    link.call(lambda session, now: session.estop(True, now))
+    assert link.blocked
+    terminal.read_until(STOP + bytes.fromhex("FF FE 10 00 00 00 00 00 00"))
+    link.close("stop")
+
+
+def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: Terminal) -> None:
+    """The driver's own farewell finds no room; somebody has to say it."""
+    listener, ours = Listener(), session(run=False)
+    link = link_to(terminal.path, listener, ours)
+    link.start()
+    terminal.read_until(STOP)
+    terminal.fill()
+
+    closed, farewell_over = ours.closed, threading.Event()
+
+    def defective(data: bytes, now: float) -> list[ImuEstimate]:
+        raise RuntimeError("a defect")
+
+    def tell_and_close(now: float) -> None:
+        farewell_over.set()
+        closed(now)
+
+    ours.hear, ours.closed = defective, tell_and_close  # type: ignore[method-assign]
+    os.write(terminal.far, b"x")
+    assert farewell_over.wait(PATIENCE_S)
+    terminal.read_until(LAST_WORDS)
+    link.close("stop")
+    wait_for_the_end_of("omnibot-reader", "omnibot-pacer")

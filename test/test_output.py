@@ -1,0 +1,64 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is printed never waits, and what cannot be printed is lost alone."""
+
+import fcntl
+import os
+import struct
+import subprocess
+import sys
+import termios
+import threading
+import time
+
+import pytest
+
+from omnibot_driver.output import _copy
+
+PATIENCE_S = 20.0
+
+
+def taken(pipe: int) -> None:
+    """Wait until nothing is left in it, which nobody tells."""
+    end = time.monotonic() + PATIENCE_S
+    while fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)) != struct.pack("i", 0):
+        assert time.monotonic() < end
+        time.sleep(0.001)
+
+
+def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
+    """Once there is room again."""
+    (source, pipe), (heard, room) = os.pipe(), os.pipe()
+    disk = os.open("/dev/full", os.O_WRONLY)
+    copier = threading.Thread(target=_copy, args=(source, disk))
+    copier.start()
+    for _ in range(2):  # when the second is taken, the first has been refused
+        os.write(pipe, b"lost\n")
+        taken(pipe)
+    os.dup2(room, disk)
+    os.write(pipe, b"kept\n")
+    os.close(pipe)
+    copier.join(PATIENCE_S)
+    assert os.read(heard, 100).endswith(b"kept\n")
+    for descriptor in (heard, room, disk):
+        os.close(descriptor)
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
+    """What is printed would go to the board."""
+    program = """
+import os, sys
+from omnibot_driver.output import UnblockedOutput
+with UnblockedOutput():
+    print("to nobody", file=sys.stderr)
+    port = os.open("/dev/null", os.O_RDWR)
+sys.exit(port <= 2)
+"""
+    command = f'exec "$0" -c "$1" {closed}'
+    done = subprocess.run(
+        ["sh", "-c", command, sys.executable, program],
+        timeout=PATIENCE_S,
+        check=False,
+    )
+    assert done.returncode == 0

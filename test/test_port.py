@@ -1,0 +1,119 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""One open terminal: refused with advice, exclusively ours, written whole."""
+
+import fcntl
+import os
+import termios
+import threading
+from collections.abc import Iterator
+
+import pytest
+from listener import PATIENCE_S, STOP, nothing_left_behind
+from terminal import Terminal
+
+from omnibot_driver.core.errors import LinkError
+from omnibot_driver.port import Port
+
+
+@pytest.fixture
+def terminal() -> Iterator[Terminal]:
+    terminal = Terminal()
+    yield terminal
+    terminal.close()
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left_behind() -> Iterator[None]:
+    """Every link and port that a test opens gives its threads and descriptors back."""
+    with nothing_left_behind():
+        yield
+
+
+@pytest.mark.parametrize(
+    ("error", "advice"),
+    [
+        (PermissionError(13, "Permission denied"), "group dialout"),
+        (FileNotFoundError(2, "No such file"), "by-id"),
+        (BlockingIOError(11, "Resource temporarily unavailable"), "fuser"),
+        (OSError(16, "Device or resource busy"), "fuser"),
+        (ValueError("invalid URL"), "socket://"),
+        (OSError(5, "Input/output error"), "check the parameter"),
+    ],
+)
+def test_every_way_a_port_can_refuse_says_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, error: Exception, advice: str
+) -> None:
+    """Nobody can be refused as root, so the refusal is put in the library's mouth."""
+
+    def refuse(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("serial.serial_for_url", refuse)
+    with pytest.raises(LinkError, match=advice) as caught:
+        Port("/dev/ttyUSB0", 115200)
+    assert caught.value.__cause__ is error
+
+
+def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
+    """By the kernel's list of locks."""
+    port = Port(terminal.path, 115200)
+    with pytest.raises(LinkError, match=rf"in use by another program \(process {os.getpid()}, "):
+        Port(terminal.path, 115200)
+    port.close()
+
+
+def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
+    """DTR falling would restart a board that is wired to it."""
+    Port(terminal.path, 115200).close()
+    near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)
+    assert not termios.tcgetattr(near)[2] & termios.HUPCL
+    os.close(near)
+
+
+def test_a_real_terminal_is_exclusive_until_it_is_closed(
+    terminal: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Programs that ask for no lock are kept out as well; a pseudo-terminal stays as it is."""
+
+    def exclusive() -> bool:
+        near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)  # as root, one may
+        answer = fcntl.ioctl(near, TIOCGEXCL, bytes(4))
+        os.close(near)
+        return answer != bytes(4)
+
+    port = Port(terminal.path, 115200)
+    assert not exclusive()
+    port.close()
+    monkeypatch.setattr("omnibot_driver.port.PSEUDO_TERMINALS", ())
+    port = Port(terminal.path, 115200)
+    assert os.geteuid() != 0 or exclusive()
+    port.close()
+    assert not exclusive()
+
+
+TIOCGEXCL = 0x80045440
+"""Linux's ioctl for whether a terminal is exclusive; the termios module does not have it."""
+
+
+def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) -> None:
+    """What waited in the kernel is given up: a board that listens again hears the newest."""
+    port = Port(terminal.path, 115200)
+    terminal.fill()
+    with pytest.raises(LinkError, match="while writing"):
+        port.write(STOP)
+    port.write(STOP)
+    port.close()
+
+
+def test_a_write_that_is_taken_in_pieces_is_completed(terminal: Terminal) -> None:
+    """The kernel takes what there is room for, and the rest when somebody reads."""
+    port = Port(terminal.path, 115200)
+    message = b"".join(b"%05d" % number for number in range(8000))
+    reader = threading.Thread(target=lambda: heard.append(terminal.read_until(b"07999")))
+    heard: list[bytes] = []
+    reader.start()
+    port.write(message)
+    reader.join(PATIENCE_S)
+    assert heard == [message]
+    port.close()

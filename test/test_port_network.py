@@ -1,0 +1,133 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Ports at the far end of a network: served like a terminal, given up when they are gone."""
+
+import contextlib
+import ctypes
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+
+import pytest
+import serial
+import serial.rfc2217
+from listener import PATIENCE_S, STOP, nothing_left_behind
+
+from omnibot_driver.core.errors import LinkError
+from omnibot_driver.port import PEER_OPTIONS, Port
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left_behind() -> Iterator[None]:
+    """Every link and port that a test opens gives its threads and descriptors back."""
+    with nothing_left_behind():
+        yield
+
+
+def connected(server: socket.socket) -> tuple[Port, socket.socket]:
+    """A port at this server, and the far end."""
+    port = Port(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
+    return port, server.accept()[0]
+
+
+@pytest.mark.parametrize("said", [STOP, b""], ids=["spoken to", "not spoken to"])
+def test_a_peer_that_vanished_without_a_word_is_given_up(
+    monkeypatch: pytest.MonkeyPatch, said: bytes
+) -> None:
+    """A half-open connection: nothing is acknowledged, nothing is refused."""
+    options = {**PEER_OPTIONS, socket.TCP_USER_TIMEOUT: 300}
+    monkeypatch.setattr("omnibot_driver.port.PEER_OPTIONS", options)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port, far = connected(server)
+        with far, closing(port):
+            drop_everything(far)
+            port.write(said)
+            with pytest.raises(LinkError, match="lost"):
+                go_on(port.read)
+
+
+def go_on(action: Callable[[], object]) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        action()
+
+
+def drop_everything(peer: socket.socket) -> None:
+    """Have the kernel throw away what comes in for this socket: a packet filter that says no."""
+    program = ctypes.create_string_buffer(struct.pack("HBBI", 0x06, 0, 0, 0))
+    so_attach_filter = 26
+    peer.setsockopt(
+        socket.SOL_SOCKET, so_attach_filter, struct.pack("HP", 1, ctypes.addressof(program))
+    )
+
+
+def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
+    """Once the buffers on both sides are full."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port, far = connected(server)
+        with far, closing(port), pytest.raises(LinkError, match="while writing"):
+            go_on(lambda: port.write(bytes(100_000)))
+
+
+def test_a_board_behind_a_socket_is_served_as_well() -> None:
+    """Any pyserial URL will do: ``socket://host:port`` reads and writes the same bytes."""
+    server = socket.create_server(("127.0.0.1", 0))
+    port = Port(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
+    far, _ = server.accept()
+    far.sendall(b"Paused: 0 \n")
+    received = b""
+    while len(received) < 11:
+        received += port.read()
+    assert received == b"Paused: 0 \n"
+    port.write(STOP)
+    assert far.recv(100) == STOP
+    far.close()
+    with pytest.raises(LinkError, match="lost"):
+        port.read()
+    port.close()
+    server.close()
+
+
+@pytest.mark.filterwarnings("ignore:set(Daemon|Name)")  # pyserial 3.5
+def test_a_board_behind_rfc2217_is_served_as_well() -> None:
+    """A serial port server on the network, as pyserial's own example has it."""
+    board_side = serial.serial_for_url("loop://", timeout=0.05)
+    listener = socket.create_server(("127.0.0.1", 0))
+    done = threading.Event()
+
+    def serve() -> None:
+        client, _ = listener.accept()
+        client.settimeout(0.05)
+        manager = serial.rfc2217.PortManager(board_side, Connection(client))
+        while not done.is_set():
+            with contextlib.suppress(TimeoutError):
+                board_side.write(b"".join(manager.filter(client.recv(1024))))
+            if data := board_side.read(board_side.in_waiting):
+                client.sendall(b"".join(manager.escape(data)))
+        client.close()
+
+    server = threading.Thread(target=serve)
+    server.start()
+    port = Port(f"rfc2217://127.0.0.1:{listener.getsockname()[1]}", 115200)
+    port.write(b"Paused: 0 \n")
+    received = b""
+    while len(received) < 11:
+        received += port.read()
+    assert received == b"Paused: 0 \n"
+    port.close()
+    done.set()
+    server.join(PATIENCE_S)
+    listener.close()
+
+
+class Connection:
+    """What rfc2217's PortManager wants of a connection."""
+
+    def __init__(self, client: socket.socket) -> None:
+        self._client = client
+
+    def write(self, data: bytes) -> None:
+        self._client.sendall(data)

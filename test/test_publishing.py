@@ -1,0 +1,59 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The stamps of what is published, by a real node's clock."""
+
+import time
+from collections.abc import Iterator
+
+import pytest
+import rclpy
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+from rclpy.time import Time
+from sensor_msgs.msg import Imu
+
+from omnibot_driver import parameters
+from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.omnibot import OmniBot
+from omnibot_driver.core.session import Session
+from omnibot_driver.messages import MessageSettings
+from omnibot_driver.publishing import Publishing
+
+
+@pytest.fixture
+def node() -> Iterator[Node]:
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = Node("stamped", context=context)
+    yield node
+    node.destroy_node()
+    rclpy.try_shutdown(context=context)
+
+
+def test_stamps_follow_simulated_time_while_there_is_any(
+    node: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whether it begins before the driver or later, and after it ends they are the system's."""
+    values = {**parameters.check_all({}), "publish_tf": False}
+    session = Session(
+        OmniBot(parameters.board_settings(values)), parameters.session_settings(values), run=True
+    )
+    published: list[bytes] = []
+
+    def published_at_s() -> float:
+        publishing.deliver([ImuEstimate(time.monotonic(), (0.0, 0.0, 9.8), (0.0, 0.0, 0.0))])
+        stamp = deserialize_message(published[-1], Imu).header.stamp
+        return float(stamp.sec + 1e-9 * stamp.nanosec)
+
+    def simulate(active: bool) -> None:
+        node.set_parameters([rclpy.Parameter("use_sim_time", value=active)])
+
+    for begins_before in (True, False):
+        simulate(begins_before)
+        publishing = Publishing(node, session, values, MessageSettings.from_parameters(values))
+        monkeypatch.setattr(publishing._imu, "publish", published.append)
+        simulate(True)
+        node.get_clock().set_ros_time_override(Time(seconds=5.0))  # type: ignore[attr-defined]
+        assert published_at_s() == pytest.approx(5.0, abs=1.0)
+        simulate(False)
+        assert published_at_s() == pytest.approx(time.time(), abs=1.0)

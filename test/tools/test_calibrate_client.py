@@ -1,0 +1,103 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A calibration finds the one driver that it is about, or says why not."""
+
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from calibrate_rig import Rig, rig
+from driver_process import PATIENCE_S
+from std_msgs.msg import String
+
+from omnibot_driver.parameters import PARAMETERS
+from omnibot_driver.tools.calibrate import client, listener
+from omnibot_driver.tools.calibrate.__main__ import main
+from omnibot_driver.tools.calibrate.interruption import Interruption
+from omnibot_driver.tools.calibrate.motion import Bounds, steady
+from omnibot_driver.tools.calibrate.robot import Robot, connect
+from omnibot_driver.tools.needs import ToolError
+
+
+@pytest.fixture(scope="module")
+def rigged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    with rig(tmp_path_factory.mktemp("robot")) as robot:
+        yield robot
+
+
+@pytest.fixture
+def robot(rigged: Rig) -> Iterator[Robot]:
+    with (
+        Interruption() as interruption,
+        connect(rigged.driver.namespace, [], interruption) as robot,
+    ):
+        yield robot
+
+
+def test_a_wrong_namespace_names_the_drivers_there_are(
+    rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With exit code 1."""
+    monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
+    assert main(["imu", "--yes", "--namespace", "nowhere"]) == 1
+    said = capsys.readouterr().err
+    assert "no driver is running in the namespace /nowhere, but" in said
+    assert f"/{rigged.driver.namespace}/omnibot_driver" in said
+
+
+def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) -> None:
+    """Of the same name, too: both would obey."""
+    before = len(rigged.port.board.commands)
+    twin = robot._node.create_publisher(String, f"{robot.driver}/state", listener.LATCHED)
+    assert robot._wait(lambda: robot._node.count_publishers(twin.topic_name) == 2, PATIENCE_S)
+    name = re.escape(robot.driver)
+    with pytest.raises(ToolError, match=f"there are several drivers here: {name}, {name}; end all"):
+        robot.drive(steady((0.1, 0.0, 0.0), 1.0), Bounds(speed=0.1, way=0.5, seconds=5.0))
+    assert all(one.kind != "velocity" for one in list(rigged.port.board.commands)[before:])
+
+
+def test_a_driver_of_another_version_is_told(
+    rigged: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It does not know a parameter of ours."""
+    newer = SimpleNamespace(name="of_tomorrow")
+    monkeypatch.setattr(client, "PARAMETERS", (*PARAMETERS, newer))
+    assert rigged.calibrate("scale") == 1
+    assert "is of another version than this tool" in capsys.readouterr().err
+
+
+def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
+    """A parameter out of range."""
+    with pytest.raises(ToolError, match="the driver refuses linear_scale: "):
+        robot.set_parameters({"linear_scale": -1.0})
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--namespace", "no/such name!"], "is no namespace"),
+        (["--ros-args", "--nonsense"], "ROS does not understand its arguments"),
+    ],
+)
+def test_what_ros_cannot_take_is_a_sentence(
+    words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No traceback."""
+    assert main(["imu", "--plot", str(tmp_path), *words]) == 1
+    assert sentence in capsys.readouterr().err
+
+
+def test_no_driver_at_all_says_how_to_start_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a domain where nobody is."""
+    monkeypatch.setattr(client, "FOUND_WITHIN_S", 0.2)
+    monkeypatch.setenv("ROS_DOMAIN_ID", "101" if os.environ["ROS_DOMAIN_ID"] != "101" else "100")
+    assert main(["imu", "--plot", str(tmp_path)]) == 1
+    assert (
+        "no driver is running: start one (ros2 run omnibot_driver driver)"
+        in capsys.readouterr().err
+    )

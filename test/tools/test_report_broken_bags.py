@@ -1,0 +1,185 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Bags that were not finished or are damaged: all that is whole is reported on, and it is said."""
+
+import shutil
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drives import START_NS, TYPES, Drive, message, write
+from rosbags.rosbag2 import CompressionMode, StoragePlugin, Writer
+
+from omnibot_driver.tools.needs import ToolError
+from omnibot_driver.tools.report import page
+from omnibot_driver.tools.report.__main__ import main
+from omnibot_driver.tools.report.bag import read
+from omnibot_driver.tools.report.log import Log
+
+SECONDS = 10.0
+CHUNK = 0x06
+STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
+
+
+@pytest.fixture
+def drive() -> Drive:
+    return Drive(SECONDS)
+
+
+def log_of(path: Path) -> Log:
+    return read(path, None, lambda _done, _total: None)
+
+
+def cut(bag: Path, end: int) -> Path:
+    """Its only file, as if the recorder had been killed when that was so long."""
+    (bag / "metadata.yaml").unlink()
+    (file,) = bag.iterdir()
+    file.write_bytes(file.read_bytes()[:end])
+    return file
+
+
+@pytest.mark.parametrize("plugin", StoragePlugin)
+def test_an_unfinished_bag_is_read_and_called_so(
+    drive: Drive,
+    tmp_path: Path,
+    plugin: StoragePlugin,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The report is written, the end is not 0, and the repair is named."""
+    monkeypatch.setattr(page, "PICTURES", ())
+    bag = write(tmp_path / "bag", [drive], plugin)
+    (bag / "metadata.yaml").unlink()
+    assert main([str(bag), "--output", str(tmp_path / "out")]) == 3
+    assert "never finished" in (text := capsys.readouterr().out)
+    assert f"ros2 bag reindex {bag}" in text
+    assert len(log_of(bag).imu) == len(drive.imu.stamp_s)
+
+
+def test_files_of_an_unfinished_bag_are_put_in_order_by_their_times(tmp_path: Path) -> None:
+    """The tenth comes before the second by name."""
+    bag = tmp_path / "bag"
+    bag.mkdir()
+    for name, first in (("bag_2", 0), ("bag_10", 10)):
+        kind = "diagnostic_msgs/msg/DiagnosticArray"
+        with Writer(tmp_path / name, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+            topics = (("/odom", "nav_msgs/msg/Odometry"), ("/diagnostics", kind))
+            _, told = (writer.add_connection(*topic, typestore=TYPES) for topic in topics)
+            for at_s in range(first, first + 10):
+                status = (0, "name", "", "", [])
+                text = message(kind, ((0, 0), ""), [message(STATUS, *status)])
+                writer.write(told, START_NS + at_s * 10**9, TYPES.serialize_cdr(text, kind))
+        shutil.copy(tmp_path / name / f"{name}.mcap", bag)
+    log = log_of(bag)
+    assert [status.at_s for status in log.diagnostics] == list(range(20))
+    assert log.duration_s == 19.0
+
+
+@pytest.mark.parametrize("text", ["", "a: [", "rosbag2_bagfile_information: 7", "\x00"])
+def test_metadata_that_make_no_sense_are_not_needed(
+    drive: Drive, tmp_path: Path, text: str
+) -> None:
+    """The files say the same."""
+    bag = write(tmp_path / "bag", [drive])
+    (bag / "metadata.yaml").write_text(text)
+    log = log_of(bag)
+    assert len(log.imu) == len(drive.imu.stamp_s)
+    (trouble,) = log.troubles
+    assert trouble.startswith("the bag is damaged (")
+    assert f"ros2 bag reindex {bag}" in trouble
+
+
+@pytest.mark.parametrize("mode", [CompressionMode.NONE, CompressionMode.STORAGE])
+def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
+    tmp_path: Path, mode: CompressionMode
+) -> None:
+    """Of a chunk that is not whole nothing is told, of those before it all."""
+    drive = Drive(40.0)  # some chunks
+    bag = write(tmp_path / "bag", [drive], compression=mode)
+    size = (bag / "bag.mcap").stat().st_size
+    file = cut(bag, size * 9 // 10)
+    log = log_of(bag)
+    assert f"the file {file.name} breaks off" in log.troubles[1]
+    assert 0.3 * len(drive.imu.stamp_s) < len(log.imu) < len(drive.imu.stamp_s)
+    np.testing.assert_array_equal(log.imu.values, drive.imu.series().values[: len(log.imu)])
+    assert len(log_of(file).imu) == len(log.imu)
+    assert file.stat().st_size == size * 9 // 10  # what was found is left as it is
+
+
+def test_an_mcap_with_its_end_overwritten_by_zeros_is_read(tmp_path: Path) -> None:
+    """As a file system leaves it after a power failure."""
+    bag = write(tmp_path / "bag", [Drive(40.0)])
+    size = (bag / "bag.mcap").stat().st_size
+    file = cut(bag, size * 9 // 10)
+    whole = len(log_of(file).imu)
+    with file.open("ab") as target:
+        target.write(bytes(5000))
+    assert len(log_of(file).imu) == whole
+
+
+def test_an_mcap_without_chunks_and_order_is_read(tmp_path: Path) -> None:
+    """Record by record, up to the one that is not whole, and put in order by arrival."""
+    kind = "std_msgs/msg/Bool"
+    bag = tmp_path / "bag"
+    with Writer(bag, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topics = (
+            ("/omnibot_driver/state", "std_msgs/msg/String"),
+            ("/omnibot_driver/estop_active", kind),
+        )
+        _, estop = (writer.add_connection(*topic, typestore=TYPES) for topic in topics)
+        for at_s, on in ((0, False), (9, False), (4, True)):
+            data = TYPES.serialize_cdr(message(kind, on), kind)
+            writer.write(estop, START_NS + at_s * 10**9, data)
+    file = bag / "bag.mcap"
+    chunked = file.read_bytes()
+    begin = 8 + 9 + int.from_bytes(chunked[9:17], "little")
+    assert chunked[begin] == CHUNK
+    size = int.from_bytes(chunked[begin + 17 + 8 : begin + 17 + 16], "little")
+    first = begin + 9 + 8 + 8 + 8 + 4 + 4 + 8
+    file.write_bytes(chunked[:begin] + chunked[first : first + size] + b"\x05\x40")
+    log = log_of(file)
+    assert [(span.begin_s, span.what) for span in log.estops] == [
+        (0.0, "free"),
+        (4.0, "latched"),
+        (9.0, "free"),
+    ]
+
+
+@pytest.mark.parametrize("size", [0, 8, 20])
+def test_an_mcap_in_which_nothing_is_whole_is_told(drive: Drive, tmp_path: Path, size: int) -> None:
+    """With the repair that may do more."""
+    bag = write(tmp_path / "bag", [drive])
+    file = cut(bag, size)
+    with pytest.raises(ToolError, match=f"{file.name} cannot be read: .*ros2 bag reindex {bag}"):
+        log_of(bag)
+
+
+def test_what_sqlite_has_not_moved_into_the_database_is_read(drive: Drive, tmp_path: Path) -> None:
+    """The write-ahead log that a recorder leaves beside it when it is killed."""
+    bag = write(tmp_path / "bag", [drive], StoragePlugin.SQLITE3)
+    killed = tmp_path / "killed"
+    killed.mkdir()
+    with closing(sqlite3.connect(bag / "bag.db3")) as database:
+        database.execute("PRAGMA journal_mode=WAL")
+        database.execute("DELETE FROM messages WHERE id > 100")
+        database.commit()
+        for file in bag.glob("bag.db3*"):
+            shutil.copy(file, killed)
+    assert (killed / "bag.db3-wal").stat().st_size
+    log = log_of(killed)
+    assert len(log.imu) < 100
+    assert sorted(file.name for file in killed.glob("*.db3-wal")) == ["bag.db3-wal"]
+
+
+def test_damaged_messages_are_counted_and_passed_over(drive: Drive, tmp_path: Path) -> None:
+    """One that is too short, in the middle."""
+    with Writer(tmp_path / "bag", version=9) as writer:
+        connections = {}
+        for number, (topic, kind, at_ns, told) in enumerate(drive.messages()):
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=TYPES)
+            data = bytes(TYPES.serialize_cdr(told, kind))
+            writer.write(connections[topic], at_ns, data[:20] if number == 500 else data)
+    assert log_of(tmp_path / "bag").troubles == ("1 message damaged, and passed over",)

@@ -1,0 +1,13 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Which words of a command line are ROS's."""
+
+from omnibot_driver.tools.ros_arguments import split_ros_arguments
+
+
+def test_ros_arguments_are_told_from_ours() -> None:
+    """As rclpy tells them."""
+    words = ["imu", "--yes", "--ros-args", "-r", "cmd_vel:=other", "--", "--minutes", "2"]
+    own, ros = split_ros_arguments(words)
+    assert own == ["imu", "--yes", "--minutes", "2"]
+    assert ros == ["--ros-args", "-r", "cmd_vel:=other", "--"]
