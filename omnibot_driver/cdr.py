@@ -111,7 +111,9 @@ def twist(data: bytes) -> BodyTwist:
             return messages.planar_twist(values)
         return messages.body_twist(deserialize_message(data, Twist))
     except (RMWError, struct.error) as error:
-        raise CommandRefused(f"cmd_vel refused: its bytes are no Twist ({error}): mend the sender") from error
+        raise CommandRefused(
+            f"cmd_vel refused: its bytes are no Twist ({error}): mend the sender"
+        ) from error
 
 
 class Messages:
