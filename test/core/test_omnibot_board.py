@@ -103,6 +103,14 @@ def test_a_text_says_that_the_board_is_paused() -> None:
     assert readings(bot(), PausedFrame(3)) == [PausedReading()]
 
 
+@pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
+def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
+    """Where anything came between two texts the board ran, and may have restarted since."""
+    texts = readings(bot(), *map(PausedFrame, (255, 0, 2)))
+    assert texts == [PausedReading(), PausedReading(continues=True), PausedReading()]
+    assert readings(bot(), PausedFrame(0), data, PausedFrame(1))[-1] == PausedReading()
+
+
 def test_readings_come_in_the_order_of_the_line() -> None:
     """A pose includes the delta before it."""
     sent = [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0), PausedFrame(0)]

@@ -48,7 +48,7 @@ from omnibot_driver.core.se2 import Pose
 TICK_S: Final = 0.01
 RATES_HZ: Final = (100.0, 25.0, 5.0)
 NOMINAL_BYTES_PER_S: Final = 1700
-DELTA_LSB: Final = (1e-4, 1e-4, 1e-4)
+DELTA_LSB: Final = 1e-4
 """m, m, rad."""
 POSE_LSB_M: Final = 1e-3
 POSE_LSB_RAD: Final = 1e-3
@@ -63,11 +63,10 @@ WAKE: Final = bytes(8)
 class OmniBotSettings:
     """What cannot be known from the wire.
 
-    ``baudrate``: at ten bits to the byte;
-    ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per rad/s; ``position_scale`` and
-    ``heading_scale``: LSB per m and rad of a commanded pose; ``delta_frame``: whether deltas
-    are differences of positions in the board's earth frame, motion along its own axes, or (older
-    firmware) encoder counts of the wheels A, B, C.
+    ``baudrate``: at ten bits to the byte; ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per
+    rad/s; ``position_scale`` and ``heading_scale``: LSB per m and rad of a commanded pose;
+    ``delta_frame``: whether deltas are differences of positions in the board's earth frame, motion
+    along its own axes, or (older firmware) encoder counts of the wheels A, B, C.
     """
 
     baudrate: int = 115200
@@ -125,7 +124,7 @@ class OmniBot:
             return None
         byte_s = 10 / self.settings.baudrate
         ahead, after = 0, len(begun)
-        if begun.startswith(frames.IMU_HEADER):
+        if begun[:2] == frames.IMU_HEADER:
             ahead, after = 1, len(begun) - frames.IMU_LENGTH
             if after < 0:
                 return Edge(1, -after * byte_s, (-after - 1) * byte_s, cut=True)
@@ -241,6 +240,7 @@ class OmniBot:
 
     def _read(self, frame: Frame, now: float, skipped: int = 0) -> Reading:
         self._modes.hear(frame)
+        paused_count, self._paused_count = self._paused_count, None
         match frame:
             case ImuFrame(accel, gyro):
                 self._imus += 1
@@ -263,20 +263,18 @@ class OmniBot:
                 self._suspicion.posed(frame, pose, self.settings.pose_byte_order)
                 return pose
             case PausedFrame(count):
-                before, self._paused_count = self._paused_count, count
+                self._paused_count = count
                 self._sequence.pause()
                 self._rhythm = Rhythm()
-                return PausedReading(continues=before is not None and count == (before + 1) % 256)
+                continues = paused_count is not None and count == (paused_count + 1) % 256
+                return PausedReading(continues)
 
     def _displacement(self, frame: DeltaFrame, now: float) -> DisplacementReading:
-        self._paused_count = None
         step = self._sequence.delta(frame.seq, now, imus=self._imus)
         self._imus = 0
-        words = (frame.dx, frame.dy, frame.dtheta)
+        dx, dy, dyaw = frame.dx * DELTA_LSB, frame.dy * DELTA_LSB, frame.dtheta * DELTA_LSB
         if self.settings.delta_frame == "wheel_counts":
-            dx, dy, dyaw = self._rolled(words)
-        else:
-            dx, dy, dyaw = (word * unit for word, unit in zip(words, DELTA_LSB, strict=True))
+            dx, dy, dyaw = self._rolled((frame.dx, frame.dy, frame.dtheta))
         displacement = DisplacementReading(
             dx,
             dy,
