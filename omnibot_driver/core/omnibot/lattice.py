@@ -166,7 +166,7 @@ class _Search:
             if begins:
                 if byte == _TEXT and measure(data, at) > 0:
                     price = onward = price + evidence.BAD_TEXT
-                elif at + 1 < size and data[at + 1] in _LENGTHS:
+                if byte == _HEADER and at + 1 < size and data[at + 1] in _LENGTHS:
                     onward, begin_run = price + evidence.BAD_HEADER, evidence.BAD_RUN
                 if run < inf:
                     self._edge(bad, bad + 1, 0.0)
