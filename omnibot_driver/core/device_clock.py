@@ -139,8 +139,9 @@ class DeviceClock:
             short = round(lag_s / period_s)
         elif len(lags_s) == BEAT_READS:
             self._settled = True
-            if self._single_reads > BEAT_READS and lag_s > max(lags_s) + 0.95 * period_s:
-                short = max(1, math.floor(lag_s / period_s))
+            later_s = lag_s - max(lags_s)
+            if self._single_reads > BEAT_READS and 0.95 < later_s / period_s < 1.5:
+                short = 1  # more at once were sooner kept waiting than lost
             elif min(lags_s) > period_s / 2:
                 short, counted = round(min(lags_s) / period_s), True
                 lags_s.clear()

@@ -183,6 +183,20 @@ def test_without_displacements_lost_samples_are_counted_by_their_arrival() -> No
         assert spread(stamped.errors()) < 0.5e-3
 
 
+def test_a_stall_that_ends_with_one_sample_at_a_time_loses_none() -> None:
+    """A network hands over what it held packet by packet: the first of ten was no tenth."""
+    for seed in SEEDS:
+        board = Board(seconds=10, skew=1e-4)
+        rng = random.Random(seed)
+        reads = [
+            (1005.0 + (at - 1004.9) * 1e-3 if 1004.9 < at < 1005.0 else at, data)
+            for at, data in bursts(board.stream(rng), rng)
+        ]
+        stamped = stamp(DeviceClock(0.01), board, reads)
+        errors = stamped.errors()
+        assert max(errors) - min(errors) < 1e-3
+
+
 @pytest.mark.parametrize("skew", [*SKEWS, 0.0])
 def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
     """Positive where it is faster than ours, so that its ticks are shorter."""
