@@ -161,12 +161,11 @@ class _Search:
             if run == inf and cost[bad + 1] == inf:
                 continue
             begins = byte in _BEGINNINGS
-            price, begin_run = evidence.BAD_BYTE, evidence.BAD_RUN + evidence.BAD_TAIL
-            onward = price
+            price = onward = evidence.BAD_BYTE
+            begin_run = evidence.BAD_RUN + evidence.BAD_TAIL
             if begins:
-                if byte == _TEXT:
-                    price += evidence.BAD_TEXT if measure(data, at) > 0 else 0.0
-                    onward = price
+                if byte == _TEXT and measure(data, at) > 0:
+                    price = onward = price + evidence.BAD_TEXT
                 elif at + 1 < size and data[at + 1] in _LENGTHS:
                     onward, begin_run = price + evidence.BAD_HEADER, evidence.BAD_RUN
                 if run < inf:
