@@ -196,3 +196,22 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
     reading = trip.move(0.01, 0.0, 0.0)
     estimates = odometry.displace(reading, 0.0) + attach(odometry, trip.pose)
     assert last(estimates) == close((0.01, 0.0, 0.0))
+
+
+def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
+    """Whoever drives to a place in it must know that it lies otherwise."""
+    odometry = Odometry(SETTINGS)
+    attach(odometry, PoseReading(1.0, 2.0, 0.0))
+    counted = [odometry.alignments]
+    odometry.displace(earth(0.01, 0.0), 0.0)
+    odometry.settle(PoseReading(1.01, 2.0, 0.0))
+    counted.append(odometry.alignments)
+    for _ in range(2):
+        odometry.settle(PoseReading(500.0, 600.0, 1.0))
+    counted.append(odometry.alignments)
+    odometry.displace(replace(earth(0.0, 0.0), duration_s=None, restarted=True), 0.04)
+    odometry.settle(PoseReading(0.0, 0.0, 0.0))
+    counted.append(odometry.alignments)
+    odometry.reset()
+    counted.append(odometry.alignments)
+    assert [count - counted[0] for count in counted] == [0, 0, 1, 2, 3]
