@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements as the bytes that rclpy would make of their messages, without making messages.
+"""Measurements as the bytes that rclpy would make of their messages, without making messages; and
+velocity commands likewise from their bytes.
 
 CDR, as DDS serialises, aligns every number to its own size, as a C struct does on a 64-bit machine:
 so Python's ``struct`` with native alignment writes it. Strings are a length and bytes with a NUL,
@@ -13,12 +14,14 @@ import math
 import struct
 from typing import Final
 
+from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rclpy._rclpy_pybind11 import RMWError
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu, JointState
 
 from omnibot_driver import messages
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.odometry import OdometryEstimate
@@ -29,6 +32,7 @@ from omnibot_driver.messages import MessageSettings
 LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 """The encapsulation header; alignment counts from behind it."""
 STAMP: Final = "iI"
+TWIST: Final = struct.Struct("<4s6d").unpack_from
 NO_TURN: Final = (0.0, 0.0, 0.0, 1.0)
 AT_REST: Final = (0.0,) * 6
 
@@ -94,6 +98,22 @@ class Serializer:
         if rates:
             return LITTLE_ENDIAN + self._joints.pack(*head, 3, *rates, 0)
         return LITTLE_ENDIAN + self._joints_at_odds.pack(*head, 0, 0)
+
+
+def twist(data: bytes) -> BodyTwist:
+    """``messages.body_twist`` of a serialised geometry_msgs/Twist.
+
+    Raises CommandRefused for what is none, as another middleware might let through.
+    """
+    try:
+        encapsulation, *values = TWIST(data)
+        if encapsulation == LITTLE_ENDIAN:
+            return messages.planar_twist(values)
+        return messages.body_twist(deserialize_message(data, Twist))
+    except (RMWError, struct.error) as error:
+        raise CommandRefused(
+            f"cmd_vel refused: its bytes are no Twist ({error}): mend the sender"
+        ) from error
 
 
 class Messages:

@@ -46,7 +46,7 @@ class Keeper:
     def beat(self, now: float) -> None:
         """The driver is alive; call it every ``BEAT_S``."""
         if self._process is not None and (trouble := self._beat(self._process)):
-            self._tell(f"the guard process {trouble}; another one is started")
+            self._tell(f"{trouble}; another one is started")
         if self._process is None and now >= self._restart_at:
             self._restart_at = now + RESTART_S
             self._start()
@@ -72,10 +72,10 @@ class Keeper:
                 os.write(pipe, guard.BEAT)
                 return ""
         except OSError:
-            return f"died (exit code {self._dismiss(guard.BYE, LEAVES_WITHIN_S)})"
+            return f"the guard process died (exit code {self._dismiss(guard.BYE, LEAVES_WITHIN_S)})"
         process.kill()
         self._dismiss(b"", LEAVES_WITHIN_S)
-        return "hung"
+        return "the guard process hung"
 
     def _start(self) -> None:
         # By its bare name: whoever kills all that is called omnibot_driver does not hit the guard.

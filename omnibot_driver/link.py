@@ -92,7 +92,7 @@ class Link:
         """Do something with the session; what it has to say is on the wire before this returns."""
         events: Sequence[Event] = ()
         try:
-            with self._changed:
+            with self._lock:
                 now = time.monotonic()
                 self._heed_standstill(now)
                 try:
@@ -104,9 +104,12 @@ class Link:
 
     @property
     def blocked(self) -> bool:
-        """The port is open and takes nothing; it is about to be opened anew."""
+        """What was said last was not taken, and the port is opened anew.
+
+        It may be gone by now: the reader is woken by what the caller finds here.
+        """
         with self._changed:
-            return self._port is not None and self._write_error is not None
+            return self._write_error is not None
 
     def command(self, action: Callable[[Session, float], None], sent_ns: int) -> None:
         """``call``, with a command sent at this time of day by the sender's clock.
@@ -210,14 +213,16 @@ class Link:
                     continue
                 now = time.monotonic()
                 measured = self._session.hear(data, now)
-            self._deliver(measured)
+            if measured:
+                self._deliver(measured)
             with self._lock:
                 self._wait_s = self.reconnect_interval_s
                 self._received += len(data)
                 self._heed_standstill(now)
                 self._session.heed(now)
                 events = self._settle()
-            self._deliver(events)
+            if events:
+                self._deliver(events)
 
     def _detach(self, port: Port, *, comes_back: bool) -> None:
         """Whatever ended the reading, the robot is not left with a command to carry out."""
@@ -245,10 +250,10 @@ class Link:
                 if now < self._pacing_until:
                     self._changed.wait(self._pacing_until - now)
                     continue
-                notices = self._beat(now)
+                events: list[Event] = [*self._beat(now)]
                 if now >= self._session.wake_at:
                     self._session.tick(now)
-                events = [*notices, *self._settle()]
+                    events += self._settle()
             self._deliver(events)
 
     def _beat(self, now: float) -> list[Notice]:

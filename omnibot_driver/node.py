@@ -18,7 +18,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Bool, Float32MultiArray
 
-from omnibot_driver import declaration, messages, parameters, selfcheck
+from omnibot_driver import cdr, declaration, messages, parameters, selfcheck
 from omnibot_driver.core.diagnosis import Refusals
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.omnibot import OmniBot
@@ -121,17 +121,15 @@ class OmniBotDriver(Node):
         if self._values["enable_stamped_cmd_vel"]:
             self.create_subscription(TwistStamped, "cmd_vel", self._on_twist_stamped, 1)
         else:
-            self.create_subscription(Twist, "cmd_vel", self._on_twist, 1)
+            self.create_subscription(Twist, "cmd_vel", self._on_twist, 1, raw=True)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._looking = self.create_timer(LOOK_EVERY_S, self._look_for_other_types, clock=steady)
         self.create_subscription(Float32MultiArray, "wheel_cmd", self._on_wheels, 1)
         self.create_subscription(PoseStamped, "cmd_pose", self._on_pose, 1)
         self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
 
-    def _on_twist(self, twist: Twist, info: MessageInfo) -> None:
-        self._command(
-            lambda session, now: session.command_twist(messages.body_twist(twist), now), info
-        )
+    def _on_twist(self, data: bytes, info: MessageInfo) -> None:
+        self._command(lambda session, now: session.command_twist(cdr.twist(data), now), info)
 
     def _on_twist_stamped(self, stamped: TwistStamped, info: MessageInfo) -> None:
         age_s = messages.age(stamped.header.stamp, self.get_clock().now().nanoseconds)

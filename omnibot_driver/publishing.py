@@ -146,7 +146,7 @@ class Publishing:
         self._over = True
 
     def _change_time(self, jump: TimeJump) -> None:
-        """Called when time begins or ceases to be simulated; to ask each time costs a microsecond."""
+        """Time begins or ceases to be simulated; to ask each time would cost a microsecond."""
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[bytes], None]:

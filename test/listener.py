@@ -18,7 +18,8 @@ from omnibot_driver.link import Link
 
 PATIENCE_S = 20.0
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
-LAST_WORDS = bytes(8) + STOP + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+EMERGENCY_STOP = bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+LAST_WORDS = bytes(8) + STOP + EMERGENCY_STOP
 
 
 class Listener:

@@ -6,7 +6,7 @@ import struct
 from typing import Any
 
 import pytest
-from geometry_msgs.msg import Quaternion
+from geometry_msgs.msg import Quaternion, Twist, Vector3
 from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from omnibot_driver import cdr, parameters
 from omnibot_driver.cdr import Messages, Serializer, difference
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.odometry import OdometryEstimate
@@ -108,3 +109,32 @@ def test_the_orientation_that_is_none_is_the_messages_default() -> None:
     """A quaternion that nobody fills in is no turn, in rclpy too."""
     nothing = Quaternion()
     assert (nothing.x, nothing.y, nothing.z, nothing.w) == cdr.NO_TURN
+
+
+@given(vectors, vectors)
+def test_a_velocity_is_read_from_its_bytes_in_either_byte_order(
+    linear: tuple[float, float, float], angular: tuple[float, float, float]
+) -> None:
+    """As from the message itself; a big-endian sender's bytes are rclpy's to read."""
+    (x, y, z), (u, v, w) = linear, angular
+    data = serialize_message(Twist(linear=Vector3(x=x, y=y, z=z), angular=Vector3(x=u, y=v, z=w)))
+    assert cdr.twist(data) == BodyTwist(x, y, w)
+    assert cdr.twist(bytes(4) + struct.pack(">6d", *linear, *angular)) == BodyTwist(x, y, w)
+
+
+@pytest.mark.parametrize("place", range(6))
+@pytest.mark.parametrize("nonsense", [float("nan"), float("inf"), float("-inf")])
+def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense: float) -> None:
+    """Also of an axis that this robot has not."""
+    values = [0.1] * 6
+    values[place] = nonsense
+    with pytest.raises(CommandRefused, match="not finite"):
+        cdr.twist(cdr.LITTLE_ENDIAN + struct.pack("<6d", *values))
+
+
+@pytest.mark.parametrize("length", range(52))
+def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> None:
+    """Whatever a middleware lets through."""
+    data = cdr.LITTLE_ENDIAN + struct.pack("<6d", *[0.1] * 6)
+    with pytest.raises(CommandRefused, match="no Twist"):
+        cdr.twist(data[:length])

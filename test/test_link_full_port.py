@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 from listener import (
+    EMERGENCY_STOP,
     LAST_WORDS,
     PATIENCE_S,
     STOP,
@@ -76,7 +77,7 @@ def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: T
     terminal.fill()
     link.call(lambda session, now: session.estop(True, now))
     assert link.blocked
-    terminal.read_until(STOP + bytes.fromhex("FF FE 10 00 00 00 00 00 00"))
+    terminal.read_until(STOP + EMERGENCY_STOP)
     link.close("stop")
 
 

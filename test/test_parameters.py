@@ -145,6 +145,13 @@ def test_one_wrong_value_among_many_is_found() -> None:
         check_all({"port": "/dev/ttyACM3", "command_rate": 1e6, "baudrate": 9600})
 
 
+def test_a_frame_that_moves_within_itself_is_refused() -> None:
+    """TF would have a loop; the IMU may well be the base."""
+    with pytest.raises(ParameterError, match="'odom_frame' must not be 'base_link'"):
+        check_all({"odom_frame": "base_link"})
+    assert check_all({"imu_frame": "base_link"})
+
+
 @pytest.mark.parametrize("signs", [[1, 1, -1], [1, -1, 1], [-1, -1, -1]])
 def test_axis_signs_that_no_mirror_makes_are_refused_for_position_control(
     signs: list[int],

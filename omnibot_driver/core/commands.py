@@ -107,7 +107,7 @@ class CommandStream:
         if self._quiet:
             return math.inf
         next_write = self._next_write()
-        if self.current is not None and not self.latched:
+        if self.current is not None:
             return min(next_write, self._expires_at)
         return next_write if self._frame(next_write, next_write) else math.inf
 
@@ -129,4 +129,4 @@ class CommandStream:
             return self._stop
         if self.current is not None:
             return self.current.frame(now)
-        return self._stop if self._urgent or due_at < self._stopping_until else b""
+        return self._stop if due_at < self._stopping_until else b""

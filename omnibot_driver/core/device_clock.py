@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from omnibot_driver.core.board import DisplacementReading, Edge, ImuReading, PoseReading, Reading
-from omnibot_driver.core.tick_line import TickLine
+from omnibot_driver.core.tick_line import Point, TickLine
 
 LARGEST_LOSS_TICKS: Final = 25
 """If more are missing that no counter has told, then nothing that was known holds any more."""
@@ -60,6 +60,8 @@ class DeviceClock:
         self._single_reads = 0
         """The last so many brought one sample each, so none waited for another."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
+        self._cut_off: Point | None = None
+        """What a cut sample tells of the line, if it was cut by the read and not by a loss."""
 
     @property
     def skew_ppm(self) -> float:
@@ -77,6 +79,10 @@ class DeviceClock:
         """
         ticks = self._count(readings)
         line = self._line = self._line or TickLine(self._period_s, (self._tick, now))
+        if readings and self._cut_off:
+            if isinstance(readings[0], ImuReading) and not readings[0].lost:
+                line.not_before(self._cut_off)
+            self._cut_off = None
         short = 0
         if edge is not None:
             kinds = list(map(type, readings))
@@ -104,7 +110,7 @@ class DeviceClock:
                 self._tick += 1 + reading.lost
             elif isinstance(reading, DisplacementReading):
                 self._tick += self._missing(reading)
-                self._displaced_tick = self._tick
+                self._displaced_tick = None if reading.restarted else self._tick
             elif isinstance(reading, PoseReading) and self._displaced_tick is not None:
                 self._displaced_tick += reading.lost * self._displacement_ticks
             ticks.append(self._tick)
@@ -133,8 +139,9 @@ class DeviceClock:
             short = round(lag_s / period_s)
         elif len(lags_s) == BEAT_READS:
             self._settled = True
-            if self._single_reads > BEAT_READS and lag_s > max(lags_s) + 0.95 * period_s:
-                short = max(1, math.floor(lag_s / period_s))
+            later_s = lag_s - max(lags_s)
+            if self._single_reads > BEAT_READS and 0.95 < later_s / period_s < 1.5:
+                short = 1  # more at once were sooner kept waiting than lost
             elif min(lags_s) > period_s / 2:
                 short, counted = round(min(lags_s) / period_s), True
                 lags_s.clear()
@@ -150,8 +157,11 @@ class DeviceClock:
             lag_s -= short * line.slope_s
         lags_s.append(lag_s)
         self._seen_tick = tick
-        missing = tick if edge.cut else tick + 1
-        line.see((tick, arrival), (missing, now + edge.earliest_s), cut=edge.cut)
+        line.see((tick, arrival), cut=edge.cut)
+        if edge.cut:
+            self._cut_off = tick, now + edge.earliest_s
+        else:
+            line.not_before((tick + 1, now + edge.earliest_s))
         return short
 
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:

@@ -37,6 +37,8 @@ class SpeedLimits:
 
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
         """The velocity after ``duration_s`` on the straight way to what is wanted."""
+        if not self.linear_mps2 and not self.angular_radps2:
+            return wanted
         vx, vy = _step(
             (now.vx_mps, now.vy_mps),
             (wanted.vx_mps, wanted.vy_mps),

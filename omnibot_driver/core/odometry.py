@@ -12,9 +12,10 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from omnibot_driver.core.backlog import Backlog, advanced, chord
+from omnibot_driver.core.backlog import Backlog, advanced
 from omnibot_driver.core.belief import Belief, expected
 from omnibot_driver.core.board import DisplacementReading, PoseReading
+from omnibot_driver.core.bridge import Bridge
 from omnibot_driver.core.follower import Follower
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose, Signs, roll, unroll
@@ -27,8 +28,6 @@ LONG_GAP: Final = 25
 """After more lost displacements the next ones wait for the pose, which tells what was lost."""
 POSE_DUE_S: Final = 0.24
 """Board time within which a pose comes, unless it is lost as well."""
-LONGEST_BRIDGE: Final = 50
-"""Displacements that a bridge stands for at the most; a robot that is not heard is soon stopped."""
 UNKNOWN_S: Final = 0.5
 """Time in which a robot rolls out: what may be unreported where nobody knows how long it was."""
 
@@ -84,8 +83,8 @@ class Odometry:
         self._belief = Belief()
         self._restarted: Pose | None = None
         self._backlog = Backlog()
+        self._bridge = Bridge()
         self._last_stamp_s: float | None = None
-        self._last: tuple[Pose, float] | None = None
         self._rolled = Pose()
         self.reset()
 
@@ -260,7 +259,8 @@ class Odometry:
 
     def _integrate(self, reading: DisplacementReading, stamp_s: float) -> OdometryEstimate:
         last_stamp_s, self._last_stamp_s = self._last_stamp_s, stamp_s
-        bridge, tangent = self._tangents(reading)
+        heading_rad = None if self._board is None else self._board.yaw_rad
+        bridge, tangent = self._bridge.tangents(reading, heading_rad)
         seconds = reading.duration_s
         if seconds is None:
             self._miss(UNKNOWN_S)
@@ -269,7 +269,7 @@ class Odometry:
             self._miss((reading.lost + 1) * seconds)
         if reading.lost:
             stamped_s = math.inf if last_stamp_s is None else stamp_s - last_stamp_s - seconds
-            self._bridge(bridge, reading.lost * seconds, stamped_s)
+            self._cross(bridge, reading.lost * seconds, stamped_s)
         if self._board is not None:
             self._board = advanced(self._board, reading)
         self._move(tangent, seconds, seconds)
@@ -283,7 +283,7 @@ class Odometry:
             stamp_s, self._follower.pose, twist, covariance, self._rolled, rolling
         )
 
-    def _bridge(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
+    def _cross(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
         """Motion that was not told, taken to be this one; the stamps leave so much time for it."""
         if self._board is not None:
             self._board = self._board.moved(roll(tangent))
@@ -292,10 +292,10 @@ class Odometry:
 
     def _bridge_until_pose(self, lost: int) -> None:
         """Displacements are missing that the pose includes; nobody knows what comes after it."""
-        if lost and self._last is not None:
-            tangent, period_s = self._last
+        if lost and self._bridge.last is not None:
+            tangent, period_s = self._bridge.last
             self._miss((lost + 1) * period_s)
-            self._bridge(tangent.times(lost, lost, lost), lost * period_s)
+            self._cross(tangent.times(lost, lost, lost), lost * period_s)
 
     def _move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Along a tangent in the board's body axes, and no further than by the stamps it can be."""
@@ -309,30 +309,6 @@ class Odometry:
             self._settings.fastest_radps * stamped_s,
         )
         self._belief.passed(seconds)
-
-    def _tangents(self, reading: DisplacementReading) -> tuple[Pose, Pose]:
-        """In the board's body axes: of the lost displacements before this one, and of this one.
-
-        What was lost is taken to have been like the motion on both sides of it.
-        """
-        if reading.duration_s is None:
-            self._last = None
-            return Pose(), self._tangent(reading, 0.0)
-        if not reading.lost:
-            tangent = self._tangent(reading, 0.0)
-            self._last = (tangent, reading.duration_s)
-            return Pose(), tangent
-        half = min(reading.lost, LONGEST_BRIDGE) / 2
-        last_turn_rad = self._last[0].yaw_rad if self._last else reading.dyaw_rad
-        tangent = self._tangent(reading, half * (last_turn_rad + reading.dyaw_rad))
-        last = self._last[0] if self._last else tangent
-        self._last = (tangent, reading.duration_s)
-        return (last + tangent).times(half, half, half), tangent
-
-    def _tangent(self, reading: DisplacementReading, bridged_rad: float) -> Pose:
-        if reading.frame == "body" or self._board is None:
-            return chord(reading)
-        return unroll(chord(reading).turned(-self._board.yaw_rad - bridged_rad))
 
     def _miss(self, duration_s: float) -> None:
         self._uncertainty.miss(duration_s, self._settings.fastest_mps, self._settings.fastest_radps)

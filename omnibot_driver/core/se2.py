@@ -40,11 +40,6 @@ class Pose:
         """No NaN and no infinity in it."""
         return all(map(math.isfinite, (self.x_m, self.y_m, self.yaw_rad)))
 
-    @property
-    def tiny(self) -> bool:
-        """Nothing but the rounding of floats."""
-        return self.way_m < 1e-9 and abs(self.yaw_rad) < 1e-9
-
     def turned(self, angle_rad: float) -> "Pose":
         """The same displacement seen from axes turned by ``-angle_rad``; yaw stays."""
         cos, sin = math.cos(angle_rad), math.sin(angle_rad)

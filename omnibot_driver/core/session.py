@@ -215,7 +215,8 @@ class Session:
         if last is None:
             return
         self._react(self._measuring.digest(), now)
-        self._tell(now)
+        if now >= self._tell_at:
+            self._tell(now)
         if self._board.mode.running and not isinstance(last, PausedReading):
             self._supervisor.heard_data(now)
 
@@ -360,8 +361,6 @@ class Session:
             self._notify(self._driving.check_goal([], now))
 
     def _tell(self, now: float) -> None:
-        if now < self._tell_at:
-            return
         self._tell_at = now + TELL_EVERY_S
         bulletin, board, odometry = self._bulletin, self._board, self._odometry
         once = [board.advice] if board.advice is not None else []

@@ -107,7 +107,6 @@ class Supervisor:
     def closed(self) -> None:
         """The port is gone, and every request with it."""
         self.phase = Phase.CLOSED
-        self._output.clear()
         self._answer(False, "the port was lost meanwhile; call again once it is back")
 
     def request(self, request: Request, token: object, now: float) -> None:

@@ -32,6 +32,7 @@ class Tally:
     last_gap: int = 0
     """How many the last one lost."""
     reads: int = 0
+    """That ended with a sample."""
     delay_s: float = 0.0
     """Sum over the reads of how old the newest sample was; the least that ever happens is 0."""
     squared_delay_s2: float = 0.0
@@ -42,10 +43,11 @@ class Tally:
     _rate: Vector3 | None = field(default=None, repr=False)
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
-        """A read brought these, the newest of which was so old."""
-        self.reads += 1
-        self.delay_s += delay_s
-        self.squared_delay_s2 += delay_s * delay_s
+        """A read brought these, the newest of which, if it is a sample, was so old."""
+        if isinstance(readings[-1], ImuReading | DisplacementReading):
+            self.reads += 1
+            self.delay_s += delay_s
+            self.squared_delay_s2 += delay_s * delay_s
         for reading in readings:
             match reading:
                 case ImuReading(force, rate, lost):

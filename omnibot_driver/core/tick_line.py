@@ -65,9 +65,8 @@ class TickLine:
         """The time of this tick."""
         return self._anchor[1] + self.slope_s * (tick - self._anchor[0])
 
-    def see(self, latest: Point, earliest: Point, *, cut: bool) -> None:
-        """A read: its newest tick had come by ``latest``; the next, or if ``cut`` the same, was not
-        to come before ``earliest``."""
+    def see(self, latest: Point, *, cut: bool) -> None:
+        """A read: its newest tick had come by ``latest``; whether the read ``cut`` it."""
         tick, arrival = latest
         anchor_tick, anchor_s = self._anchor
         if arrival < anchor_s + self.slope_s * (tick - anchor_tick):
@@ -75,10 +74,13 @@ class TickLine:
         height_s = arrival - self.slope_s * tick
         if self._best is None or height_s < self._best_s:
             self._best, self._best_s = (latest, cut), height_s
-        self._not_before.append(earliest)
         if tick - self._block_from >= BLOCK_TICKS:
             self._end_block(*self._best)
             self._best, self._not_before, self._block_from = None, [], tick
+
+    def not_before(self, earliest: Point) -> None:
+        """A read that had not brought this tick by then."""
+        self._not_before.append(earliest)
 
     def _end_block(self, best: Point, cut: bool) -> None:
         if not self._latest or self._latest[-1][0][0] < best[0]:

@@ -35,8 +35,17 @@ def check_all(given: Mapping[str, object]) -> dict[str, Value]:
         parameter.name: parameter.check(given.get(parameter.name, parameter.default))
         for parameter in PARAMETERS
     }
+    _require_two_frames(values)
     _require_a_frame_for_goals(values)
     return values
+
+
+def _require_two_frames(values: Mapping[str, Any]) -> None:
+    if values["odom_frame"] == values["base_frame"]:
+        raise ParameterError(
+            f"parameter 'odom_frame' must not be '{values['odom_frame']}', which is 'base_frame':"
+            " a frame cannot move within itself"
+        )
 
 
 def _require_a_frame_for_goals(values: Mapping[str, Any]) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from random import Random
+from statistics import median
 
 from ratios import Figure, alternate, short
 from truth import FAULTS, SCENARIOS, generate, receive
@@ -18,10 +19,15 @@ from omnibot_driver import parameters
 from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, OmniBot, PoseFrame
 from omnibot_driver.core.omnibot.frames import Frame
 from omnibot_driver.core.session import Session
+from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 
 BYTES_PER_S = 1700.0
 CHUNKS = (1, 14, 64, 4096)
 SECONDS = 120.0
+SETTLED = 400
+"""Ticks."""
+OTHERS_BYTES = 24 << 20
+"""More than a processor's own caches hold."""
 GOALS = {"clean": 1.5, "1 byte in 100 lost": 4.0}
 
 _IMU, _DELTA, _POSE = (struct.Struct(form).unpack_from for form in (">6h", ">3hB", ">3fB"))
@@ -100,15 +106,34 @@ def linearity() -> list[str]:
     return rows
 
 
+def cold(ticks: int) -> str:
+    """What a read of one IMU frame takes until it can be published, in a loop and as it happens."""
+    session, board = _session(), SimulatedBoard(BoardSettings(seed=1, running=True))
+    other = bytearray(OTHERS_BYTES)
+    taken: dict[bool, list[float]] = {False: [], True: []}
+    for tick in range(SETTLED + ticks):
+        data, now = board.step(), tick * 0.01
+        forgotten = tick % 2 == 0
+        if forgotten and tick >= SETTLED:
+            other[:] = bytes(OTHERS_BYTES)
+        begun = time.perf_counter()
+        session.hear(data, now)
+        passed = time.perf_counter() - begun
+        session.heed(now)
+        session.take_output(now)
+        session.take_events()
+        if tick >= SETTLED and len(data) == 14:
+            taken[forgotten].append(passed)
+    hot_us, cold_us = (1e6 * median(taken[forgotten]) for forgotten in (False, True))
+    return (
+        f"One IMU frame, from its bytes to what is published: {short(hot_us)} µs right after"
+        f" another one, {short(cold_us)} µs after something else has used the processor's caches."
+    )
+
+
 def memory(hours: float = 1.0) -> str:
     """Bytes through decoder and session as fast as it goes; resident memory meanwhile."""
-    settings = parameters.check_all({})
-    session = Session(
-        OmniBot(parameters.board_settings(settings)),
-        parameters.session_settings(settings),
-        run=True,
-    )
-    session.opened(0.0)
+    session = _session()
     data, now, events = stream(SECONDS), 0.0, 0
     resident_mb = []
     ends = [*range(38, len(data), 38), len(data)]
@@ -134,6 +159,17 @@ def memory(hours: float = 1.0) -> str:
 
 
 FAULTY = "1 byte in 100 lost"
+
+
+def _session() -> Session:
+    settings = parameters.check_all({})
+    session = Session(
+        OmniBot(parameters.board_settings(settings)),
+        parameters.session_settings(settings),
+        run=True,
+    )
+    session.opened(0.0)
+    return session
 
 
 def _us_per_frame(work: object, data: object, frames: int) -> float:

@@ -14,7 +14,8 @@ import rclpy
 from geometry_msgs.msg import Twist
 from rclpy.node import Node
 
-PERIOD_S = 0.025
+PERIOD_S = 0.0247
+"""No multiple of the board's tick: every moment between two of its readings is met."""
 FASTEST = 30
 LSB_PER_MPS = 70.0
 

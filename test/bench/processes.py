@@ -79,6 +79,11 @@ def floor(what: str, path: str, namespace: str) -> Program:
     return Program(str(HERE / "floor.py"), what, path, namespace)
 
 
+def step(what: str, path: str, namespace: str) -> Program:
+    """The smallest relay that does so much more."""
+    return Program(str(HERE / "steps.py"), what, path, namespace)
+
+
 def ear(*namespaces: str) -> Program:
     """Somebody who listens, once this returns."""
     program = Program(str(HERE / "ear.py"), *namespaces)

@@ -42,6 +42,9 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
     figures += core.decoding(1 if quick else 7)
     say("split")
     sections = ["", "Processor time of the driver by stage:", "", *system.split(5 if quick else 30)]
+    say("step by step")
+    sections += ["", "From the floor to the driver, by ratios:", "", *system.steps(windows // 2)]
+    sections += ["", core.cold(200 if quick else 2000)]
     say("many drivers")
     scale = system.scale(SCALES[:2] if quick else SCALES, 3 if quick else 15)
     sections += ["", "Drivers side by side on this machine, each with a board:", "", *scale]

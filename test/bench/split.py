@@ -50,7 +50,8 @@ def timed(owner: type, name: str, stage: str) -> None:
 
 timed(Port, "read", "read")
 timed(FrameDecoder, "feed", "decode")
-timed(Session, "receive", "measure (clock, plausibility, odometry, IMU)")
+timed(Session, "hear", "measure (clock, plausibility, odometry, IMU)")
+timed(Session, "heed", "measure (clock, plausibility, odometry, IMU)")
 timed(Publishing, "deliver", "convert (stamps, serialising)")
 timed(Publisher, "publish", "publish")
 timed(threading.Thread, "run", "the rest of the reader (lock, commands due, state)")

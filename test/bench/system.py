@@ -17,11 +17,12 @@ from pathlib import Path
 from statistics import median, quantiles
 from tempfile import TemporaryDirectory
 
-from processes import HERE, Program, driver, ear, floor
+from processes import HERE, Program, driver, ear, floor, step
 from ratios import Figure, alternate
 from stage import TICK_S, Stage, number_of
+from steps import STEPS
 
-WINDOW_S = 10.0
+WINDOW_S = 8.0
 SETTLING_S = 5.0
 MPS2_PER_COUNT = 9.80665 / 16384
 
@@ -69,6 +70,41 @@ def measurements(windows: int) -> tuple[list[Figure], str]:
         f" (floor: {delivered[1]:,}) of {100 * (marks[-1] - marks[0]):,.0f}."
     )
     return figures, memory
+
+
+def steps(windows: int) -> list[str]:
+    """From the floor to the driver, one thing after another; rows of a table."""
+    names = ["floor", *STEPS, "ours"]
+    with Stage(len(names)) as stage, ExitStack() as stack:
+        listener = stack.enter_context(ear(*names))
+        paths = dict(zip(names, stage.paths, strict=True))
+        programs = [
+            stack.enter_context(floor("measurements", paths["floor"], "floor")),
+            *(stack.enter_context(step(each, paths[each], each)) for each in STEPS),
+            stack.enter_context(driver(paths["ours"], "ours")),
+        ]
+        time.sleep(2 * SETTLING_S)
+        marks, busy = [time.monotonic()], [[program.busy_s for program in programs]]
+        for _ in range(windows):
+            time.sleep(WINDOW_S)
+            marks.append(time.monotonic())
+            busy.append([program.busy_s for program in programs])
+        heard = listener.result()["heard"]
+    units = (1.0, *(MPS2_PER_COUNT,) * (len(names) - 1))
+    late = [_latencies(*each) for each in zip(stage.said, heard, units, strict=True)]
+    least = [
+        [median(us for at, us in each if start <= at < end) for each in late]
+        for start, end in pairwise(marks)
+    ]
+    spent = [[b - a for a, b in zip(*pair, strict=True)] for pair in pairwise(busy)]
+    rows = ["| relay | latency, median | processor time |", "|---|---|---|"]
+    told = ["the floor", *(f"+ {text}" for text, _, _ in STEPS.values()), "the driver"]
+    for number, text in enumerate(told):
+        latency, time_ = (
+            median(window[number] / window[0] for window in each) for each in (least, spent)
+        )
+        rows.append(f"| {text} | {latency:.2f} | {time_:.2f} |")
+    return rows
 
 
 def commands(windows: int) -> Figure:

@@ -42,3 +42,9 @@ def estop(bench: Bench, active: bool) -> str:
 def reconnect(bench: Bench) -> None:
     bench.close()
     bench.open()
+
+
+def push(bench: Bench, x_m: float, y_m: float, yaw_rad: float) -> None:
+    """By hand, within one tick: the wheels roll, and the board notices."""
+    odometry = bench.board._odometry
+    odometry.pose = odometry.pose.moved(x_m, y_m, yaw_rad)

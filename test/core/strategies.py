@@ -44,10 +44,11 @@ def believable(frame: Frame) -> bool:
     return True
 
 
+below_10_m_per_s = st.one_of(st.sampled_from(TREACHEROUS_WORDS[:7]), st.integers(-4000, 4000))
 believable_frames = st.one_of(
     st.builds(ImuFrame, st.tuples(words, words, st.just(-16384)), triples),
     imu_frames.filter(believable),
-    delta_frames,
+    st.builds(DeltaFrame, below_10_m_per_s, below_10_m_per_s, below_10_m_per_s, counters),
     pose_frames.filter(believable),
     paused_frames,
 )

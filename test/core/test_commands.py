@@ -158,12 +158,34 @@ def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
     assert run(stream, 1.62, 1.64)[0][1] == TURN
 
 
+def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
+    stream: CommandStream,
+) -> None:
+    """A second one would only be late."""
+    order(stream, GO, 1.0)
+    stream.due(1.0)
+    order(stream, STOP, 1.001)
+    stream.due(1.001)
+    order(stream, TURN, 1.002, Authority.WHEELS)
+    assert run(stream, 1.002, 1.03) == [(pytest.approx(1.011), TURN)]
+
+
+def test_what_is_discarded_leaves_the_line_quiet(stream: CommandStream) -> None:
+    """A Stop that was to go out at once, and the second of them, included."""
+    order(stream, GO, 1.0)
+    stream.halt(1.0)
+    stream.discard()
+    assert stream.due(1.0) == b""
+    assert stream.wake_at == math.inf
+
+
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: CommandStream) -> None:
     """Neither the Stop between them nor the newer one."""
     order(stream, GO, 1.0)
     stream.due(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
     stream.latch(1.001)
+    assert stream.current is None
     assert {frame for _, frame in run(stream, 1.001, 1.2)} == {ESTOP}
 
 

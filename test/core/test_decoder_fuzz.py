@@ -121,28 +121,22 @@ def work(
     monkeypatch: pytest.MonkeyPatch, stream: bytes, chunk_length: int, pause_s: float = 0.0
 ) -> tuple[int, int]:
     """Looks at a byte, edges and gaps of the lattice; and the most bytes held between calls."""
-    done, measure, read, edge = 0, decoder.measure, decoder.read, lattice._Search._edge
+    done, measure, forward = 0, decoder.measure, lattice._Search._forward
 
     def measuring(data: bytes | bytearray, at: int) -> int:
         nonlocal done
         done += 1
         return measure(data, at)
 
-    def reading(data: bytes, *state: Any, **more: Any) -> list[lattice.Piece]:
+    def searching(search: lattice._Search, *of: Any) -> None:
         nonlocal done
-        done += len(data)
-        return read(data, *state, **more)
-
-    def adding(search: lattice._Search, *of: Any) -> None:
-        nonlocal done
-        done += 1 + len(search._gaps)
-        edge(search, *of)
+        forward(search, *of)
+        done += len(search._data) + len(search._edges) * (1 + len(search._gaps))
 
     most = 0
     with monkeypatch.context() as patch:
         patch.setattr(decoder, "measure", measuring)
-        patch.setattr(decoder, "read", reading)
-        patch.setattr(lattice._Search, "_edge", adding)
+        patch.setattr(lattice._Search, "_forward", searching)
         made = FrameDecoder()
         for number, at in enumerate(range(0, len(stream), chunk_length)):
             made.feed(stream[at : at + chunk_length], number * pause_s)
@@ -174,4 +168,3 @@ def test_no_repeated_pattern_costs_much_more_than_another(
     with pytest.MonkeyPatch.context() as patch:
         done, _ = work(patch, stream, chunk_length)
     assert done <= 1000 * len(stream)
-    print(done / len(stream))

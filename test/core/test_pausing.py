@@ -143,8 +143,10 @@ def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
     bench.hears = True
-    assert bench.ask(Request.START, 5.0).success
+    start = len(bench.written)
+    assert bench.ask(Request.START, 5.0).message == "running (nominal)"
     bench.run(3.0)
+    assert b"P" not in bench.written_since(start)
     assert bench.board.mode is BoardMode.NOMINAL
     drive_on(bench)
     assert not bench.still()

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import pytest
 from bench import EMERGENCY_STOP, STOP, Bench
+from robots import push, reconnect
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.supervisor import Request
@@ -153,11 +154,6 @@ def estop(bench: Bench) -> None:
     bench.settle()
 
 
-def reconnect(bench: Bench) -> None:
-    bench.close()
-    bench.open()
-
-
 @pytest.mark.parametrize(
     "event",
     [
@@ -222,7 +218,7 @@ def test_a_robot_that_is_pushed_a_little_keeps_its_goal(bench: Bench) -> None:
     bench.run(3.0)
     pushed = bench.board.odometry
     for _ in range(20):
-        bench.board._pose = bench.board._pose.moved(-0.01, 0.0, 0.015)
+        push(bench, -0.01, 0.0, 0.015)
         bench.run(0.04)
     bench.run(3.0)
     assert bench.board.odometry.x_mm == pytest.approx(pushed.x_mm, abs=2.0)

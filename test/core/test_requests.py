@@ -5,7 +5,7 @@
 import itertools
 
 import pytest
-from bench import STOP, Bench
+from bench import OPENING, STOP, Bench
 from robots import drive_on, driving, standing
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
@@ -66,10 +66,35 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
     assert [(answer.token, answer.success) for answer in answers] == [(token, False)]
 
 
+def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
+    """Stop and R had not been written yet."""
+    bench = standing()
+    bench.session.request(Request.RESET, object(), bench.now)
+    bench.session.closed(bench.now)
+    start = len(bench.written)
+    bench.open()
+    assert bench.written_since(start) == OPENING + b"S"
+
+
+@pytest.mark.parametrize("speaks", [True, False])
+def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
+    """While a board is started, paused or reset, one that does not answer too."""
+    bench = Bench()
+    bench.speaks = speaks
+    bench.open()
+    for request in (Request.START, Request.PAUSE, Request.RESET):
+        bench.session.request(request, token := object(), bench.now)
+        while not any(isinstance(e, RequestDone) and e.token is token for e in bench.events):
+            bench.run(0.01)
+            assert bench.session.wake_at > bench.now
+
+
 def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench) -> None:
-    """S is harmless while running; the current command goes on."""
+    """S is harmless while running, and said against a P in flight; the current command goes on."""
     bench.drive(0.3)
-    assert bench.ask(Request.START, 1.0).success
+    start = len(bench.written)
+    assert bench.ask(Request.START, 1.0).message == "running (nominal)"
+    assert bench.written_since(start).startswith(b"S")
     bench.run(0.1)
     assert not bench.still()
 

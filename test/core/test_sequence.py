@@ -71,6 +71,18 @@ def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_wit
     assert sequence.delta(16, 16 * 0.04) == Step(1)
 
 
+def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
+    """Twelve deltas are missing, and both poses among them came in: twelve in all."""
+    sequence = Sequence()
+    for count in range(10):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    told = [sequence.pose(number, (5 * number + 4) * 0.04) for number in (2, 3)]
+    assert told == [Step(5), Step(5)]
+    assert sequence.delta(22, 22 * 0.04) == Step(2)
+
+
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
     """Two seconds after 205 the count is at zero anyway, but not that of the poses."""
     sequence = Sequence()
@@ -126,6 +138,28 @@ def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it
     assert sequence.delta(110, 100.04, imus=4) == Step(0)
     assert sequence.delta(111, 100.08, imus=4) == Step(100)
     assert sequence.delta(112, 100.12, imus=4) == Step(0)
+
+
+def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
+    """Its count is near zero, but the next true one goes on from where the board was."""
+    sequence = begun(88)
+    assert sequence.delta(1, 100.02, imus=1).restarted
+    assert sequence.delta(89, 100.04, imus=2) == Step(0)
+    assert sequence.delta(90, 100.08, imus=4) == Step(0)
+
+
+def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
+    """What was held in doubt came out late, and the next delta soon after it."""
+    sequence = Sequence()
+    for count in range(11):
+        sequence.delta(count, count * 0.04, imus=4)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    for count in (11, 12, 13):
+        sequence.delta(count, 0.56, imus=4)
+    assert sequence.pose(2, 0.56) == Step(1)
+    assert sequence.delta(15, 0.58, imus=4) == Step(0)
+    assert sequence.delta(16, 0.64, imus=4) == Step(0)
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:

@@ -20,7 +20,8 @@ def followed(
     line = TickLine(PERIOD_S, (0, 1.0))
     for tick in range(ticks):
         true_s = tick * period_s
-        line.see((tick, true_s + above(tick)), (tick, true_s + below(tick)), cut=False)
+        line.see((tick, true_s + above(tick)), cut=False)
+        line.not_before((tick, true_s + below(tick)))
     return line, line.at(ticks) - ticks * period_s
 
 

@@ -4,7 +4,7 @@
 
 import pytest
 from bench import STOP, Bench
-from robots import drive_on, driving
+from robots import drive_on, driving, push
 
 from omnibot_driver.simulator import BoardSettings
 
@@ -66,7 +66,7 @@ def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> No
     """Standing takes a moment, and whoever bumps into it does not drive it."""
     bench.run(4.0)
     for _ in range(5):
-        bench.board._pose = bench.board._pose.moved(0.005, 0.0, 0.0)
+        push(bench, 0.005, 0.0, 0.0)
         bench.run(0.4)
     assert bench.notices == []
 

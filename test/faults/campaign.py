@@ -24,7 +24,8 @@ from cases import Case, survivable
 from endings import ENDINGS, terminal_is_closed
 from fuzz import fuzz
 from goals import GOAL_ENDINGS, GOALS
-from rig import GoalRig, NetworkRig, Rig
+from other_rigs import GoalRig, NetworkRig
+from rig import Rig
 from stuck import NETWORK
 from walk import walk
 

@@ -33,9 +33,9 @@ IN_THE_READER: Final = """
 import omnibot_driver.node as node
 from omnibot_driver.core.session import Session
 def end(self, message):
-    def receive(self, data, now):
+    def hear(self, data, now):
         raise ZeroDivisionError("a defect in the reader")
-    Session.receive = receive
+    Session.hear = hear
 node.OmniBotDriver._on_estop_topic = end
 """
 HANGS: Final = """

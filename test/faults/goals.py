@@ -11,7 +11,8 @@ from functools import partial
 from typing import Final
 
 from breakable_line import cut
-from rig import TIMEOUT_S, GoalRig
+from other_rigs import GoalRig
+from rig import TIMEOUT_S
 from std_srvs.srv import SetBool, Trigger
 from stuck import TAKES_NOTHING
 

@@ -9,7 +9,6 @@ the board, whether the odometry went on without a jump, what the process costs.
 import math
 import os
 import re
-import socket
 import subprocess
 import time
 from contextlib import ExitStack
@@ -21,7 +20,7 @@ from typing import Any, Final, Self
 from breakable_line import TICK_S, BreakableLine
 from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import PATIENCE_S, Driver
-from hands import Hand, Navigator, Stick
+from hands import Hand, Stick
 from nav_msgs.msg import Odometry
 from ports import Server, Terminal
 from probe import Probe
@@ -272,41 +271,3 @@ class Rig:
         status = (folder / "status").read_text()
         kilobytes = int(status.split("VmRSS:")[1].split()[0])
         return len(os.listdir(folder / "fd")), kilobytes
-
-
-class NetworkRig(Rig):
-    """The board is behind a server on the network."""
-
-    def __init__(self, folder: Path, **options: Any) -> None:
-        super().__init__(folder, **options)
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            self._number = server.getsockname()[1]
-        self.port = f"socket://127.0.0.1:{self._number}"
-
-    @property
-    def server(self) -> Server:
-        """What is plugged in."""
-        assert isinstance(self._terminal, Server)
-        return self._terminal
-
-    def _make_terminal(self) -> Server:
-        return Server(self.line, self._number)
-
-
-class GoalRig(Rig):
-    """The board's switch stands on position: goals, not velocities."""
-
-    def __init__(self, folder: Path, **options: Any) -> None:
-        board = BoardSettings(control="position")
-        super().__init__(folder, board=board, control_method="position", **options)
-
-    def make_hand(self) -> Hand:
-        return Navigator(self.probe, self.odom)
-
-    def drive(self, vx: float = 0.3, vy: float = 0.0, yaw_rate: float = 0.2) -> None:
-        """A goal, sent until it is taken; then it is pursued without anybody's help."""
-        for _ in range(50):
-            self.hand.hold(vx, vy, yaw_rate)
-            if self.wait_for_board(lambda line: line.board.driven, 0.2):
-                return
-        raise AssertionError(self.driver.output)

@@ -7,7 +7,8 @@ from functools import partial
 from typing import Final
 
 from breakable_line import cut
-from rig import TIMEOUT_S, NetworkRig, Rig
+from other_rigs import NetworkRig
+from rig import TIMEOUT_S, Rig
 from std_srvs.srv import SetBool
 
 OLD_COMMAND: Final = bytes.fromhex("FF FE 01 00 15 00 00 00 64")

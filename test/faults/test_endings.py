@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from endings import ENDINGS, Ending, terminal_is_closed
 from goals import GOAL_ENDINGS
-from rig import GoalRig, Rig
+from other_rigs import GoalRig
+from rig import Rig
 
 SOME = (
     "ctrl-C, plugged in but not yet open again",

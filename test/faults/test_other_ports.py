@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 from goals import GOALS
-from rig import GoalRig, NetworkRig
+from other_rigs import GoalRig, NetworkRig
 from stuck import NETWORK
 from walk import walk
 

@@ -98,6 +98,23 @@ def test_readings_saturate_at_the_range_of_the_sensor() -> None:
     assert readings(board, 0.1)[0][5] == 32767 / 131
 
 
+def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
+    """The root mean square over sixty robots; each step adds to those before."""
+    ends = []
+    for seed in range(60):
+        board = SimulatedBoard(
+            BoardSettings(
+                running=True,
+                seed=seed,
+                gyro_walk_dps=2.0,
+                gyro_noise_dps=0.0,
+                gyro_bias_dps=(0.0, 0.0, 0.0),
+            )
+        )
+        ends.append(readings(board, 1.0)[-1][3:])
+    assert rms(ends) == pytest.approx([2.0] * 3, rel=0.3)
+
+
 def test_a_stuck_gyro_reads_its_counts_whatever_the_motion() -> None:
     """All three words stay, while the accelerometer goes on."""
     board = SimulatedBoard(BoardSettings(running=True, gyro_stuck=(-6, -5, -4)))

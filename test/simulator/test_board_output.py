@@ -86,6 +86,21 @@ def test_a_sequence_goes_on_after_a_pause() -> None:
     )
 
 
+def test_the_rhythm_of_deltas_and_poses_goes_on_through_a_pause() -> None:
+    """Ticks count from the end of the boot, whatever the mode is in them."""
+    board = SimulatedBoard(RUNNING)
+    run(board, 0.05)
+    board.receive(b"P")
+    run(board, 0.06)
+    board.receive(b"P")
+    run(board, 0.09)
+    ticks = {
+        header: [one.tick for one in board.sent if one.data.startswith(header)]
+        for header in (DELTA, POSE)
+    }
+    assert ticks == {DELTA: [4, 12, 16, 20], POSE: [20]}
+
+
 def drive_square(board: SimulatedBoard) -> None:
     """Four sides of a metre, two of them sideways, turned by 90 degrees half way."""
     legs = [velocity(35, 0, 0), velocity(0, 35, 0)] * 2

@@ -125,9 +125,7 @@ def test_the_end_of_the_input_does_not_end_it() -> None:
 
 def test_the_options_reach_the_board() -> None:
     """An IMU-only board with a running start says so."""
-    options = ["--running", "--imu-only", "--frame", "body", "--latching-estop", "--seed", "7"]
-    options += ["--control", "position"]
-    with simulator(*options) as process:
+    with simulator("--running", "--imu-only") as process:
         line(process)
         say(process, "truth")
         truth = json.loads(line(process))

@@ -55,6 +55,13 @@ def test_larger_wheels_carry_the_robot_further_than_the_encoders_say() -> None:
     assert large.truth.yaw_rad == pytest.approx(1.02 * plain.truth.yaw_rad)
 
 
+def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
+    """By its factor, and the encoders do not know."""
+    plain, wide = drive(BoardSettings()), drive(BoardSettings(base_radius_scale=1.05))
+    assert wide.encoders == plain.encoders
+    assert wide.truth.yaw_rad == pytest.approx(plain.truth.yaw_rad / 1.05)
+
+
 def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
     """Over many wheel turns the loss averages to the setting, and it depends on the seed."""
     plain = drive(BoardSettings(), 3000)

@@ -102,10 +102,8 @@ def test_reset_brings_the_board_back_and_odometry_goes_on(probe: Probe, board: P
     assert still(board.board)
 
 
-def test_estop_latches_is_on_the_wire_at_once_and_releases_to_standing_still(
-    probe: Probe, board: PtyBoard
-) -> None:
-    """When the answer arrives the board has stopped; a release moves nothing."""
+def test_estop_latches_and_releases_to_standing_still(probe: Probe, board: PtyBoard) -> None:
+    """The robot stops; a release moves nothing."""
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     drive(probe, board)
     assert probe.call(SetBool, "estop", data=True).success

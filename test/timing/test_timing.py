@@ -19,6 +19,24 @@ def test_lost_bytes_shift_no_stamps(line: str, scenario: str) -> None:
         assert spread(stamped.errors()) < 0.5e-3
 
 
+@pytest.mark.parametrize(
+    ("line", "scenario", "skew", "seed"),
+    [
+        ("FTDI", "driving", -1e-4, 0),
+        ("FTDI", "IMU only, noisy gyro", -5e-5, 6),
+        ("FTDI, timer restarted by data", "driving", -5e-5, 6),
+        ("single bytes", "driving", 5e-5, 3),
+    ],
+)
+def test_a_sample_that_a_loss_cut_and_a_delta_that_was_made_up_shift_none_either(
+    line: str, scenario: str, skew: float, seed: int
+) -> None:
+    """One in a hundred: the streams that showed each of them."""
+    stamped = stamp(line, scenario, 1e-2, skew, seed, 30.0)
+    assert stamped.unevenness() < 0.2e-3
+    assert spread(stamped.errors()) < 0.5e-3
+
+
 @pytest.mark.parametrize("event", ["the board restarts", "stall of 0.3 s", "stall of 2 s"])
 def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(event: str) -> None:
     """One constant before and after."""

@@ -94,6 +94,14 @@ def test_uneven_stamps_are_noticed(drive: Drive) -> None:
     assert "steps between stamps of imu/data_raw vary" in jitter.text
 
 
+def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) -> None:
+    """Two states, one cable."""
+    drive.states += [(8.0, "disconnected"), (8.5, "connecting"), (9.0, "nominal")]
+    for topic in (drive.imu, drive.odom, drive.joints):
+        topic.drop(8.0, 9.0)
+    assert "1 time, first at 8.0 s" in said(drive, "State", "out of reach").text
+
+
 def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
     """Nothing comes after it to step to."""
     drive.imu.drop(17.0, 99.0)

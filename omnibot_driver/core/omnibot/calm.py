@@ -36,10 +36,9 @@ _POSE: Final = {
     "little": struct.Struct("<3fB").unpack_from,
 }
 
-# A frozen object is made without its constructor three times as fast.
+# A frozen object that is filled slot by slot costs a third of one made by its constructor.
 _new: Final = object.__new__
-_set_accel: Final = ImuFrame.accel.__set__  # type: ignore[attr-defined]
-_set_gyro: Final = ImuFrame.gyro.__set__  # type: ignore[attr-defined]
+_set_accel, _set_gyro = (vars(ImuFrame)[name].__set__ for name in ("accel", "gyro"))
 
 LEARN_EVERY: Final = 8
 """Frames; more would teach the expectation nothing new."""

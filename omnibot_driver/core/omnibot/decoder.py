@@ -9,8 +9,8 @@ a header alone proves nothing. A frame is believed for what stands around it, in
   nothing speaks against it: what follows in hand begins like a frame, its content is no leap, the
   line was not idle within it, and its last byte is not one that the next header may have lent.
 * *In doubt* all readings of the bytes in hand compete (``lattice``), priced by all the evidence
-  (``evidence``). A frame of the cheapest reading comes out when every reading without it is dearer
-  by ``SURE``; where two are close, nothing is said. A doubt waits for ``DOUBT_BYTES`` at the most.
+  (``evidence``). A frame of the cheapest reading comes out when every reading without it is clearly
+  dearer; where two are close, nothing is said. A doubt waits for ``DOUBT_BYTES`` at the most.
 
 This module reads no clock and never raises on input. It holds less than ``DOUBT_BYTES`` between
 calls, and looks at each byte a bounded number of times.

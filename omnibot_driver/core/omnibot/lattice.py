@@ -70,6 +70,7 @@ _HEADLESS: Final = {
 """By the half of the header that is left."""
 _HEADER: Final = 0xFF
 _TEXT: Final = 0x50
+_BEGINNINGS: Final = (_HEADER, _TEXT)
 
 
 @value(frozen=True, slots=True)
@@ -149,8 +150,9 @@ class _Search:
         data, size, least = self._data, len(self._data), self._least
         self._limit = limit
         self._cost = cost = [inf] * (self._end + 1)
-        self._by = by = [None] * (self._end + 1)
-        self._edges = edges = []
+        by: list[_Edge | None] = [None] * (self._end + 1)
+        edges: list[_Edge] = []
+        self._by, self._edges = by, edges
         self._contexts = {0: self._start_context, 1: self._start_context}
         cost[0], cost[1] = inf if in_step else evidence.UNKNOWN_START, 0.0
         for at, byte in enumerate(data):
@@ -158,21 +160,20 @@ class _Search:
             run = cost[bad]
             if run == inf and cost[bad + 1] == inf:
                 continue
-            begins = byte == _HEADER or byte == _TEXT
-            price, begin_run = evidence.BAD_BYTE, evidence.BAD_RUN + evidence.BAD_TAIL
-            onward = price
+            begins = byte in _BEGINNINGS
+            price = onward = evidence.BAD_BYTE
+            begin_run = evidence.BAD_RUN + evidence.BAD_TAIL
             if begins:
-                if byte == _TEXT:
-                    price += evidence.BAD_TEXT if measure(data, at) > 0 else 0.0
-                    onward = price
+                if byte == _TEXT and measure(data, at) > 0:
+                    price = onward = price + evidence.BAD_TEXT
                 elif at + 1 < size and data[at + 1] in _LENGTHS:
                     onward, begin_run = price + evidence.BAD_HEADER, evidence.BAD_RUN
                 if run < inf:
                     self._edge(bad, bad + 1, 0.0)
             if run + onward + least[bad + 2] <= limit:
                 cost[bad + 2] = run + onward
-                by[bad + 2] = edge = (bad, bad + 2, onward, None, None)
-                edges.append(edge)
+                edges.append((bad, bad + 2, onward, None, None))
+                by[bad + 2] = edges[-1]
             here = cost[bad + 1]
             if here < inf:
                 price += begin_run
@@ -207,7 +208,7 @@ class _Search:
         first = data[at]
         length = _LENGTHS.get(data[at + 1], 0) if first == _HEADER and at + 1 < size else 0
         if length:
-            if evidence.BROKEN_OFF <= spare:
+            if spare >= evidence.BROKEN_OFF:
                 for end in range(at + 2, min(at + length - 2, size - 1)):
                     if data[end] == _HEADER and data[end + 1] in _LENGTHS:
                         price = evidence.BROKEN_OFF + self._idle_within(at, end)

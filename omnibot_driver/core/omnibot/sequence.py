@@ -53,6 +53,8 @@ class Sequence:
         self._ahead: int | None = None
         """The last count, if it was ahead of the time. The time is believed until the next one goes
         on from it: a bit flipped, or the framing was deceived."""
+        self._left: tuple[int, float, int] | None = None
+        """The last count before one that seemed to begin anew, its time, and that one."""
 
     def pause(self) -> None:
         """The board said that it is paused: what comes next takes up the count, or begins anew."""
@@ -64,8 +66,10 @@ class Sequence:
 
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
         """A delta with this count came in, and so many IMU frames since the one before."""
+        self._take_back(count, now)
         before, self._delta = self._delta, count
-        elapsed_s, self._delta_at = now - self._delta_at, now
+        before_at, self._delta_at = self._delta_at, now
+        elapsed_s = now - before_at
         paused, self._paused = self._paused, False
         reconnected, self._reconnected = self._reconnected, False
         told, self._told = self._told, 0
@@ -79,12 +83,12 @@ class Sequence:
         late_s = abs((lost + 1) * DELTA_PERIOD_S - elapsed_s)
         from_zero = count * DELTA_PERIOD_S <= elapsed_s + EARLY_S
         if lost and late_s > LATE_S and (reconnected or from_zero):
-            self._pose = None
+            self._pose, self._left = None, (before, before_at, count)
             return Step(0, None, restarted=True)
         latest_s = (lost + 1) * DELTA_PERIOD_S - (
             DELTA_PERIOD_S / 2 if imus == IMUS_PER_DELTA else LATE_S
         )
-        ahead = lost > 0 and elapsed_s < latest_s
+        ahead = lost > told and elapsed_s < latest_s
         goes_on = self._ahead is not None and 0 < (count - self._ahead) % WRAP <= DELTAS_PER_POSE
         self._ahead = count if ahead and not goes_on else None
         in_time = max(0, round(elapsed_s / DELTA_PERIOD_S) - 1)
@@ -111,6 +115,16 @@ class Sequence:
         if from_zero and not goes_on and abs(passed - counted) > 2 * DELTAS_PER_POSE:
             return Step(0, None, restarted=True)
         missing = max(0, passed - counted)
-        in_time = missing * DELTA_PERIOD_S <= now - self._delta_at + DELTA_PERIOD_S
-        self._told = missing if in_time else 0
-        return Step(self._told)
+        if (self._told + missing) * DELTA_PERIOD_S > now - self._delta_at + DELTA_PERIOD_S:
+            return Step(0)  # there was no time for so many
+        self._told += missing
+        return Step(missing)
+
+    def _take_back(self, count: int, now: float) -> None:
+        """What seemed to begin anew did not, if this count goes on from the one before it."""
+        left, self._left = self._left, None
+        if left is not None:
+            was, at, anew = left
+            on_time = abs((count - was) % WRAP * DELTA_PERIOD_S - (now - at)) <= LATE_S
+            if on_time and not 0 < (count - anew) % WRAP <= DELTAS_PER_POSE:
+                self._delta, self._delta_at = was, at

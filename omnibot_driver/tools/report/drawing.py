@@ -16,7 +16,7 @@ STATES: Final = {
     "imu_only": "#B9D67A",
     "paused": "#F2C14E",
     "connecting": "#F08A4B",
-    "disconnected": "#C0272D",
+    "disconnected": "#8E6BB0",
 }
 WIDTH_IN: Final = 10.0
 POINTS: Final = 3000

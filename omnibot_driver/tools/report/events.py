@@ -13,6 +13,7 @@ from omnibot_driver.tools.report.log import Log, Span, Status
 LEVELS: Final = ("OK", "WARN", "ERROR", "STALE")
 FIRST_SECONDS: Final = 3.0
 """In which a driver that has just been started may still be connecting."""
+OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
 """A driver that has published no /diagnostics for so long is not there."""
@@ -35,11 +36,7 @@ def _states(log: Log) -> Iterator[Finding]:
     for state in states:
         lengths[state.what] = lengths.get(state.what, 0.0) + state.length_s
     told = ", ".join(f"{name} for {span(length)}" for name, length in lengths.items())
-    lost = [
-        state
-        for state in states
-        if state.what in ("disconnected", "connecting") and state.end_s > FIRST_SECONDS
-    ]
+    lost = _lost(states)
     if lost:
         yield Finding(
             Level.BAD
@@ -59,6 +56,18 @@ def _states(log: Log) -> Iterator[Finding]:
         )
     else:
         yield Finding(Level.GOOD, "State", f"{told[:1].upper()}{told[1:]}.")
+
+
+def _lost(states: list[Span]) -> list[Span]:
+    """While the board was out of reach, whether or not its port was open meanwhile."""
+    lost: list[Span] = []
+    for state in states:
+        if state.what in OUT_OF_REACH and state.end_s > FIRST_SECONDS:
+            begin_s = state.begin_s
+            if lost and lost[-1].end_s == begin_s:
+                begin_s = lost.pop().begin_s
+            lost.append(Span(begin_s, state.end_s, ""))
+    return lost
 
 
 def _alive(log: Log, state: Span) -> bool:

@@ -2,7 +2,8 @@
 
 """Pictures of a log: each function draws one figure, which needs neither a screen nor ROS."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import zip_longest
 from typing import Final
 
 import numpy as np
@@ -11,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from omnibot_driver.tools.report import following, rhythm, sensing, travel
+from omnibot_driver.tools.report import events, following, rhythm, sensing, travel
 from omnibot_driver.tools.report.drawing import (
     COMMAND,
     GREY,
@@ -30,7 +31,7 @@ from omnibot_driver.tools.report.drawing import (
     shade,
     time_axis,
 )
-from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Series, Span
+from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Series, Span, Status
 
 HOLE_S: Final = 1.0
 """What was not heard for longer is not drawn as a way."""
@@ -229,10 +230,7 @@ def timeline(log: Log) -> Figure:
         told = [
             item for item in log.diagnostics if (item.hardware_id, item.name) == (hardware_id, name)
         ]
-        band(
-            name.rpartition(": ")[2],
-            ((Span(item.at_s, item.at_s + 1.0, ""), LEVELS[min(item.level, 3)]) for item in told),
-        )
+        band(name.rpartition(": ")[2], _said(told))
     axes.set_yticks(range(len(labels)), labels)
     axes.set_ylim(len(labels) - 0.4, -0.6)
     axes.yaxis.set_tick_params(length=0)
@@ -240,6 +238,15 @@ def timeline(log: Log) -> Figure:
     axes.xaxis.set_major_locator(MaxNLocator(10))
     time_axis(axes, log)
     return figure
+
+
+def _said(told: list[Status]) -> Iterator[tuple[Span, str]]:
+    """Each until the next, which comes after a second, about."""
+    for item, after in zip_longest(told, told[1:]):
+        end_s = item.at_s + 1.0
+        if after is not None and after.at_s - item.at_s < events.SILENT_S:
+            end_s = after.at_s
+        yield Span(item.at_s, end_s, ""), LEVELS[min(item.level, 3)]
 
 
 def _name_states(axes: Axes, log: Log) -> None:

@@ -1,7 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The quick loop for calm frames takes exactly what the decoder's own loop takes."""
+"""The decoder's short cuts change nothing: neither its quick loop for calm frames, nor what the
+lattice leaves out."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf
 from random import Random
 
 import pytest
@@ -9,28 +13,32 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from truth import CHUNKERS, FAULTS, SCENARIOS, generate, receive
 
-from omnibot_driver.core.omnibot import FrameDecoder, decoder
+from omnibot_driver.core.omnibot import FrameDecoder, decoder, lattice
+from omnibot_driver.core.omnibot.bounds import least_costs
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics
+from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Expectation
 from omnibot_driver.core.omnibot.frames import Frame
 
 SECONDS = 6.0
-Outcome = list[tuple[list[Frame], list[int], DecoderStatistics]]
+Outcome = list[tuple[list[Frame], list[int], DecoderStatistics, bytes | None]]
 Chunks = list[tuple[bytes, float]]
 
 TRUTHS = {name: generate(scenario, 11, SECONDS) for name, scenario in SCENARIOS.items()}
 
 
 def outcome(chunks: Chunks, *, quick: bool) -> Outcome:
-    """What comes out of each call, and what is counted."""
+    """What comes out of each call, what is counted, and what has begun."""
     with pytest.MonkeyPatch.context() as patch:
         if not quick:
             patch.setattr(decoder, "take_calm", lambda _held, at, context, *_: (at, context))
+            patch.setattr(lattice, "least_costs", lambda data: [0.0] * (2 * len(data) + 3))
+            patch.setattr(lattice, "STEP", inf)
         tested = FrameDecoder()
         found: Outcome = []
         for data, now in chunks:
             frames = tested.feed(data, now)
-            found.append((frames, tested.skipped, tested.statistics))
-        found.append((tested.flush(now + 1.0), tested.skipped, tested.statistics))
+            found.append((frames, tested.skipped, replace(tested.statistics), tested.begun))
+        found.append((tested.flush(now + 1.0), tested.skipped, tested.statistics, None))
     return found
 
 
@@ -59,7 +67,7 @@ pieces = st.sampled_from(
 ) | st.binary(max_size=20)
 
 
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 @given(st.lists(st.tuples(pieces, st.sampled_from([0.0, 0.001, 0.01, 0.2])), min_size=1))
 def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, float]]) -> None:
     """In any order, with any pauses."""
@@ -82,5 +90,36 @@ def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(decoder.Expectation, "weigh", count)
     chunks = chunks_of("driving", "none, starting anywhere", "whole bursts", 1)
     found = outcome(chunks, quick=True)
-    imus = sum(type(frame) is decoder.ImuFrame for frames, _, _ in found for frame in frames)
+    imus = sum(type(frame) is decoder.ImuFrame for frames, *_ in found for frame in frames)
     assert weighed.count(decoder.ImuFrame) < 0.1 * imus
+
+
+def test_most_of_the_lattice_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Or they would compare one full search with another."""
+    edges = {True: 0, False: 0}
+    pieces = lattice._Search.pieces
+    chunks = chunks_of("driving", "1 byte in 100 lost", "4096-byte blocks", 1)
+    for quick in edges:
+
+        def count(search: lattice._Search, quick: bool = quick) -> Sequence[lattice.Piece]:
+            edges[quick] += len(search._edges)
+            return pieces(search)
+
+        monkeypatch.setattr(lattice._Search, "pieces", count)
+        outcome(chunks, quick=quick)
+    assert 0 < edges[True] < 0.4 * edges[False]
+
+
+@settings(max_examples=200)
+@given(st.lists(pieces, min_size=1, max_size=8).map(b"".join).map(lambda data: data[:170]))
+def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
+    """Nor does the bound fall, along any edge, by more than the edge costs."""
+    least = least_costs(data)
+    search = lattice._Search(data, NOTHING_KNOWN, Expectation(16384.0), [], "big")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(lattice, "least_costs", lambda data: [0.0] * (2 * len(data) + 3))
+        patch.setattr(lattice, "STEP", inf)
+        search.run(in_step=False, closed=False)
+    for start, end, price, _, _ in search._edges:
+        assert least[start] <= price + least[end] + 1e-9
+    assert least[search._end] == 0.0

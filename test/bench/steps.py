@@ -1,0 +1,133 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The floor again, doing one thing more at each step: what an honest relay cannot leave out.
+
+Arguments: which step (a key of STEPS), port, namespace. It publishes bytes and writes nothing.
+"""
+
+import os
+import select
+import sys
+import termios
+import threading
+import time
+from collections.abc import Callable
+from typing import Final
+
+import rclpy
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from sensor_msgs.msg import Imu, JointState
+
+from omnibot_driver import parameters
+from omnibot_driver.cdr import Serializer
+from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, OmniBot
+from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.session import Session
+from omnibot_driver.core.uncertainty import Covariance
+from omnibot_driver.messages import MessageSettings
+
+MPS2_PER_COUNT = 9.80665 / 16384
+AT_REST = (Pose(), BodyTwist(0.0, 0.0, 0.0), Covariance(), Pose(), BodyTwist(0.0, 0.0, 0.0))
+Estimates = list[ImuEstimate | OdometryEstimate]
+
+
+class Relay:
+    """``publish`` is given what a step made of a read."""
+
+    def __init__(self, node: Node) -> None:
+        values = parameters.check_all({})
+        self._make = Serializer(MessageSettings.from_parameters(values))
+        self._imus = node.create_publisher(Imu, "imu/data_raw", 10)
+        self._odometries = node.create_publisher(Odometry, "odom", 10)
+        self._joints = node.create_publisher(JointState, "joint_states", 10)
+        self._decoder = FrameDecoder()
+        self._session = Session(
+            OmniBot(parameters.board_settings(values)),
+            parameters.session_settings(values),
+            run=True,
+        )
+        self._session.opened(time.monotonic())
+
+    def publish(self, estimates: Estimates) -> None:
+        """Each under its topic, with its own stamp."""
+        for estimate in estimates:
+            stamp_ns = round(1e9 * estimate.stamp_s)
+            if isinstance(estimate, ImuEstimate):
+                self._imus.publish(self._make.imu(estimate, stamp_ns))
+            else:
+                self._odometries.publish(self._make.odometry(estimate, stamp_ns))
+                self._joints.publish(self._make.joint_state(estimate, stamp_ns))
+
+    def trust(self, data: bytes) -> None:
+        """The first byte begins a frame; its first word is all that is looked at."""
+        estimates: Estimates = []
+        at = 0
+        while at < len(data):
+            kind = data[at + 1]
+            if kind == 0xFA:
+                word = int.from_bytes(data[at + 2 : at + 4], "big", signed=True)
+                force = (word * MPS2_PER_COUNT, 0.0, 0.0)
+                estimates.append(ImuEstimate(0.0, force, (0.0, 0.0, 0.0)))
+            elif kind == 0xFB:
+                estimates.append(OdometryEstimate(0.0, *AT_REST))
+            at += {0xFA: 14, 0xFB: 9, 0xFC: 15}[kind]
+        self.publish(estimates)
+
+    def decode(self, data: bytes) -> None:
+        """Frames are proven."""
+        estimates: Estimates = []
+        for frame in self._decoder.feed(data, time.monotonic()):
+            if isinstance(frame, ImuFrame):
+                x, y, z = frame.accel
+                force = (x * MPS2_PER_COUNT, y * MPS2_PER_COUNT, z * MPS2_PER_COUNT)
+                estimates.append(ImuEstimate(0.0, force, (0.0, 0.0, 0.0)))
+            elif isinstance(frame, DeltaFrame):
+                estimates.append(OdometryEstimate(0.0, *AT_REST))
+        self.publish(estimates)
+
+    def measure(self, data: bytes) -> None:
+        """... stamped, checked and integrated; and the session is told the rest."""
+        now = time.monotonic()
+        self.publish(list(self._session.hear(data, now)))
+        self._session.heed(now)
+        self._session.take_output(now)
+        told = self._session.take_events()
+        self.publish([each for each in told if isinstance(each, OdometryEstimate)])
+
+
+STEPS: Final[dict[str, tuple[str, Callable[[Relay, bytes], None], bool]]] = {
+    "bytes": ("publish bytes, not messages", Relay.trust, False),
+    "poll": ("a read that can be ended, and a lock", Relay.trust, True),
+    "decode": ("prove the frames", Relay.decode, True),
+    "measure": ("stamp, check, integrate, react", Relay.measure, True),
+}
+
+
+def main() -> None:
+    """Until the line hangs up, or it is killed."""
+    step, path, namespace = sys.argv[1:]
+    port = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    rclpy.init()
+    node = Node("step", namespace=namespace, start_parameter_services=False, enable_rosout=False)
+    relay, lock = Relay(node), threading.Lock()
+    _, work, polls = STEPS[step]
+    arrivals = select.poll()
+    arrivals.register(port, select.POLLIN)
+    termios.tcflush(port, termios.TCIFLUSH)
+    while True:
+        if polls:
+            arrivals.poll()
+        if not (data := os.read(port, 4096)):
+            return
+        if polls:
+            with lock:
+                pass
+        work(relay, data)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Rigs whose board is behind a network, or whose board's switch stands on position."""
+
+import socket
+from pathlib import Path
+from typing import Any
+
+from hands import Hand, Navigator
+from ports import Server
+from rig import Rig
+
+from omnibot_driver.simulator import BoardSettings
+
+
+class NetworkRig(Rig):
+    """The board is behind a server on the network."""
+
+    def __init__(self, folder: Path, **options: Any) -> None:
+        super().__init__(folder, **options)
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            self._number = server.getsockname()[1]
+        self.port = f"socket://127.0.0.1:{self._number}"
+
+    @property
+    def server(self) -> Server:
+        """What is plugged in."""
+        assert isinstance(self._terminal, Server)
+        return self._terminal
+
+    def _make_terminal(self) -> Server:
+        return Server(self.line, self._number)
+
+
+class GoalRig(Rig):
+    """The board's switch stands on position: goals, not velocities."""
+
+    def __init__(self, folder: Path, **options: Any) -> None:
+        board = BoardSettings(control="position")
+        super().__init__(folder, board=board, control_method="position", **options)
+
+    def make_hand(self) -> Hand:
+        return Navigator(self.probe, self.odom)
+
+    def drive(self, vx: float = 0.3, vy: float = 0.0, yaw_rate: float = 0.2) -> None:
+        """A goal, sent until it is taken; then it is pursued without anybody's help."""
+        for _ in range(50):
+            self.hand.hold(vx, vy, yaw_rate)
+            if self.wait_for_board(lambda line: line.board.driven, 0.2):
+                return
+        raise AssertionError(self.driver.output)

@@ -1,0 +1,139 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A port that comes late, goes, comes back, or comes back while everything ends."""
+
+import itertools
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from listener import (
+    PATIENCE_S,
+    STOP,
+    Listener,
+    link_to,
+    nothing_left_behind,
+    session,
+    wait_for_the_end_of,
+)
+
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left_behind() -> Iterator[None]:
+    """Every link and port that a test opens gives its threads and descriptors back."""
+    with nothing_left_behind():
+        yield
+
+
+def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
+    """Closing works before, too."""
+    listener, ours = Listener(), session()
+    name = str(tmp_path / "omnibot")
+    link = link_to(name, listener, ours)
+    link.start()
+    listener.wait_for(lambda: len(listener.reports) > 2)
+    with PtyBoard(SimulatedBoard(), name):
+        listener.wait_for(lambda: ours.state == "nominal")
+        link.close("stop")
+    never = link_to(name, Listener(), session())
+    never.start()
+    never.close("stop")
+
+
+def test_attempts_are_made_less_and_less_often_up_to_a_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each wait is half as long again as the one before; a limit keeps the board from waiting."""
+
+    class Timed(Listener):
+        def report(self, trouble: str | None) -> None:
+            times.append(time.monotonic())
+            super().report(trouble)
+
+    listener, times = Timed(), list[float]()
+    link = link_to("/no/such/port", listener, session())
+    link.start()
+    listener.wait_for(lambda: len(listener.reports) >= 6)
+    link.close("stop")
+    for number, (before, after) in enumerate(itertools.pairwise(times[:6])):
+        assert after - before >= 0.02 * 1.5**number
+    monkeypatch.setattr("omnibot_driver.link.LONGEST_WAIT_S", 0.0)
+    listener = Listener()
+    link = link_to("/no/such/port", listener, session())
+    link.start()
+    listener.wait_for(lambda: len(listener.reports) > 40)  # unlimited, that took days
+    link.close("stop")
+
+
+def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_path: Path) -> None:
+    """Behind the link that udev keeps; the command from before is forgotten."""
+    name = tmp_path / "omnibot"
+    listener, ours = Listener(), session()
+    with PtyBoard(SimulatedBoard()) as second:
+        with PtyBoard(SimulatedBoard(), str(name)) as first:
+            link = link_to(str(name), listener, ours)
+            link.start()
+            listener.wait_for(lambda: ours.state == "nominal")
+            link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
+            assert first.wait_for(lambda b: b.commands[-1].kind == "velocity", PATIENCE_S)
+        listener.wait_for(lambda: ours.state == "disconnected")
+        name.symlink_to(second.path)
+        listener.wait_for(lambda: ours.state == "nominal")
+        assert second.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
+        with second.lock:
+            assert "velocity" not in [command.kind for command in second.board.commands]
+        link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
+        assert second.wait_for(lambda b: b.commands[-1].kind == "velocity", PATIENCE_S)
+        link.close("stop")
+        assert first.path != second.path
+
+
+def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
+    """The terminal hangs up."""
+    listener, ours = Listener(), session()
+    with PtyBoard(SimulatedBoard()) as board:
+        link = link_to(board.path, listener, ours)
+        link.start()
+        listener.wait_for(lambda: ours.state == "nominal")
+    listener.wait_for(lambda: ours.state == "disconnected" and len(listener.reports) > 1)
+    link.close("stop")
+    assert "lost" in str(listener.reports[1])
+
+
+def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_farewell_too() -> None:
+    """The robot may still be driving by what it was told before the port was lost."""
+    listener = Listener()
+    closer = threading.Thread(target=lambda: link.close("stop"))
+
+    def close_first(_trouble: str | None) -> None:
+        closer.start()
+        wait_for_the_end_of("omnibot-pacer")
+
+    listener.report = close_first  # type: ignore[method-assign]
+    with PtyBoard(SimulatedBoard(BoardSettings(running=True))) as board:
+        link = link_to(board.path, listener, session())
+        link.start()
+        assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
+        closer.join(PATIENCE_S)
+        wait_for_the_end_of("omnibot-reader")
+
+
+def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
+    """The cable is in again, and the driver ends before it would have tried the port anew."""
+    name = tmp_path / "omnibot"
+    listener, ours = Listener(), session()
+    link = link_to(str(name), listener, ours)
+    link.reconnect_interval_s = 3600.0
+    with PtyBoard(SimulatedBoard(BoardSettings(running=True)), str(name)):
+        link.start()
+        listener.wait_for(lambda: ours.state == "nominal")
+    listener.wait_for(lambda: len(listener.reports) == 2)
+    with PtyBoard(SimulatedBoard(BoardSettings(running=True)), str(name)) as board:
+        link.close("stop")
+        assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
+    wait_for_the_end_of("omnibot-reader")
