@@ -16,6 +16,9 @@ from typing import Self
 PATIENCE_S = 60.0
 """How long an event is awaited before a test gives up; nobody asserts how long it took."""
 
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda *_: None)  # as good under nohup, and no child inherits it
+
 _namespaces = (f"robot{os.getpid()}_{number}" for number in itertools.count())
 """Of their own also beside another run of the tests that has come by the same ROS domain."""
 
