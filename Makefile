@@ -49,7 +49,7 @@ pictures: $(VENV)/.test  ## make the pictures of README and documents anew (6 mi
 integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), into docs/integrity.md
 	$(PY) test/integrity/report.py
 
-bench: $(VENV)/.test  ## measure speed against a floor (10 minutes), into docs/performance.md
+bench: $(VENV)/.test  ## measure speed against a floor (11 minutes), into docs/performance.md
 	$(PY) test/bench/report.py
 
 faults: $(VENV)/.test  ## break everything, with the real node (16 minutes), into docs/safety.md
