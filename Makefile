@@ -43,7 +43,7 @@ docs: $(VENV)/.docs  ## write what is generated, and build the documents as a si
 	$(PY) -m sphinx -q -W --keep-going -c docs . build/docs
 	@echo "build/docs/docs/index.html"
 
-pictures: $(VENV)/.test  ## make the pictures of README and documents anew (6 minutes)
+pictures: $(VENV)/.test  ## make the pictures of README and documents anew (5 minutes)
 	@$(PY) test/pictures
 
 integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), into docs/integrity.md
