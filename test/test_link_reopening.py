@@ -107,10 +107,11 @@ def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
 
 def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_farewell_too() -> None:
     """The robot may still be driving by what it was told before the port was lost."""
-    listener = Listener()
+    listener, started = Listener(), threading.Event()
     closer = threading.Thread(target=lambda: link.close("stop"))
 
     def close_first(_trouble: str | None) -> None:
+        assert started.wait(PATIENCE_S)
         closer.start()
         wait_for_the_end_of("omnibot-pacer")
 
@@ -118,6 +119,7 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_farewell_too() 
     with PtyBoard(SimulatedBoard(BoardSettings(running=True))) as board:
         link = link_to(board.path, listener, session())
         link.start()
+        started.set()
         assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
         closer.join(PATIENCE_S)
         wait_for_the_end_of("omnibot-reader")
