@@ -123,6 +123,8 @@ class OmniBot:
         if begun is None:
             return None
         byte_s = 10 / self.settings.baudrate
+        if not begun:
+            return Edge(0, 0.0, (frames.IMU_LENGTH - 1) * byte_s)
         ahead, after = 0, len(begun)
         if begun[:2] == frames.IMU_HEADER:
             ahead, after = 1, len(begun) - frames.IMU_LENGTH
@@ -228,14 +230,15 @@ class OmniBot:
 
     def _read_all(self, found: list[Frame], now: float) -> list[Reading]:
         """What a read brings at once did not come at once: each frame has a time of its own."""
-        skipped = self._decoder.skipped
+        skipped, before_s, self._heard_s = self._decoder.skipped, self._heard_s, now
+        if len(found) == 1:
+            return [self._read(found[0], now, skipped[0])]
         left = sum(skipped) + sum(map(_length, found))
         readings = []
         for frame, before in zip(found, skipped, strict=True):
             left -= before + _length(frame)
-            came_s = max(self._heard_s, now - left / NOMINAL_BYTES_PER_S)
+            came_s = max(before_s, now - left / NOMINAL_BYTES_PER_S)
             readings.append(self._read(frame, came_s, before))
-        self._heard_s = now
         return readings
 
     def _read(self, frame: Frame, now: float, skipped: int = 0) -> Reading:

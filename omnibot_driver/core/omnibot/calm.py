@@ -71,7 +71,7 @@ class Walk:
 
 
 def take_calm(
-    held: bytearray,
+    held: bytes | bytearray,
     at: int,
     context: Context,
     expectation: Expectation,

@@ -102,8 +102,11 @@ class FrameDecoder:
             return found
         self._arrived = len(data)
         last, self._last_arrival_s = self._last_arrival_s, now
-        if last is not None and now - last > GAP_S:
-            self._pause(now - last, len(data), found)
+        pause_s = 0.0 if last is None else now - last
+        if not self._held and self._in_step and self._hurry(data, pause_s, found):
+            return found
+        if pause_s > GAP_S:
+            self._pause(pause_s, len(data), found)
         self._held += data
         self._settle(found, closed=False)
         return found
@@ -120,8 +123,9 @@ class FrameDecoder:
     def begun(self) -> bytes | None:
         """What has come of the next frame; None while in doubt about it."""
         held = self._held
-        doubt = not self._in_step or len(held) > TICK_BYTES // 2
-        if doubt or (held and measure(held, 0) == NO_FRAME):
+        if not self._in_step:
+            return None
+        if held and (len(held) > TICK_BYTES // 2 or measure(held, 0) == NO_FRAME):
             return None
         return bytes(held)
 
@@ -152,6 +156,24 @@ class FrameDecoder:
             width = 1 if sharp else arrived
             price = evidence.KNOWN_GAP if known else evidence.GAP
             self._gaps.append((place, place + width, price))
+
+    def _hurry(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
+        """Take all of it, if it is calm, and the pause before it says nothing that is not known."""
+        most = 2 * PAUSES_TO_TRUST
+        if pause_s > GAP_S and not (pause_s <= TICK_S and self._sharp == self._between == most):
+            return False
+        walk = Walk()
+        order = self._pose_byte_order
+        end, context = take_calm(data, 0, self._context, self._expectation, order, walk)
+        if end < len(data):
+            return False
+        self._context = context
+        for _, frame, before in walk.lessons:
+            self._expectation.learn(frame, before)
+        found += walk.frames
+        self.skipped = [0] * len(found)
+        self.statistics.frames += len(found)
+        return True
 
     def _settle(self, found: list[Frame], *, closed: bool) -> None:
         """Take frames from what is held, until nothing is left or more bytes must tell."""
