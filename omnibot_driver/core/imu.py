@@ -7,7 +7,6 @@ Source: MPU-6050 product specification, sections 6.1 and 6.2 (sensitivity scale 
 
 import math
 from dataclasses import dataclass
-from functools import cache
 from typing import Final
 
 STANDARD_GRAVITY: Final = 9.80665
@@ -16,6 +15,10 @@ ACCEL_COUNTS_PER_G: Final = {2: 16384.0, 4: 8192.0, 8: 4096.0, 16: 2048.0}
 """By full-scale range in g."""
 GYRO_COUNTS_PER_DPS: Final = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}
 """By full-scale range in degrees per second."""
+_MPS2_PER_COUNT: Final = {g: STANDARD_GRAVITY / counts for g, counts in ACCEL_COUNTS_PER_G.items()}
+_RADPS_PER_COUNT: Final = {
+    dps: math.radians(1.0 / counts) for dps, counts in GYRO_COUNTS_PER_DPS.items()
+}
 
 ACCEL_TOLERANCE: Final = 0.1
 """Part of gravity by which a sound sensor may be off, its initial tolerance and bias together."""
@@ -45,20 +48,12 @@ class ImuScale:
 
     def specific_force(self, counts: Counts) -> Vector3:
         """Counts to m/s²."""
-        unit = _count_mps2(self.accel_range_g)
-        return counts[0] * unit, counts[1] * unit, counts[2] * unit
+        unit = _MPS2_PER_COUNT[self.accel_range_g]
+        x, y, z = counts
+        return x * unit, y * unit, z * unit
 
     def angular_velocity(self, counts: Counts) -> Vector3:
         """Counts to rad/s."""
-        unit = _count_radps(self.gyro_range_dps)
-        return counts[0] * unit, counts[1] * unit, counts[2] * unit
-
-
-@cache
-def _count_mps2(range_g: int) -> float:
-    return STANDARD_GRAVITY / ACCEL_COUNTS_PER_G[range_g]
-
-
-@cache
-def _count_radps(range_dps: int) -> float:
-    return math.radians(1.0 / GYRO_COUNTS_PER_DPS[range_dps])
+        unit = _RADPS_PER_COUNT[self.gyro_range_dps]
+        u, v, w = counts
+        return u * unit, v * unit, w * unit

@@ -93,10 +93,21 @@ class OmniBot:
         self._saturated = 0
         self.connect()
 
+    @property
+    def settings(self) -> OmniBotSettings:
+        """What cannot be known from the wire."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: OmniBotSettings) -> None:
+        self._settings = settings
+        byte_s = 10 / settings.baudrate
+        self._nothing_begun = Edge(0, 0.0, (frames.IMU_LENGTH - 1) * byte_s)
+
     def connect(self) -> None:
         """A new line: a new decoder, and no belief but in the board's counters."""
         self._decoder = FrameDecoder(
-            self.settings.pose_byte_order, ACCEL_COUNTS_PER_G[self.settings.imu.accel_range_g]
+            self._settings.pose_byte_order, ACCEL_COUNTS_PER_G[self._settings.imu.accel_range_g]
         )
         self._decoder.statistics = self._statistics
         self._modes = ModeTracker()
@@ -104,6 +115,7 @@ class OmniBot:
         self._sequence.reconnect()
         self._paused_count: int | None = None
         self._imus = 0
+        self._alone = self._most_alone = 0
         self._heard_s = -math.inf
 
     @property
@@ -119,12 +131,12 @@ class OmniBot:
     @property
     def edge(self) -> Edge | None:
         """By the IMU frame in hand, whole or begun, and the bytes after it."""
+        if self._decoder.at_rest:
+            return self._nothing_begun
         begun = self._decoder.begun
         if begun is None:
             return None
-        byte_s = 10 / self.settings.baudrate
-        if not begun:
-            return Edge(0, 0.0, (frames.IMU_LENGTH - 1) * byte_s)
+        byte_s = 10 / self._settings.baudrate
         ahead, after = 0, len(begun)
         if begun[:2] == frames.IMU_HEADER:
             ahead, after = 1, len(begun) - frames.IMU_LENGTH
@@ -146,7 +158,7 @@ class OmniBot:
 
     def gravity_advice(self, gravity_mps2: float) -> str:
         """By the accelerometer's range."""
-        return gravity_advice(gravity_mps2, self.settings.imu.accel_range_g)
+        return gravity_advice(gravity_mps2, self._settings.imu.accel_range_g)
 
     @property
     def advice(self) -> str | None:
@@ -155,6 +167,10 @@ class OmniBot:
 
     def receive(self, data: bytes, now: float) -> list[Reading]:
         """The readings that these bytes complete, in the order of the line."""
+        if self._alone < self._most_alone and (frame := self._decoder.take_lone(data, now)):
+            self._alone += 1
+            self._heard_s = now
+            return [self._imu_reading(frame)]
         return self._read_all(self._decoder.feed(data, now), now)
 
     def flush(self, now: float) -> list[Reading]:
@@ -163,7 +179,7 @@ class OmniBot:
 
     def silence(self) -> None:
         """Nothing was understood for so long that the mode is unknown again."""
-        self._modes.apply(Happening.HEARD_NOTHING)
+        self._apply(Happening.HEARD_NOTHING)
 
     def wake(self) -> bytes:
         """Eight zero bytes and Stop."""
@@ -171,12 +187,12 @@ class OmniBot:
 
     def start(self) -> bytes:
         """S."""
-        self._modes.apply(Happening.SENT_START)
+        self._apply(Happening.SENT_START)
         return frames.FORCE_START
 
     def pause(self) -> bytes:
         """Stop, then P: a toggle, so refused unless the board is known to run."""
-        self._modes.apply(Happening.SENT_PAUSE)
+        self._apply(Happening.SENT_PAUSE)
         return STOP + frames.TOGGLE_PAUSE
 
     def force_pause(self) -> bytes:
@@ -186,7 +202,7 @@ class OmniBot:
     def reset(self) -> bytes:
         """Stop, then R; zeros first where the board may not be listening yet."""
         wake = b"" if self.mode.running else WAKE
-        self._modes.apply(Happening.SENT_RESET)
+        self._apply(Happening.SENT_RESET)
         return wake + STOP + frames.RESET
 
     def stop(self) -> bytes:
@@ -199,19 +215,19 @@ class OmniBot:
 
     def velocity(self, twist: BodyTwist) -> bytes:
         """Base vector control; Stop when it rounds to nothing."""
-        linear, angular = self.settings.linear_scale, self.settings.angular_scale
+        linear, angular = self._settings.linear_scale, self._settings.angular_scale
         counts = (twist.vx_mps * linear, twist.vy_mps * linear, twist.yaw_rate_radps * angular)
         return self._drive(frames.VELOCITY_MODE, counts)
 
     def wheels(self, rates_radps: Vector3) -> bytes:
         """Independent wheel drive in rad/s: the unit on the wire is that of a rim speed."""
-        unit = self.settings.linear_scale * self.settings.wheel_radius_m
+        unit = self._settings.linear_scale * self._settings.wheel_radius_m
         a, b, c = rates_radps
         return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
 
     def drive_to(self, pose: Pose) -> bytes:
         """Base vector control with the switch on position; the origin is a pose like any other."""
-        position, heading = self.settings.position_scale, self.settings.heading_scale
+        position, heading = self._settings.position_scale, self._settings.heading_scale
         counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)
         if not all(abs(count) < MAX_WORD + 0.5 for count in counts):
             raise CommandRefused(
@@ -230,26 +246,44 @@ class OmniBot:
 
     def _read_all(self, found: list[Frame], now: float) -> list[Reading]:
         """What a read brings at once did not come at once: each frame has a time of its own."""
+        self._catch_up()
         skipped, before_s, self._heard_s = self._decoder.skipped, self._heard_s, now
-        if len(found) == 1:
-            return [self._read(found[0], now, skipped[0])]
         left = sum(skipped) + sum(map(_length, found))
         readings = []
         for frame, before in zip(found, skipped, strict=True):
             left -= before + _length(frame)
             came_s = max(before_s, now - left / NOMINAL_BYTES_PER_S)
             readings.append(self._read(frame, came_s, before))
+        self._most_alone = (
+            0 if any(skipped) or self._paused_count is not None else self._modes.imus_to_come - 1
+        )
         return readings
+
+    def _catch_up(self) -> None:
+        """Modes and rhythm are told of the frames that came alone."""
+        alone, self._alone = self._alone, 0
+        for _ in range(alone):
+            self._modes.hear_imu()
+            self._rhythm.hear(ImuFrame, 0)
+        self._imus += alone
+
+    def _apply(self, happening: Happening) -> None:
+        self._catch_up()
+        self._modes.apply(happening)
+
+    def _imu_reading(self, frame: ImuFrame, lost: int = 0) -> ImuReading:
+        scale = self._settings.imu
+        return ImuReading(
+            scale.specific_force(frame.accel), scale.angular_velocity(frame.gyro), lost
+        )
 
     def _read(self, frame: Frame, now: float, skipped: int = 0) -> Reading:
         self._modes.hear(frame)
         paused_count, self._paused_count = self._paused_count, None
         match frame:
-            case ImuFrame(accel, gyro):
+            case ImuFrame():
                 self._imus += 1
-                lost = self._rhythm.hear(ImuFrame, skipped)
-                scale = self.settings.imu
-                return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro), lost)
+                return self._imu_reading(frame, self._rhythm.hear(ImuFrame, skipped))
             case DeltaFrame():
                 self._rhythm.hear(DeltaFrame, skipped)
                 return self._displacement(frame, now)
@@ -263,7 +297,7 @@ class OmniBot:
                     lost=step.lost,
                     restarted=step.restarted,
                 )
-                self._suspicion.posed(frame, pose, self.settings.pose_byte_order)
+                self._suspicion.posed(frame, pose, self._settings.pose_byte_order)
                 return pose
             case PausedFrame(count):
                 self._paused_count = count
@@ -276,13 +310,13 @@ class OmniBot:
         step = self._sequence.delta(frame.seq, now, imus=self._imus)
         self._imus = 0
         dx, dy, dyaw = frame.dx * DELTA_LSB, frame.dy * DELTA_LSB, frame.dtheta * DELTA_LSB
-        if self.settings.delta_frame == "wheel_counts":
+        if self._settings.delta_frame == "wheel_counts":
             dx, dy, dyaw = self._rolled((frame.dx, frame.dy, frame.dtheta))
         displacement = DisplacementReading(
             dx,
             dy,
             dyaw,
-            frame="earth" if self.settings.delta_frame == "earth" else "body",
+            frame="earth" if self._settings.delta_frame == "earth" else "body",
             duration_s=step.duration_s,
             lost=step.lost,
             restarted=step.restarted,
@@ -292,7 +326,7 @@ class OmniBot:
 
     def _rolled(self, counts: Words) -> Vector3:
         """The body's displacement from the wheels' counts (manual, "Odometry equation")."""
-        settings = self.settings
+        settings = self._settings
         a, b, c = (count * math.tau / settings.counts_per_revolution for count in counts)
         wheels = OmniKinematics(settings.wheel_radius_m, settings.base_radius_m)
         rolled = wheels.body_twist((a, b, c))

@@ -29,6 +29,8 @@ LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
 
 _FIRST, _IMU_KIND = IMU_HEADER
 _DELTA_KIND, _POSE_KIND = DELTA_HEADER[1], POSE_HEADER[1]
+_LONE_IMU: Final = struct.Struct(">H6h").unpack
+_LONE_HEADER: Final = int.from_bytes(IMU_HEADER, "big")
 _IMU: Final = struct.Struct(">6h").unpack_from
 _DELTA: Final = struct.Struct(">3hB").unpack_from
 _POSE: Final = {
@@ -68,6 +70,36 @@ class Walk:
         self.frames.append(frame)
         self.ends.append(end)
         self.before_last = self.before_last[1], before
+
+
+def take_lone(
+    data: bytes, context: Context, expectation: Expectation
+) -> tuple[ImuFrame, Context] | None:
+    """``take_calm`` where one IMU frame is all there is: the frame, and what is known then."""
+    header, x, y, z, u, v, w = _LONE_IMU(data)
+    last, seq, pose, imus, deltas, _, turned = context
+    if header != _LONE_HEADER or last is None:
+        return None
+    lightest, heaviest, far, fast = expectation.calm
+    px, py, pz = last.accel
+    pu, pv, pw = last.gyro
+    if not (
+        lightest < x * x + y * y + z * z < heaviest
+        and -far < x - px < far
+        and -far < y - py < far
+        and -far < z - pz < far
+        and -fast < u - pu < fast
+        and -fast < v - pv < fast
+        and -fast < w - pw < fast
+        and w & 0xFF not in LENT
+    ):
+        return None
+    frame = _new(ImuFrame)
+    _set_accel(frame, (x, y, z))
+    _set_gyro(frame, (u, v, w))
+    if not imus & 3:
+        expectation.learn(frame, last)
+    return frame, tuple.__new__(Context, (frame, seq, pose, imus + 1, deltas, False, turned))
 
 
 def take_calm(

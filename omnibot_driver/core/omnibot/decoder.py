@@ -16,14 +16,16 @@ This module reads no clock and never raises on input. It holds less than ``DOUBT
 calls, and looks at each byte a bounded number of times.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.omnibot import evidence
-from omnibot_driver.core.omnibot.calm import LENT, Walk, take_calm
+from omnibot_driver.core.omnibot.calm import LENT, Walk, take_calm, take_lone
 from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Context, Expectation
 from omnibot_driver.core.omnibot.frames import (
+    IMU_LENGTH,
     INCOMPLETE,
     NO_FRAME,
     ByteOrder,
@@ -79,6 +81,8 @@ class FrameDecoder:
         self.statistics = DecoderStatistics()
         self.skipped: list[int] = []
         """For each frame of the last call, how many bytes before it were none."""
+        self.at_rest = False
+        """All that came was understood, and pauses stand where they should."""
         self._dropped = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
         self._expectation = Expectation(accel_counts_per_g)
@@ -89,7 +93,7 @@ class FrameDecoder:
         self._arrived = 0
         self._sharp = self._between = 0  # how often pauses ended where a frame began, or before
         self._wait_for = 0
-        self._last_arrival_s: float | None = None
+        self._last_arrival_s = -math.inf
 
     def feed(self, data: bytes, now: float) -> list[Frame]:
         """The frames that are complete with these bytes, in the order of the line.
@@ -102,20 +106,35 @@ class FrameDecoder:
             return found
         self._arrived = len(data)
         last, self._last_arrival_s = self._last_arrival_s, now
-        pause_s = 0.0 if last is None else now - last
-        if not self._held and self._in_step and self._hurry(data, pause_s, found):
-            return found
-        if pause_s > GAP_S:
-            self._pause(pause_s, len(data), found)
+        if now - last > GAP_S:
+            self._pause(now - last, len(data), found)
         self._held += data
         self._settle(found, closed=False)
+        most = 2 * PAUSES_TO_TRUST
+        self.at_rest = self._in_step and not self._held and self._sharp == self._between == most
         return found
+
+    def take_lone(self, data: bytes, now: float) -> ImuFrame | None:
+        """``feed`` for what comes most often: one IMU frame by itself, when a frame is due.
+
+        None, and nothing is changed, where anything at all is to be considered.
+        """
+        if not self.at_rest or len(data) != IMU_LENGTH or now - self._last_arrival_s > TICK_S:
+            return None
+        taken = take_lone(data, self._context, self._expectation)
+        if taken is None:
+            return None
+        self._last_arrival_s = now
+        self.statistics.frames += 1
+        frame, self._context = taken
+        return frame
 
     def flush(self, now: float) -> list[Frame]:
         """The line is closed, or was silent: what can still be told from what is held."""
         self._last_arrival_s = now
         found: list[Frame] = []
         self.skipped = []
+        self.at_rest = False
         self._close(found)
         return found
 
@@ -156,24 +175,6 @@ class FrameDecoder:
             width = 1 if sharp else arrived
             price = evidence.KNOWN_GAP if known else evidence.GAP
             self._gaps.append((place, place + width, price))
-
-    def _hurry(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
-        """Take all of it, if it is calm, and the pause before it says nothing that is not known."""
-        most = 2 * PAUSES_TO_TRUST
-        if pause_s > GAP_S and not (pause_s <= TICK_S and self._sharp == self._between == most):
-            return False
-        walk = Walk()
-        order = self._pose_byte_order
-        end, context = take_calm(data, 0, self._context, self._expectation, order, walk)
-        if end < len(data):
-            return False
-        self._context = context
-        for _, frame, before in walk.lessons:
-            self._expectation.learn(frame, before)
-        found += walk.frames
-        self.skipped = [0] * len(found)
-        self.statistics.frames += len(found)
-        return True
 
     def _settle(self, found: list[Frame], *, closed: bool) -> None:
         """Take frames from what is held, until nothing is left or more bytes must tell."""

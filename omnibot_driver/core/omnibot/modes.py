@@ -50,7 +50,8 @@ class ModeTracker:
 
     def __init__(self) -> None:
         self.mode = Mode.UNKNOWN
-        self._imu_frames_alone = 0
+        self.imus_to_come = IMU_FRAMES_ALONE
+        """Before they tell anything."""
 
     def apply(self, happening: Happening) -> None:
         """One step through the table."""
@@ -60,15 +61,19 @@ class ModeTracker:
             raise RequestRefused(
                 f"the board is {self.mode.value}: {happening.value} would do nobody knows what"
             ) from None
-        self._imu_frames_alone = 0
+        self.imus_to_come = IMU_FRAMES_ALONE
 
     def hear(self, frame: Frame) -> None:
         """What this frame tells of the mode."""
         if isinstance(frame, ImuFrame):
-            self._imu_frames_alone += 1
-            if self._imu_frames_alone >= IMU_FRAMES_ALONE:
-                self.apply(Happening.HEARD_IMU_ALONE)
+            self.hear_imu()
         elif isinstance(frame, PausedFrame):
             self.apply(Happening.HEARD_PAUSED)
         else:
             self.apply(Happening.HEARD_MOTION)
+
+    def hear_imu(self) -> None:
+        """An IMU frame."""
+        self.imus_to_come -= 1
+        if not self.imus_to_come:
+            self.apply(Happening.HEARD_IMU_ALONE)
