@@ -1,7 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The decoder's short cuts change nothing: neither its quick loop for calm frames, nor what the
-lattice leaves out."""
+"""The decoder's short cuts change nothing: neither its quick loop for calm frames, nor the way of
+an IMU frame that comes alone, nor what the lattice leaves out."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,7 +13,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from truth import CHUNKERS, FAULTS, SCENARIOS, generate, receive
 
-from omnibot_driver.core.omnibot import FrameDecoder, decoder, lattice
+from omnibot_driver.core.omnibot import (
+    FrameDecoder,
+    OmniBot,
+    OmniBotSettings,
+    decoder,
+    lattice,
+)
 from omnibot_driver.core.omnibot.bounds import least_costs
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics
 from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Expectation
@@ -36,8 +42,11 @@ def outcome(chunks: Chunks, *, quick: bool) -> Outcome:
         tested = FrameDecoder()
         found: Outcome = []
         for data, now in chunks:
-            frames = tested.feed(data, now)
-            found.append((frames, tested.skipped, replace(tested.statistics), tested.begun))
+            if quick and (lone := tested.take_lone(data, now)) is not None:
+                frames, skipped = [lone], [0]
+            else:
+                frames, skipped = tested.feed(data, now), tested.skipped
+            found.append((frames, skipped, replace(tested.statistics), tested.begun))
         found.append((tested.flush(now + 1.0), tested.skipped, tested.statistics, None))
     return found
 
@@ -76,6 +85,45 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
         now += pause_s
         chunks.append((data, now))
     assert outcome(chunks, quick=True) == outcome(chunks, quick=False)
+
+
+@pytest.mark.parametrize("fault", ["none, starting anywhere", "1 byte in 100 lost"])
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_readings_come_out_alike(
+    scenario: str, fault: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And where each read ended, and the mode; now and then S is sent, which counts anew."""
+    chunks = chunks_of(scenario, fault, "whole bursts", 2)
+
+    def told() -> list[object]:
+        board = OmniBot(OmniBotSettings())
+        found: list[object] = []
+        for number, (data, now) in enumerate(chunks):
+            if number % 97 == 13:
+                board.start()
+            found.append((board.receive(data, now), board.edge, board.mode, board.figures))
+        return found
+
+    quick = told()
+    monkeypatch.setattr(FrameDecoder, "take_lone", lambda *_: None)
+    assert quick == told()
+
+
+def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Or the tests above would compare nothing: so most reads go."""
+    fed = []
+    feed = FrameDecoder.feed
+
+    def count(self: FrameDecoder, data: bytes, now: float) -> list[Frame]:
+        fed.append(data)
+        return feed(self, data, now)
+
+    monkeypatch.setattr(FrameDecoder, "feed", count)
+    chunks = chunks_of("driving", "none, starting anywhere", "whole bursts", 1)
+    board = OmniBot(OmniBotSettings())
+    for data, now in chunks:
+        board.receive(data, now)
+    assert len(fed) < 0.5 * len(chunks)
 
 
 def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:

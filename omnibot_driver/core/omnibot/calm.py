@@ -75,7 +75,10 @@ class Walk:
 def take_lone(
     data: bytes, context: Context, expectation: Expectation
 ) -> tuple[ImuFrame, Context] | None:
-    """``take_calm`` where one IMU frame is all there is: the frame, and what is known then."""
+    """``take_calm`` where one IMU frame is all there is: the frame, and what is known then.
+
+    It came as a whole, so its last byte is its own.
+    """
     header, x, y, z, u, v, w = _LONE_IMU(data)
     last, seq, pose, imus, deltas, _, turned = context
     if header != _LONE_HEADER or last is None:
@@ -91,7 +94,6 @@ def take_lone(
         and -fast < u - pu < fast
         and -fast < v - pv < fast
         and -fast < w - pw < fast
-        and w & 0xFF not in LENT
     ):
         return None
     frame = _new(ImuFrame)

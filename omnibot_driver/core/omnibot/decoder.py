@@ -110,8 +110,8 @@ class FrameDecoder:
             self._pause(now - last, len(data), found)
         self._held += data
         self._settle(found, closed=False)
-        most = 2 * PAUSES_TO_TRUST
-        self.at_rest = self._in_step and not self._held and self._sharp == self._between == most
+        known = self._sharp >= PAUSES_TO_TRUST <= self._between
+        self.at_rest = known and self._in_step and not self._held
         return found
 
     def take_lone(self, data: bytes, now: float) -> ImuFrame | None:
@@ -119,13 +119,16 @@ class FrameDecoder:
 
         None, and nothing is changed, where anything at all is to be considered.
         """
-        if not self.at_rest or len(data) != IMU_LENGTH or now - self._last_arrival_s > TICK_S:
+        pause_s = now - self._last_arrival_s
+        if not self.at_rest or len(data) != IMU_LENGTH or pause_s > TICK_S:
             return None
         taken = take_lone(data, self._context, self._expectation)
         if taken is None:
             return None
         self._last_arrival_s = now
         self.statistics.frames += 1
+        if pause_s - IMU_LENGTH * BYTE_S > GAP_S:
+            self._trust(sharp=True, between=True)
         frame, self._context = taken
         return frame
 
