@@ -29,8 +29,8 @@ LARGEST_LOSS_TICKS: Final = 25
 BEAT_READS: Final = 12
 """Among so many reads one is little delayed: a 16 ms adapter's cuts recur after five."""
 CALM: Final = 0.45
-"""Part of a period, less than half of it: two reads in a row that are so near the line leave no doubt
-about their ticks."""
+"""Part of a period, less than half of it: two reads in a row that came so near the line leave no
+doubt about their ticks."""
 LARGEST_RISE: Final = 0.02
 """By this part of a period a stamp follows, each tick, a line that was laid later."""
 SMALLEST_STEP_S: Final = 1e-6

@@ -43,8 +43,7 @@ class Tally:
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
         """A read brought these, the newest of which, if it is a sample, was so old."""
-        newest = readings[-1]
-        if isinstance(newest, ImuReading) or isinstance(newest, DisplacementReading):
+        if isinstance(readings[-1], (ImuReading, DisplacementReading)):
             self.reads += 1
             self.delay_s += delay_s
             self.squared_delay_s2 += delay_s * delay_s
