@@ -81,5 +81,7 @@ def chord(reading: DisplacementReading) -> Pose:
 def advanced(board: Pose, reading: DisplacementReading) -> Pose:
     """A pose in the board's frame after this displacement."""
     if reading.frame == "earth":
-        return board + chord(reading)
+        return Pose(
+            board.x_m + reading.dx_m, board.y_m + reading.dy_m, board.yaw_rad + reading.dyaw_rad
+        )
     return board.moved(roll(chord(reading)))

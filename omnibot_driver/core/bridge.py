@@ -13,6 +13,7 @@ from omnibot_driver.core.se2 import Pose, unroll
 
 LONGEST_BRIDGE: Final = 50
 """Displacements that a bridge stands for at the most; a robot that is not heard is soon stopped."""
+AT_REST: Final = Pose()
 
 
 class Bridge:
@@ -33,13 +34,15 @@ class Bridge:
         """
         last, self.last = self.last, None
         if reading.duration_s is None:
-            return Pose(), _tangent(reading, heading_rad)
+            return AT_REST, _tangent(reading, heading_rad)
         half = min(reading.lost, LONGEST_BRIDGE) / 2
         if half and heading_rad is not None:
             last_turn_rad = last[0].yaw_rad if last else reading.dyaw_rad
             heading_rad += half * (last_turn_rad + reading.dyaw_rad)
         tangent = _tangent(reading, heading_rad)
         self.last = tangent, reading.duration_s
+        if not half:
+            return AT_REST, tangent
         before = last[0] if last else tangent
         return (before + tangent).times(half, half, half), tangent
 

@@ -33,8 +33,9 @@ class Follower:
 
     def move(self, chord: Pose, room_m: float, room_rad: float) -> None:
         """The robot moved so, in its own axes, and could have moved as far as the room."""
-        self.target = self.target.moved(chord)
-        self.pose = self.pose.moved(chord)
+        pose, target = self.pose, self.target
+        self.target = target.moved(chord)
+        self.pose = self.target if pose is target else pose.moved(chord)
         self._room_m += room_m - chord.way_m
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
@@ -50,9 +51,12 @@ class Follower:
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0
         self._settling_s = max(0.0, self._settling_s - seconds)
-        linear = min(share, _part(wrong.way_m, self._room_m))
-        angular = min(share, _part(abs(wrong.yaw_rad), self._room_rad))
-        self.pose += wrong.times(linear, linear, angular)
+        if wrong.x_m or wrong.y_m or wrong.yaw_rad:
+            linear = min(share, _part(wrong.way_m, self._room_m))
+            angular = min(share, _part(abs(wrong.yaw_rad), self._room_rad))
+            self.pose += wrong.times(linear, linear, angular)
+        else:
+            self.pose = self.target
         self._room_m = self._room_rad = 0.0
 
 

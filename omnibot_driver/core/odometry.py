@@ -16,10 +16,10 @@ from omnibot_driver.core.backlog import Backlog, advanced
 from omnibot_driver.core.belief import Belief, expected
 from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.bridge import Bridge
-from omnibot_driver.core.follower import Follower
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose, Signs, roll, unroll
-from omnibot_driver.core.uncertainty import NOTHING, Covariance, OdometryNoise, Uncertainty
+from omnibot_driver.core.track import Track
+from omnibot_driver.core.uncertainty import NOTHING, Covariance, OdometryNoise
 from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0
@@ -76,16 +76,14 @@ class Odometry:
         """True once a board sent no pose and its heading had to be taken for 0."""
         self.alignments = 0
         """How often the odometry frame has come to lie otherwise in the board's."""
-        self._axis_signs = axis_signs
-        self._settings = settings
-        self._uncertainty = Uncertainty(settings.noise)
+        self._track = Track(axis_signs)
+        self.settings = settings
         self._board: Pose | None = None
         self._belief = Belief()
         self._restarted: Pose | None = None
         self._backlog = Backlog()
         self._bridge = Bridge()
         self._last_stamp_s: float | None = None
-        self._rolled = Pose()
         self.reset()
 
     @property
@@ -101,21 +99,35 @@ class Odometry:
     @settings.setter
     def settings(self, settings: OdometrySettings) -> None:
         self._settings = settings
-        self._uncertainty.noise = settings.noise
+        self._track.configure(
+            settings.noise,
+            linear_scale=settings.linear_scale,
+            angular_scale=settings.angular_scale,
+            fastest_mps=settings.fastest_mps,
+            fastest_radps=settings.fastest_radps,
+        )
 
     def reset(self) -> None:
         """The odometry frame begins where the robot stands."""
         self.alignments += 1
         if self._board is not None:
             self._release()
-            if self._uncertainty.gap != NOTHING:
+            if self._track.gap != NOTHING:
                 self._belief.proved = None  # what the next pose corrects was before the reset
         self._backlog = Backlog()
-        self._follower = Follower()
-        self._uncertainty = Uncertainty(self._settings.noise)
+        self._track.begin()
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
         """The estimates that this displacement completes: none while a pose must tell first."""
+        if (
+            not reading.restarted
+            and self._restarted is None
+            and (self._board is not None or reading.frame != "earth")
+            and reading.lost <= LONG_GAP
+            and not self._backlog
+        ):
+            self._belief.displaced(reading)
+            return [self._integrate(reading, stamp_s)]
         estimates = []
         if reading.restarted:
             estimates = self._release() if self._board is not None else []
@@ -139,7 +151,7 @@ class Odometry:
         told = Pose(reading.x_m, reading.y_m, reading.yaw_rad)
         if not self._belief.possible(told):
             return []
-        confirmed = self._belief.confirmed(told, self._uncertainty.gap)
+        confirmed = self._belief.confirmed(told, self._track.gap)
         if reading.restarted or self._is_new_frame(told, confirmed):
             return self._attach(told)
         if self._board is None or self._restarted is not None:
@@ -160,10 +172,7 @@ class Odometry:
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None
-        way = self._follower.target.way_to(place)
-        linear, angular = self._settings.linear_scale, self._settings.angular_scale
-        tangent = unroll(way).times(1 / linear, 1 / linear, 1 / angular).times(*self._axis_signs)
-        return self._board.moved(roll(tangent))
+        return self._board.moved(roll(self._track.way_to(place)))
 
     @property
     def _settles(self) -> bool:
@@ -182,7 +191,7 @@ class Odometry:
             return confirmed
         if self._restarted is None:
             return False
-        gap = self._uncertainty.gap
+        gap = self._track.gap
         anew = self._restarted.way_to(told)
         went_on = self._board.way_to(self._backlog.before(told))
         if expected(anew, gap) and _size(anew) < _size(went_on):
@@ -196,7 +205,7 @@ class Odometry:
         self._begin_at(self._backlog.before(told))
         estimates = self._release()
         self._belief.believe(told)
-        self._uncertainty.give_up()
+        self._track.give_up()
         return estimates
 
     def _resume(self, told: Pose) -> list[OdometryEstimate]:
@@ -205,13 +214,11 @@ class Odometry:
         seconds = self._backlog.unstamped_s(self._last_stamp_s)
         way = unroll(self._board.way_to(self._backlog.before(told)))
         self._board = self._board.moved(roll(way))
-        self._rolled += self._scaled(way)
-        self._uncertainty.move(self._follower.target.yaw_rad, self._signed(way))
-        self._follower.correct(roll(self._signed(way)), 0.0)
+        self._track.resume(way)
         self._move(Pose(), seconds, seconds)
         self._backlog.forget_losses()
         estimates = self._release()
-        self._uncertainty.settle()
+        self._track.settle()
         self._belief.believe(told)
         return estimates
 
@@ -233,17 +240,14 @@ class Odometry:
         assert self._board is not None
         way = self._board.way_to(told)
         reachable = self._reachable(told)
-        if not confirmed and not (reachable and expected(way, self._uncertainty.gap)):
+        if not confirmed and not (reachable and expected(way, self._track.gap)):
             self._belief.doubted = told
             return
         if reachable:
-            if self._uncertainty.gap != NOTHING:  # more than rounding
-                self._rolled += self._scaled(unroll(way))
-            self._follower.correct(roll(self._signed(unroll(way))))
-            self._uncertainty.settle()
+            self._track.correct(unroll(way))
         else:
             self.alignments += 1
-            self._uncertainty.give_up()
+            self._track.give_up()
         self._board = told
         self._belief.believe(told)
 
@@ -263,25 +267,22 @@ class Odometry:
         bridge, tangent = self._bridge.tangents(reading, heading_rad)
         seconds = reading.duration_s
         if seconds is None:
-            self._miss(UNKNOWN_S)
+            self._track.miss(UNKNOWN_S)
             seconds = max(0.0, stamp_s - (stamp_s if last_stamp_s is None else last_stamp_s))
         elif reading.lost:
-            self._miss((reading.lost + 1) * seconds)
+            self._track.miss((reading.lost + 1) * seconds)
         if reading.lost:
             stamped_s = math.inf if last_stamp_s is None else stamp_s - last_stamp_s - seconds
             self._cross(bridge, reading.lost * seconds, stamped_s)
         if self._board is not None:
             self._board = advanced(self._board, reading)
         self._move(tangent, seconds, seconds)
-        self._follower.follow((reading.lost + 1) * seconds)
+        self._track.follow((reading.lost + 1) * seconds)
         twist = rolling = None
         if reading.duration_s:
-            twist = self._signed(tangent).over(seconds)
-            rolling = self._scaled(tangent).over(seconds)
-        covariance = self._uncertainty.total(self._follower.wrong)
-        return OdometryEstimate(
-            stamp_s, self._follower.pose, twist, covariance, self._rolled, rolling
-        )
+            twist, rolling = self._track.rates(tangent, seconds)
+        track = self._track
+        return OdometryEstimate(stamp_s, track.pose, twist, track.covariance, track.rolled, rolling)
 
     def _cross(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
         """Motion that was not told, taken to be this one; the stamps leave so much time for it."""
@@ -294,31 +295,13 @@ class Odometry:
         """Displacements are missing that the pose includes; nobody knows what comes after it."""
         if lost and self._bridge.last is not None:
             tangent, period_s = self._bridge.last
-            self._miss((lost + 1) * period_s)
+            self._track.miss((lost + 1) * period_s)
             self._cross(tangent.times(lost, lost, lost), lost * period_s)
 
     def _move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Along a tangent in the board's body axes, and no further than by the stamps it can be."""
-        self._rolled += self._scaled(tangent)
-        part = self._signed(tangent)
-        self._uncertainty.move(self._follower.target.yaw_rad, part)
-        move = self._follower.move if stamped_s >= seconds else self._follower.trail
-        move(
-            roll(part),
-            self._settings.fastest_mps * stamped_s,
-            self._settings.fastest_radps * stamped_s,
-        )
+        self._track.move(tangent, seconds, stamped_s)
         self._belief.passed(seconds)
-
-    def _miss(self, duration_s: float) -> None:
-        self._uncertainty.miss(duration_s, self._settings.fastest_mps, self._settings.fastest_radps)
-
-    def _signed(self, tangent: Pose) -> Pose:
-        return self._scaled(tangent).times(*self._axis_signs)
-
-    def _scaled(self, tangent: Pose) -> Pose:
-        linear, angular = self._settings.linear_scale, self._settings.angular_scale
-        return tangent.times(linear, linear, angular)
 
 
 def _size(way: Pose) -> float:

@@ -214,6 +214,12 @@ class _Leaps:
 
         ``topmost_bit``: what it is worth in those that may be knocked.
         """
+        if self._leaping is None and self._sure is not None:
+            largest = max(map(abs, map(sub, self._sure, values)))
+            if largest <= periods or largest <= OUT_OF_PROPORTION * self._restless:
+                self._restless = max(CALMING * self._restless, largest)
+                self._sure = values
+                return False, False
         leaping, self._leaping = self._leaping, None
         was_single = False
         if leaping is not None and self._sure is not None:

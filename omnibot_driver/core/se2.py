@@ -57,8 +57,13 @@ class Pose:
 
     def way_to(self, other: "Pose") -> "Pose":
         """The displacement in this pose's own axes that leads there, the shorter turn of both."""
-        way = (other - self).turned(-self.yaw_rad)
-        return Pose(way.x_m, way.y_m, math.remainder(way.yaw_rad, math.tau))
+        cos, sin = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        dx_m, dy_m = other.x_m - self.x_m, other.y_m - self.y_m
+        return Pose(
+            cos * dx_m + sin * dy_m,
+            cos * dy_m - sin * dx_m,
+            math.remainder(other.yaw_rad - self.yaw_rad, math.tau),
+        )
 
     def over(self, duration_s: float) -> BodyTwist:
         """The constant twist that makes this tangent in this time."""
@@ -68,14 +73,20 @@ class Pose:
 def unroll(chord: Pose) -> Pose:
     """The constant twist times duration (the SE(2) logarithm) whose result is this displacement."""
     half = chord.yaw_rad / 2
-    stretch = half / math.sin(half) if half else 1.0
-    along = chord.turned(-half)
-    return Pose(stretch * along.x_m, stretch * along.y_m, chord.yaw_rad)
+    if not half:
+        return chord
+    cos, sin = math.cos(half), math.sin(half)
+    stretch = half / sin
+    x_m, y_m = chord.x_m, chord.y_m
+    return Pose(stretch * (cos * x_m + sin * y_m), stretch * (cos * y_m - sin * x_m), chord.yaw_rad)
 
 
 def roll(tangent: Pose) -> Pose:
     """The displacement that a constant twist times duration makes (the SE(2) exponential)."""
     half = tangent.yaw_rad / 2
-    shrink = math.sin(half) / half if half else 1.0
-    along = tangent.turned(half)
-    return Pose(shrink * along.x_m, shrink * along.y_m, tangent.yaw_rad)
+    if not half:
+        return tangent
+    cos, sin = math.cos(half), math.sin(half)
+    shrink = sin / half
+    x_m, y_m = tangent.x_m, tangent.y_m
+    return Pose(shrink * (cos * x_m - sin * y_m), shrink * (sin * x_m + cos * y_m), tangent.yaw_rad)

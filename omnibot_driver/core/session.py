@@ -36,7 +36,7 @@ from omnibot_driver.core.permission import why_not_calibrate, why_not_drive
 from omnibot_driver.core.plausibility import MotionLimits, Refused
 from omnibot_driver.core.se2 import Pose, Signs
 from omnibot_driver.core.snapshot import SessionFigures
-from omnibot_driver.core.supervisor import OnExit, Phase, Request, Supervisor
+from omnibot_driver.core.supervisor import CLOSED, OnExit, Phase, Request, Supervisor
 
 SILENCE_S: Final = 1.5
 """The board says something at least once a second; after this it is not known to be there."""
@@ -146,7 +146,7 @@ class Session:
     @property
     def wake_at(self) -> float:
         """When ``tick`` must be called at the latest; infinity when nothing is due."""
-        if self._supervisor.phase is Phase.CLOSED:
+        if self._supervisor.phase is CLOSED:
             return math.inf
         silent_at = math.inf if self._silent else self._heard_at + SILENCE_S
         unheard_at = self._heard_at + UNHEARD_S if self._commands.current else math.inf
@@ -214,7 +214,8 @@ class Session:
         last, self._last = self._last, None
         if last is None:
             return
-        self._react(self._measuring.digest(), now)
+        if measured := self._measuring.digest():
+            self._react(measured, now)
         if now >= self._tell_at:
             self._tell(now)
         if self._board.mode.running and not isinstance(last, PausedReading):
@@ -313,7 +314,7 @@ class Session:
 
     def take_output(self, now: float) -> bytes:
         """The bytes to write now; they count as written."""
-        if self._supervisor.phase is Phase.CLOSED:
+        if self._supervisor.phase is CLOSED:
             return b""
         data = self._supervisor.take_output()
         if data:
@@ -323,8 +324,9 @@ class Session:
     def take_events(self) -> list[Event]:
         """What happened since the last call, in order."""
         for answers in (self._supervisor.answers, self._inertial.calibration.answers):
-            self._events += answers
-            answers.clear()
+            if answers:
+                self._events += answers
+                answers.clear()
         beneath = (self._supervisor.phase, self._board.mode, self._commands.latched)
         if beneath != self._beneath:
             self._beneath = beneath
@@ -337,7 +339,7 @@ class Session:
 
     @property
     def _closed(self) -> bool:
-        return self._supervisor.phase is Phase.CLOSED
+        return self._supervisor.phase is CLOSED
 
     def _take_in(self, readings: list[Reading], now: float) -> list[ImuEstimate]:
         if readings:

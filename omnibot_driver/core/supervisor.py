@@ -57,6 +57,12 @@ class Wanted(Enum):
     PAUSED = "paused"
 
 
+CLOSED: Final = Phase.CLOSED
+SETTLED: Final = Phase.SETTLED
+PAUSED: Final = Wanted.PAUSED
+"""For what is asked with every read: Python 3.11 looks for a member of an Enum by a function."""
+
+
 @dataclass(frozen=True, slots=True)
 class RequestDone:
     """The answer to a request; ``token`` is what the asker handed in."""
@@ -85,6 +91,8 @@ class Supervisor:
 
     def take_output(self) -> bytes:
         """What to write now, before anything else."""
+        if not self._output:
+            return b""
         data = bytes(self._output)
         self._output.clear()
         return data
@@ -92,6 +100,8 @@ class Supervisor:
     @property
     def wake_at(self) -> float:
         """When ``tick`` has something to do."""
+        if self.phase is SETTLED:
+            return self._deadline
         next_at = math.inf
         if self.phase is Phase.STARTING:
             next_at = self._said_at + START_RETRY_S
@@ -157,8 +167,11 @@ class Supervisor:
 
     def heard_data(self, now: float) -> None:
         """The board sent data, and its mode is a running one."""
-        self._flowed_s += min(now - self._data_at, FLOWING_S)
-        self._data_at, self._shown_at = now, math.inf
+        data_at, self._data_at = self._data_at, now
+        if self.phase is SETTLED and self._request is None and self._wanted is not PAUSED:
+            return
+        self._flowed_s += min(now - data_at, FLOWING_S)
+        self._shown_at = math.inf
         unheard = self._flowed_s >= PAUSE_RETRY_S
         if self.phase is Phase.STARTING:
             self._settle(f"running ({self._board.mode.value})")

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from omnibot_driver.core.board import (
     DisplacementReading,
     ImuReading,
-    PausedReading,
     PoseReading,
     Reading,
     Vector3,
@@ -44,26 +43,26 @@ class Tally:
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
         """A read brought these, the newest of which, if it is a sample, was so old."""
-        if isinstance(readings[-1], ImuReading | DisplacementReading):
+        if isinstance(readings[-1], (ImuReading, DisplacementReading)):
             self.reads += 1
             self.delay_s += delay_s
             self.squared_delay_s2 += delay_s * delay_s
         for reading in readings:
-            match reading:
-                case ImuReading(force, rate, lost):
-                    self.imu += 1
-                    self.lost_imu += lost
-                    self.same_force = self.same_force + 1 if force == self._force else 0
-                    self.same_rate = self.same_rate + 1 if rate == self._rate else 0
-                    self._force, self._rate = force, rate
-                case DisplacementReading(lost=lost, restarted=restarted):
-                    self.displacements += 1
-                    self._miss(lost, restarted)
-                case PoseReading(lost=lost, restarted=restarted):
-                    self.poses += 1
-                    self._miss(lost, restarted)
-                case PausedReading():
-                    self.same_force = self.same_rate = 0
+            if isinstance(reading, ImuReading):
+                force, rate = reading.specific_force, reading.angular_velocity
+                self.imu += 1
+                self.lost_imu += reading.lost
+                self.same_force = self.same_force + 1 if force == self._force else 0
+                self.same_rate = self.same_rate + 1 if rate == self._rate else 0
+                self._force, self._rate = force, rate
+            elif isinstance(reading, DisplacementReading):
+                self.displacements += 1
+                self._miss(reading.lost, reading.restarted)
+            elif isinstance(reading, PoseReading):
+                self.poses += 1
+                self._miss(reading.lost, reading.restarted)
+            else:
+                self.same_force = self.same_rate = 0
 
     def _miss(self, lost: int, restarted: bool) -> None:
         self.restarts += restarted

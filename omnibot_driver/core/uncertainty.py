@@ -69,13 +69,34 @@ class Covariance:
             self.yaw_yaw + other.yaw_yaw,
         )
 
+    def with_errors(self, errors: Iterable[tuple[float, float, float, float]]) -> "Covariance":
+        """And of independent errors along lines in (x, y, yaw), each with a variance along its
+        own."""
+        xx = xy = x_yaw = yy = y_yaw = yaw_yaw = 0.0
+        for variance, x, y, yaw in errors:
+            along_x, along_y = variance * x, variance * y
+            xx += along_x * x
+            xy += along_x * y
+            x_yaw += along_x * yaw
+            yy += along_y * y
+            y_yaw += along_y * yaw
+            yaw_yaw += variance * yaw * yaw
+        return Covariance(
+            self.xx + xx,
+            self.xy + xy,
+            self.x_yaw + x_yaw,
+            self.yy + yy,
+            self.y_yaw + y_yaw,
+            self.yaw_yaw + yaw_yaw,
+        )
+
     def carried(self, dx_m: float, dy_m: float) -> "Covariance":
         """After a displacement given in the odometry frame: a wrong yaw makes a wrong way."""
         return Covariance(
-            xx=self.xx - 2 * dy_m * self.x_yaw + dy_m**2 * self.yaw_yaw,
+            xx=self.xx - 2 * dy_m * self.x_yaw + dy_m * dy_m * self.yaw_yaw,
             xy=self.xy + dx_m * self.x_yaw - dy_m * self.y_yaw - dx_m * dy_m * self.yaw_yaw,
             x_yaw=self.x_yaw - dy_m * self.yaw_yaw,
-            yy=self.yy + 2 * dx_m * self.y_yaw + dx_m**2 * self.yaw_yaw,
+            yy=self.yy + 2 * dx_m * self.y_yaw + dx_m * dx_m * self.yaw_yaw,
             y_yaw=self.y_yaw + dx_m * self.yaw_yaw,
             yaw_yaw=self.yaw_yaw,
         )
@@ -99,12 +120,14 @@ class Uncertainty:
 
         In plain numbers: with a Pose for each it would be a third of all an odometry message costs.
         """
+        if not (tangent.x_m or tangent.y_m or tangent.yaw_rad):
+            return
         heading_rad += tangent.yaw_rad / 2
         cos, sin = math.cos(heading_rad), math.sin(heading_rad)
         dx_m = cos * tangent.x_m - sin * tangent.y_m
         dy_m = sin * tangent.x_m + cos * tangent.y_m
         wheels, alone = _wheels(self.noise.base_radius_m)
-        drift = self.noise.wheel_drift**2
+        drift = self.noise.wheel_drift * self.noise.wheel_drift
         levers, errors = [], []
         for (lever_x_m, lever_y_m, lever_rad), rim_m, part in zip(
             self._levers, wheels.wheel_rates(tangent.over(1.0)), alone, strict=True
@@ -119,7 +142,7 @@ class Uncertainty:
             levers.append(lever)
             errors.append((drift * abs(rim_m), x_m, y_m, part.yaw_rad))
         self._levers = levers
-        self._walk = self._walk.carried(dx_m, dy_m) + _independent(errors)
+        self._walk = self._walk.carried(dx_m, dy_m).with_errors(errors)
         if self.gap is not NOTHING:
             self.gap = self.gap.carried(dx_m, dy_m)
 
@@ -145,27 +168,23 @@ class Uncertainty:
 
     def total(self, open_error: Pose) -> Covariance:
         """Of a pose that is known to be off by ``open_error`` and otherwise at its best."""
-        scale, slip = self.noise.wheel_scale**2, self.noise.wheel_slip**2
-        errors = [(scale, *lever) for lever in self._levers]
-        x_m, y_m, yaw_rad = map(sum, zip(*self._levers, strict=True))
-        errors.append((slip, x_m, y_m, yaw_rad))
-        errors.append((1.0, open_error.x_m, open_error.y_m, open_error.yaw_rad))
+        noise, (a, b, c) = self.noise, self._levers
+        scale = noise.wheel_scale * noise.wheel_scale
         known = self._walk if self.gap is NOTHING else self._walk + self.gap
-        return known + _independent(errors)
-
-
-def _independent(errors: Iterable[tuple[float, float, float, float]]) -> Covariance:
-    """Of errors along lines in (x, y, yaw), each with a variance along its own."""
-    xx = xy = x_yaw = yy = y_yaw = yaw_yaw = 0.0
-    for variance, x, y, yaw in errors:
-        along_x, along_y = variance * x, variance * y
-        xx += along_x * x
-        xy += along_x * y
-        x_yaw += along_x * yaw
-        yy += along_y * y
-        y_yaw += along_y * yaw
-        yaw_yaw += variance * yaw * yaw
-    return Covariance(xx, xy, x_yaw, yy, y_yaw, yaw_yaw)
+        return known.with_errors(
+            (
+                (scale, *a),
+                (scale, *b),
+                (scale, *c),
+                (
+                    noise.wheel_slip * noise.wheel_slip,
+                    a[0] + b[0] + c[0],
+                    a[1] + b[1] + c[1],
+                    a[2] + b[2] + c[2],
+                ),
+                (1.0, open_error.x_m, open_error.y_m, open_error.yaw_rad),
+            )
+        )
 
 
 @cache
