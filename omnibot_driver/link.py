@@ -218,9 +218,8 @@ class Link:
             with self._lock:
                 self._wait_s = self.reconnect_interval_s
                 self._received += len(data)
-                self._heed_standstill(now)
-                self._session.heed(now)
-                events = self._settle()
+                stopped = self._heed_standstill(now)
+                events = self._settle() if self._session.heed(now) or stopped else ()
             if events:
                 self._deliver(events)
 
@@ -267,10 +266,13 @@ class Link:
         trouble, self._keeper.trouble = self._keeper.trouble, ""
         return [Notice(trouble)] if trouble else []
 
-    def _heed_standstill(self, now: float) -> None:
+    def _heed_standstill(self, now: float) -> bool:
+        """With the lock held: whether this process stood still, and the robot is to be stopped."""
         length_s = self._standstill.begun(now)
-        if length_s and not self._closing.is_set():
-            self._session.stood_still(length_s, now)
+        if not length_s or self._closing.is_set():
+            return False
+        self._session.stood_still(length_s, now)
+        return True
 
     def _settle(self) -> Sequence[Event]:
         """With the lock held: write what is due, wake the pacer if it sleeps for too long."""

@@ -42,13 +42,14 @@ class Measuring:
     ) -> None:
         self.odometry = Odometry(odometry, axis_signs)
         self.inertial = Inertial(board, imu)
-        self.tally = Tally()
+        self._tally = Tally()
         self._board = board
         self._clock = DeviceClock(board.tick_s)
         self._plausibility = Plausibility(motion, board.tick_s)
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
         """Of each read the readings, and how old the newest was."""
-        self._undigested: list[Stamped] = []
+        self.undigested: list[Stamped] = []
+        """What is heard, but for ``digest``."""
 
     def configure(
         self, odometry: OdometrySettings, motion: MotionLimits, imu: ImuCorrection
@@ -83,8 +84,8 @@ class Measuring:
         stamps_s = self._clock.stamps(readings, now, self._board.edge)
         estimates = []
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
-            if self._undigested or not isinstance(reading, ImuReading):
-                self._undigested.append((reading, stamp_s))
+            if self.undigested or not isinstance(reading, ImuReading):
+                self.undigested.append((reading, stamp_s))
                 continue
             for sure, at_s in self._plausibility.admit_imu(reading, stamp_s):
                 estimates.append(self.inertial.estimate(sure, at_s))
@@ -92,16 +93,21 @@ class Measuring:
             self._uncounted.append((readings, now - stamps_s[-1]))
         return estimates
 
+    @property
+    def tally(self) -> Tally:
+        """Of all that was heard so far."""
+        for readings, delay_s in self._uncounted:
+            self._tally.read(readings, delay_s)
+        self._uncounted.clear()
+        return self._tally
+
     def digest(self) -> list[Measured]:
         """What else is sure of all that was heard."""
-        for readings, delay_s in self._uncounted:
-            self.tally.read(readings, delay_s)
-        self._uncounted.clear()
         measured: list[Measured] = []
-        for reading, stamp_s in self._undigested:
+        for reading, stamp_s in self.undigested:
             for sure, at_s in self._plausibility.admit(reading, stamp_s):
                 measured.append((sure, self._estimates(sure, at_s)))
-        self._undigested.clear()
+        self.undigested.clear()
         return measured
 
     def release(self) -> list[Measured]:

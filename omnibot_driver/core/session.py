@@ -209,17 +209,25 @@ class Session:
             self._commands.halt(now)
         return []
 
-    def heed(self, now: float) -> None:
-        """What comes of the bytes that were heard last."""
+    def heed(self, now: float) -> bool:
+        """What comes of the bytes that were heard last. False: nothing to write or to tell."""
         last, self._last = self._last, None
         if last is None:
-            return
+            return bool(self._events)
+        if (
+            now < self._tell_at
+            and not self._measuring.undigested
+            and not self._events
+            and self._supervisor.at_rest
+        ):
+            return False
         if measured := self._measuring.digest():
             self._react(measured, now)
         if now >= self._tell_at:
             self._tell(now)
         if self._board.mode.running and not isinstance(last, PausedReading):
             self._supervisor.heard_data(now)
+        return True
 
     def tick(self, now: float) -> None:
         """Time passed."""

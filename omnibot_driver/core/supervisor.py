@@ -165,10 +165,15 @@ class Supervisor:
         elif self.phase is Phase.STARTING or (self.phase is Phase.SETTLED and running_wanted):
             self._begin(now)  # it has restarted, and may have slept through what was said so far
 
+    @property
+    def at_rest(self) -> bool:
+        """Data that goes on coming is nothing to react to."""
+        return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
+
     def heard_data(self, now: float) -> None:
         """The board sent data, and its mode is a running one."""
         data_at, self._data_at = self._data_at, now
-        if self.phase is SETTLED and self._request is None and self._wanted is not PAUSED:
+        if self.at_rest:
             return
         self._flowed_s += min(now - data_at, FLOWING_S)
         self._shown_at = math.inf
