@@ -350,15 +350,17 @@ class Session:
         for reading, estimates in measured:
             self._events += estimates
             match reading:
-                case DisplacementReading(restarted=restarted):
-                    self._notify(self._driving.look(reading, estimates, now))
-                    if restarted:
+                case DisplacementReading():
+                    if news := self._driving.look(reading, estimates, now):
+                        self._notify(news)
+                    if reading.restarted:
                         self._commands.halt(now)
-                case PoseReading(restarted=True):
-                    self._commands.halt(now)
-                case PausedReading(continues):
+                case PoseReading():
+                    if reading.restarted:
+                        self._commands.halt(now)
+                case PausedReading():
                     self._driving.begin()
-                    self._supervisor.heard_paused(now, continues=continues)
+                    self._supervisor.heard_paused(now, continues=reading.continues)
         if self._commands.current is not None:
             self._notify(self._driving.check_goal([], now))
 
