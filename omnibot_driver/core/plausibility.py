@@ -88,18 +88,16 @@ class Plausibility:
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
         """The readings that are sure now, each kind in the order in which it came."""
-        match reading:
-            case ImuReading():
-                return list(self.admit_imu(reading, stamp_s))
-            case DisplacementReading():
-                return self._admit_displacement(reading, stamp_s)
-            case PoseReading() if self._held_motion:
-                self._held_motion.append((reading, stamp_s))
-                return []
-            case PoseReading():
-                return [(self._told_of_losses(reading), stamp_s)]
-            case PausedReading():
-                return [*self.release(), (reading, stamp_s)]
+        if isinstance(reading, ImuReading):
+            return list(self.admit_imu(reading, stamp_s))
+        if isinstance(reading, DisplacementReading):
+            return self._admit_displacement(reading, stamp_s)
+        if isinstance(reading, PausedReading):
+            return [*self.release(), (reading, stamp_s)]
+        if self._held_motion:
+            self._held_motion.append((reading, stamp_s))
+            return []
+        return [(self._told_of_losses(reading), stamp_s)]
 
     def release(self) -> list[Stamped]:
         """What waits, for nothing will come that could speak against it."""
