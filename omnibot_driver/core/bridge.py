@@ -5,6 +5,7 @@
 Knows displacements and headings; not where the robot is, nor what a guess does to it.
 """
 
+import math
 from typing import Final
 
 from omnibot_driver.core.backlog import chord
@@ -50,4 +51,6 @@ class Bridge:
 def _tangent(reading: DisplacementReading, heading_rad: float | None) -> Pose:
     if reading.frame == "body" or heading_rad is None:
         return chord(reading)
-    return unroll(chord(reading).turned(-heading_rad))
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    dx_m, dy_m = reading.dx_m, reading.dy_m
+    return unroll(Pose(cos * dx_m + sin * dy_m, cos * dy_m - sin * dx_m, reading.dyaw_rad))

@@ -7,7 +7,7 @@ may be driven now is decided elsewhere.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 from omnibot_driver.core.board import Board, DisplacementReading
@@ -97,21 +97,22 @@ class Driving:
 
     def look(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
-    ) -> Iterator[str]:
+    ) -> list[str]:
         """Hold what the robot did against what it was told; sentences for the user."""
-        if self._obeys:
-            finding = self._watch.look(reading, self.stream.current)
+        news = []
+        finding = self._watch.look(reading, self.stream.current) if self._obeys else None
+        if finding is not None:
             if finding is Finding.ASTRAY:
                 self.stream.halt(now)
-            if finding and self._watch.is_news(finding):
-                yield finding.value
-        yield from self.check_goal(estimates, now)
+            if self._watch.is_news(finding):
+                news.append(finding.value)
+        return news + self.check_goal(estimates, now)
 
-    def check_goal(self, estimates: Sequence[Estimate], now: float) -> Iterator[str]:
+    def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
         """Drop a goal that is another place by now, or that the robot drives away from."""
         goal = self.stream.current
         if not isinstance(goal, GoalMotion):
-            return
+            return []
         if goal.alignment != self._odometry.alignments:
             why = "odom begins anew"
         elif any(
@@ -121,6 +122,6 @@ class Driving:
         ):
             why = "the robot drives away from it: does the board's switch stand on position?"
         else:
-            return
+            return []
         self.stream.halt(now)
-        yield f"the goal of cmd_pose is discarded: {why}"
+        return [f"the goal of cmd_pose is discarded: {why}"]

@@ -48,6 +48,14 @@ class Look:
         self.displacements = 0
         self._x_m = self._y_m = self._yaw_rad = 0.0
 
+    def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
+        """A reading of the IMU."""
+        if not self.rates:
+            self.began_s = stamp_s
+        self.last_s = stamp_s
+        self.rates.append(rate)
+        self.forces.append(force)
+
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
         """A displacement, in whichever axes."""
         self.displacements += 1
@@ -125,14 +133,9 @@ class GyroCalibration:
         look = self._look
         if stamp_s - look.last_s > GAP_S:
             look = self._look = Look()
-        if not look.rates:
-            look.began_s = stamp_s
-        look.last_s = stamp_s
-        look.rates.append(rate)
-        look.forces.append(force)
-        if stamp_s - look.began_s >= BLOCK_S and (
-            not self.measuring or stamp_s - look.began_s >= MEASURE_S
-        ):
+        look.hear(rate, force, stamp_s)
+        length_s = stamp_s - look.began_s
+        if length_s >= BLOCK_S and (length_s >= MEASURE_S or not self.measuring):
             self._conclude()
 
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:

@@ -13,7 +13,6 @@ from omnibot_driver.core.board import (
     Board,
     DisplacementReading,
     ImuReading,
-    PausedReading,
     PoseReading,
     Reading,
 )
@@ -116,14 +115,12 @@ class Measuring:
         return measured + [(sure, self._estimates(sure, at_s)) for sure, at_s in released]
 
     def _estimates(self, reading: Reading, stamp_s: float) -> Sequence[Estimate]:
-        match reading:
-            case ImuReading():
-                return [self.inertial.estimate(reading, stamp_s)]
-            case DisplacementReading():
-                self.inertial.displaced(reading)
-                return self.odometry.displace(reading, stamp_s)
-            case PoseReading():
-                return self.odometry.settle(reading)
-            case PausedReading():
-                self._clock.restart()
-                return []
+        if isinstance(reading, DisplacementReading):
+            self.inertial.displaced(reading)
+            return self.odometry.displace(reading, stamp_s)
+        if isinstance(reading, PoseReading):
+            return self.odometry.settle(reading)
+        if isinstance(reading, ImuReading):
+            return [self.inertial.estimate(reading, stamp_s)]
+        self._clock.restart()
+        return []

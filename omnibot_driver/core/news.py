@@ -6,7 +6,6 @@ Knows counts, times and words; not where they come from.
 """
 
 import math
-from collections.abc import Iterable, Iterator
 from typing import Final
 
 from omnibot_driver.core.plausibility import Refused
@@ -41,30 +40,31 @@ class Bulletin:
         self._told: set[str] = set()
         self._standing = ""
 
-    def counted(self, lost: int, refused: Refused, now: float) -> Iterator[str]:
+    def counted(self, lost: int, refused: Refused, now: float) -> list[str]:
         """What was lost and refused since it was last told."""
+        news = []
         if more := self._lost.since_told(lost, now):
-            yield f"odometry frames lost on the line: {more}; check cable and hub"
+            news.append(f"odometry frames lost on the line: {more}; check cable and hub")
         total = refused.imu + refused.displacements + refused.poses
         if more := self._refused.since_told(total, now):
-            yield (
+            news.append(
                 f"readings refused that cannot be true: {more} (in all {refused.imu} imu,"
                 f" {refused.displacements} odometry, {refused.poses} poses); the line changes bits,"
                 " or a limit of motion is set too low"
             )
+        return news
 
-    def once(self, sentences: Iterable[str]) -> Iterator[str]:
-        """Those that were never told before."""
-        for sentence in sentences:
-            if sentence not in self._told:
-                self._told.add(sentence)
-                yield sentence
+    def once(self, sentence: str) -> list[str]:
+        """Unless it was told before."""
+        if sentence in self._told:
+            return []
+        self._told.add(sentence)
+        return [sentence]
 
-    def standing(self, sentence: str) -> Iterator[str]:
+    def standing(self, sentence: str) -> list[str]:
         """What holds now, empty for nothing; told when it begins to hold."""
         before, self._standing = self._standing, sentence
-        if sentence and not before:
-            yield sentence
+        return [sentence] if sentence and not before else []
 
 
 def why_silent(silence_s: float, *, bytes_came: bool) -> str:

@@ -112,7 +112,7 @@ class Odometry:
         self.alignments += 1
         if self._board is not None:
             self._release()
-            if self._track.gap != NOTHING:
+            if self._track.uncertainty.gap != NOTHING:
                 self._belief.proved = None  # what the next pose corrects was before the reset
         self._backlog = Backlog()
         self._track.begin()
@@ -151,7 +151,7 @@ class Odometry:
         told = Pose(reading.x_m, reading.y_m, reading.yaw_rad)
         if not self._belief.possible(told):
             return []
-        confirmed = self._belief.confirmed(told, self._track.gap)
+        confirmed = self._belief.confirmed(told, self._track.uncertainty.gap)
         if reading.restarted or self._is_new_frame(told, confirmed):
             return self._attach(told)
         if self._board is None or self._restarted is not None:
@@ -191,7 +191,7 @@ class Odometry:
             return confirmed
         if self._restarted is None:
             return False
-        gap = self._track.gap
+        gap = self._track.uncertainty.gap
         anew = self._restarted.way_to(told)
         went_on = self._board.way_to(self._backlog.before(told))
         if expected(anew, gap) and _size(anew) < _size(went_on):
@@ -205,7 +205,7 @@ class Odometry:
         self._begin_at(self._backlog.before(told))
         estimates = self._release()
         self._belief.believe(told)
-        self._track.give_up()
+        self._track.uncertainty.give_up()
         return estimates
 
     def _resume(self, told: Pose) -> list[OdometryEstimate]:
@@ -218,7 +218,7 @@ class Odometry:
         self._move(Pose(), seconds, seconds)
         self._backlog.forget_losses()
         estimates = self._release()
-        self._track.settle()
+        self._track.uncertainty.settle()
         self._belief.believe(told)
         return estimates
 
@@ -240,14 +240,14 @@ class Odometry:
         assert self._board is not None
         way = self._board.way_to(told)
         reachable = self._reachable(told)
-        if not confirmed and not (reachable and expected(way, self._track.gap)):
+        if not confirmed and not (reachable and expected(way, self._track.uncertainty.gap)):
             self._belief.doubted = told
             return
         if reachable:
             self._track.correct(unroll(way))
         else:
             self.alignments += 1
-            self._track.give_up()
+            self._track.uncertainty.give_up()
         self._board = told
         self._belief.believe(told)
 
@@ -277,12 +277,13 @@ class Odometry:
         if self._board is not None:
             self._board = advanced(self._board, reading)
         self._move(tangent, seconds, seconds)
-        self._track.follow((reading.lost + 1) * seconds)
+        track, follower = self._track, self._track.follower
+        follower.follow((reading.lost + 1) * seconds)
         twist = rolling = None
         if reading.duration_s:
-            twist, rolling = self._track.rates(tangent, seconds)
-        track = self._track
-        return OdometryEstimate(stamp_s, track.pose, twist, track.covariance, track.rolled, rolling)
+            twist, rolling = track.rates(tangent, seconds)
+        covariance = track.uncertainty.total(follower.wrong)
+        return OdometryEstimate(stamp_s, follower.pose, twist, covariance, track.rolled, rolling)
 
     def _cross(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
         """Motion that was not told, taken to be this one; the stamps leave so much time for it."""

@@ -88,18 +88,16 @@ class Plausibility:
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
         """The readings that are sure now, each kind in the order in which it came."""
-        match reading:
-            case ImuReading():
-                return list(self.admit_imu(reading, stamp_s))
-            case DisplacementReading():
-                return self._admit_displacement(reading, stamp_s)
-            case PoseReading() if self._held_motion:
-                self._held_motion.append((reading, stamp_s))
-                return []
-            case PoseReading():
-                return [(self._told_of_losses(reading), stamp_s)]
-            case PausedReading():
-                return [*self.release(), (reading, stamp_s)]
+        if isinstance(reading, ImuReading):
+            return list(self.admit_imu(reading, stamp_s))
+        if isinstance(reading, DisplacementReading):
+            return self._admit_displacement(reading, stamp_s)
+        if isinstance(reading, PausedReading):
+            return [*self.release(), (reading, stamp_s)]
+        if self._held_motion:
+            self._held_motion.append((reading, stamp_s))
+            return []
+        return [(self._told_of_losses(reading), stamp_s)]
 
     def release(self) -> list[Stamped]:
         """What waits, for nothing will come that could speak against it."""
@@ -140,7 +138,7 @@ class Plausibility:
         if reading.duration_s is not None:
             turn = self.limits.fastest_radps2 * reading.duration_s**2
             way = self.limits.fastest_mps2 * reading.duration_s**2
-            values = [reading.dx_m / way, reading.dy_m / way, reading.dyaw_rad / turn]
+            values = (reading.dx_m / way, reading.dy_m / way, reading.dyaw_rad / turn)
             periods = reading.lost + self._lost + 1
             was_flip, leaps = self._motion_leaps.judge(values, periods)
         released, self._held_motion = self._held_motion, []
@@ -148,8 +146,10 @@ class Plausibility:
             refused, _ = released.pop(0)
             assert isinstance(refused, DisplacementReading)
             self._refuse(refused)
-        released = [(self._told_of_losses(held), at_s) for held, at_s in released]
-        reading = self._made_good(reading)
+        if released:
+            released = [(self._told_of_losses(held), at_s) for held, at_s in released]
+        if self._lost or self._restarted or self._time_unknown:
+            reading = self._made_good(reading)
         if leaps:
             self._held_motion = [(reading, stamp_s)]
             return released
@@ -176,8 +176,6 @@ class Plausibility:
 
     def _made_good(self, reading: DisplacementReading) -> DisplacementReading:
         """What is known of the refused ones before it is now known of this one."""
-        if not (self._lost or self._restarted or self._time_unknown):
-            return reading
         unknown = self._time_unknown or reading.duration_s is None
         made_good = replace(
             reading,

@@ -8,7 +8,7 @@ not log: whatever a user should hear of is an event.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -357,30 +357,33 @@ class Session:
     def _react(self, measured: list[Measured], now: float) -> None:
         for reading, estimates in measured:
             self._events += estimates
-            match reading:
-                case DisplacementReading(restarted=restarted):
-                    self._notify(self._driving.look(reading, estimates, now))
-                    if restarted:
-                        self._commands.halt(now)
-                case PoseReading(restarted=True):
+            if isinstance(reading, DisplacementReading):
+                self._notify(self._driving.look(reading, estimates, now))
+                if reading.restarted:
                     self._commands.halt(now)
-                case PausedReading(continues):
-                    self._driving.begin()
-                    self._supervisor.heard_paused(now, continues=continues)
+            elif isinstance(reading, PoseReading):
+                if reading.restarted:
+                    self._commands.halt(now)
+            elif isinstance(reading, PausedReading):
+                self._driving.begin()
+                self._supervisor.heard_paused(now, continues=reading.continues)
         if self._commands.current is not None:
             self._notify(self._driving.check_goal([], now))
 
     def _tell(self, now: float) -> None:
         self._tell_at = now + TELL_EVERY_S
-        bulletin, board, odometry = self._bulletin, self._board, self._odometry
-        once = [board.advice] if board.advice is not None else []
-        once += [HEADING_ASSUMED] if odometry.heading_assumed else []
-        self._notify(bulletin.counted(self.lost, self.refused, now))
-        self._notify(bulletin.standing(self._inertial.advice))
-        self._notify(bulletin.once(once))
+        bulletin, measuring, advice = self._bulletin, self._measuring, self._board.advice
+        news = bulletin.counted(measuring.tally.lost_displacements, measuring.refused, now)
+        news += bulletin.standing(self._inertial.advice)
+        if advice is not None:
+            news += bulletin.once(advice)
+        if self._odometry.heading_assumed:
+            news += bulletin.once(HEADING_ASSUMED)
+        self._notify(news)
 
-    def _notify(self, sentences: Iterable[str]) -> None:
-        self._events += map(Notice, sentences)
+    def _notify(self, sentences: Sequence[str]) -> None:
+        if sentences:
+            self._events += map(Notice, sentences)
 
     def _command(self, wish: Wish, now: float) -> None:
         motion, _ = wish

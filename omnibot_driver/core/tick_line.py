@@ -86,8 +86,9 @@ class TickLine:
         if not self._latest or self._latest[-1][0][0] < best[0]:
             self._latest.append((best, cut))
         if len(self._not_before) >= FEWEST_READS:
-            ends = sorted(self._not_before, key=self._height)
-            tick, time = ends[-1 - int(LATE_PART * len(ends))]
+            slope_s = self.slope_s
+            heights = sorted((time - slope_s * tick, tick, time) for tick, time in self._not_before)
+            _, tick, time = heights[-1 - int(LATE_PART * len(heights))]
             earliest = tick, time - LATE_S
             is_near = 0.0 < self._height(best) - self._height(earliest) < WIDEST * self._period_s
             if is_near and (not self._earliest or self._earliest[-1][0] < tick):

@@ -12,7 +12,7 @@ from typing import Final
 from omnibot_driver.core.follower import Follower
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose, Signs, roll, unroll
-from omnibot_driver.core.uncertainty import NOTHING, Covariance, OdometryNoise, Uncertainty
+from omnibot_driver.core.uncertainty import NOTHING, OdometryNoise, Uncertainty
 
 Factors = tuple[float, float, float]
 """Of x, y and yaw."""
@@ -26,7 +26,7 @@ class Track:
         self.rolled = Pose()
         """All motion since the driver began, as one tangent in the board's axes, of true size."""
         self._axis_signs = axis_signs
-        self._follower, self._uncertainty = Follower(), Uncertainty(OdometryNoise())
+        self.follower, self.uncertainty = Follower(), Uncertainty(OdometryNoise())
 
     def configure(
         self,
@@ -42,26 +42,11 @@ class Track:
         self._size = linear_scale, linear_scale, angular_scale
         self._signed_size = x * linear_scale, y * linear_scale, yaw * angular_scale
         self._fastest_mps, self._fastest_radps = fastest_mps, fastest_radps
-        self._uncertainty.noise = noise
+        self.uncertainty.noise = noise
 
     def begin(self) -> None:
         """The odometry frame begins where the robot stands."""
-        self._follower, self._uncertainty = Follower(), Uncertainty(self._uncertainty.noise)
-
-    @property
-    def pose(self) -> Pose:
-        """What is given out."""
-        return self._follower.pose
-
-    @property
-    def covariance(self) -> Covariance:
-        """Of ``pose``."""
-        return self._uncertainty.total(self._follower.wrong)
-
-    @property
-    def gap(self) -> Covariance:
-        """Of the motion that nobody reported."""
-        return self._uncertainty.gap
+        self.follower, self.uncertainty = Follower(), Uncertainty(self.uncertainty.noise)
 
     def rates(self, tangent: Pose, seconds: float) -> tuple[BodyTwist, BodyTwist]:
         """Of this motion in this time: in REP-103's axes, and in the board's."""
@@ -73,45 +58,39 @@ class Track:
     def way_to(self, place: Pose) -> Pose:
         """The tangent that leads there from where the robot is, by the shorter turn."""
         x, y, yaw = self._signed_size
-        return unroll(self._follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
+        return unroll(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
 
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Along a tangent, and no further than by the stamps it can be."""
-        self.rolled += _times(tangent, self._size)
-        part = _times(tangent, self._signed_size)
-        self._uncertainty.move(self._follower.target.yaw_rad, part)
-        move = self._follower.move if stamped_s >= seconds else self._follower.trail
-        move(roll(part), self._fastest_mps * stamped_s, self._fastest_radps * stamped_s)
-
-    def follow(self, seconds: float) -> None:
-        """What is given out nears the truth by the share of this time."""
-        self._follower.follow(seconds)
+        follower, chord = self.follower, roll(self._part(tangent))
+        move = follower.move if stamped_s >= seconds else follower.trail
+        move(chord, self._fastest_mps * stamped_s, self._fastest_radps * stamped_s)
 
     def miss(self, duration_s: float) -> None:
         """Nobody reported the motion of this time."""
-        self._uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
+        self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:
         """The motion in a gap, told before anything else is made of the gap."""
-        self.rolled += _times(tangent, self._size)
-        part = _times(tangent, self._signed_size)
-        self._uncertainty.move(self._follower.target.yaw_rad, part)
-        self._follower.correct(roll(part), 0.0)
+        self.follower.correct(roll(self._part(tangent)), 0.0)
 
     def correct(self, tangent: Pose) -> None:
         """The robot is elsewhere, and all motion in gaps is known."""
-        if self._uncertainty.gap != NOTHING:  # more than rounding
+        if self.uncertainty.gap != NOTHING:  # more than rounding
             self.rolled += _times(tangent, self._size)
-        self._follower.correct(roll(_times(tangent, self._signed_size)))
-        self._uncertainty.settle()
+        self.follower.correct(roll(_times(tangent, self._signed_size)))
+        self.uncertainty.settle()
 
-    def settle(self) -> None:
-        """The motion in all gaps is known now."""
-        self._uncertainty.settle()
-
-    def give_up(self) -> None:
-        """The motion in all gaps will never be known."""
-        self._uncertainty.give_up()
+    def _part(self, tangent: Pose) -> Pose:
+        """It was rolled, and is uncertain; in REP-103's axes."""
+        true = signed = tangent
+        if self._size != AS_TOLD:
+            true = tangent.times(*self._size)
+        if self._signed_size != AS_TOLD:
+            signed = tangent.times(*self._signed_size)
+        self.rolled += true
+        self.uncertainty.move(self.follower.target.yaw_rad, signed)
+        return signed
 
 
 def _times(tangent: Pose, factors: Factors) -> Pose:
