@@ -45,6 +45,7 @@ class DeviceClock:
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s
+        self._calm_s = CALM * period_s
         self._tick = 0
         self._stamp_s = -math.inf
         self.restart()
@@ -83,24 +84,10 @@ class DeviceClock:
         ``now``; a displacement has the stamp of its tick's ImuReading.
         """
         ticks = self._count(readings)
-        line, tick = self._calm, self._tick
-        if (  # one new tick, whole, when it was due: what comes of the rest below, in fewer steps
-            line is not None
-            and edge is not None
-            and not (edge.ahead or edge.cut)
-            and tick != self._seen_tick
-            and ticks
-            and ticks.count(tick) == len(ticks)
-            and isinstance(readings[0], ImuReading)
-            and abs(lag_s := now + edge.latest_s - line.at(tick)) <= CALM * self._period_s
-        ):
-            self._single_reads += 1
-            self._lags_s.append(lag_s)
-            self._seen_tick = tick
-            line.see((tick, now + edge.latest_s), cut=False)
-            line.not_before((tick + 1, now + edge.earliest_s))
-            self._stamp(tick, now, (now - self._stamp_s) / (len(ticks) + 1))
-            return [self._stamp_s] * len(ticks)
+        if ticks and ticks.count(ticks[0]) == len(ticks) and isinstance(readings[0], ImuReading):
+            stamp_s = self._due(ticks[0], now, edge, len(ticks))
+            if stamp_s is not None:
+                return [stamp_s] * len(ticks)
         line = self._line = self._line or TickLine(self._period_s, (self._tick, now))
         if readings and self._cut_off:
             if isinstance(readings[0], ImuReading) and not readings[0].lost:
@@ -124,6 +111,32 @@ class DeviceClock:
                 self._stamp(tick + short, now - later_s, (now - self._stamp_s) / (left + 1))
             stamps.append(self._stamp_s)
         return stamps
+
+    def stamp(self, reading: ImuReading, now: float, edge: Edge | None) -> float | None:
+        """``stamps`` of one that came alone, when due; None, and nothing is changed, otherwise."""
+        if reading.lost:
+            return None
+        stamp_s = self._due(self._tick + 1, now, edge, 1)
+        if stamp_s is not None:
+            self._tick += 1
+        return stamp_s
+
+    def _due(self, tick: int, now: float, edge: Edge | None, readings: int) -> float | None:
+        """The stamp of one new tick that came as a whole, when it was due; None if it did not."""
+        line = self._calm
+        if line is None or edge is None or edge.ahead or edge.cut or tick == self._seen_tick:
+            return None
+        arrival = now + edge.latest_s
+        lag_s = arrival - line.at(tick)
+        if not -self._calm_s <= lag_s <= self._calm_s:
+            return None
+        self._single_reads += 1
+        self._lags_s.append(lag_s)
+        self._seen_tick = tick
+        line.see((tick, arrival), cut=False)
+        line.not_before((tick + 1, now + edge.earliest_s))
+        self._stamp(tick, now, (now - self._stamp_s) / (readings + 1))
+        return self._stamp_s
 
     def _count(self, readings: Sequence[Reading]) -> list[int]:
         """The ticks of the readings, by what is known of losses; the counter is right."""
@@ -185,7 +198,7 @@ class DeviceClock:
             self._cut_off = tick, now + edge.earliest_s
         else:
             line.not_before((tick + 1, now + edge.earliest_s))
-        is_calm = self._settled and not edge.cut and abs(lag_s) <= CALM * period_s
+        is_calm = self._settled and not edge.cut and abs(lag_s) <= self._calm_s
         self._calm = line if is_calm else None
         return short
 

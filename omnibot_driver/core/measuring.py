@@ -80,8 +80,16 @@ class Measuring:
 
         A reading does not overtake one of another kind.
         """
-        stamps_s = self._clock.stamps(readings, now, self._board.edge)
-        estimates = []
+        estimates: list[ImuEstimate] = []
+        edge = self._board.edge
+        if len(readings) == 1 and isinstance(alone := readings[0], ImuReading):
+            stamp_s = None if self.undigested else self._clock.stamp(alone, now, edge)
+            if stamp_s is not None:
+                self._uncounted.append((readings, now - stamp_s))
+                for sure, at_s in self._plausibility.admit_imu(alone, stamp_s):
+                    estimates.append(self.inertial.estimate(sure, at_s))
+                return estimates
+        stamps_s = self._clock.stamps(readings, now, edge)
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
             if self.undigested or not isinstance(reading, ImuReading):
                 self.undigested.append((reading, stamp_s))

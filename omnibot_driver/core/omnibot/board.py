@@ -116,6 +116,7 @@ class OmniBot:
         self._paused_count: int | None = None
         self._imus = 0
         self._alone = self._most_alone = 0
+        """IMU frames that came alone and were not told on; so many may be before they tell anything."""
         self._heard_s = -math.inf
 
     @property
@@ -248,24 +249,24 @@ class OmniBot:
         """What a read brings at once did not come at once: each frame has a time of its own."""
         self._catch_up()
         skipped, before_s, self._heard_s = self._decoder.skipped, self._heard_s, now
-        left = sum(skipped) + sum(map(_length, found))
+        lengths = [LENGTH.get(type(frame), 0) for frame in found]
+        left = sum(skipped) + sum(lengths)
         readings = []
-        for frame, before in zip(found, skipped, strict=True):
-            left -= before + _length(frame)
+        for frame, length, before in zip(found, lengths, skipped, strict=True):
+            left -= before + length
             came_s = max(before_s, now - left / NOMINAL_BYTES_PER_S)
             readings.append(self._read(frame, came_s, before))
-        self._most_alone = (
-            0 if any(skipped) or self._paused_count is not None else self._modes.imus_to_come - 1
-        )
+        usual = self._paused_count is None and not any(skipped)
+        self._most_alone = self._modes.imus_to_come - 1 if usual else 0
         return readings
 
     def _catch_up(self) -> None:
         """Modes and rhythm are told of the frames that came alone."""
         alone, self._alone = self._alone, 0
-        for _ in range(alone):
-            self._modes.hear_imu()
-            self._rhythm.hear(ImuFrame, 0)
-        self._imus += alone
+        if alone:
+            self._modes.hear_imus(alone)
+            self._rhythm.hear_imus(alone)
+            self._imus += alone
 
     def _apply(self, happening: Happening) -> None:
         self._catch_up()
@@ -331,7 +332,3 @@ class OmniBot:
         wheels = OmniKinematics(settings.wheel_radius_m, settings.base_radius_m)
         rolled = wheels.body_twist((a, b, c))
         return rolled.vx_mps, rolled.vy_mps, rolled.yaw_rate_radps
-
-
-def _length(frame: Frame) -> int:
-    return LENGTH.get(type(frame), 0)

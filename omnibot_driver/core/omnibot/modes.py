@@ -66,14 +66,14 @@ class ModeTracker:
     def hear(self, frame: Frame) -> None:
         """What this frame tells of the mode."""
         if isinstance(frame, ImuFrame):
-            self.hear_imu()
+            self.hear_imus(1)
         elif isinstance(frame, PausedFrame):
             self.apply(Happening.HEARD_PAUSED)
         else:
             self.apply(Happening.HEARD_MOTION)
 
-    def hear_imu(self) -> None:
-        """An IMU frame."""
-        self.imus_to_come -= 1
+    def hear_imus(self, count: int) -> None:
+        """So many IMU frames, and no more than are to come."""
+        self.imus_to_come -= count
         if not self.imus_to_come:
             self.apply(Happening.HEARD_IMU_ALONE)

@@ -15,9 +15,26 @@ from omnibot_driver.core.omnibot.modes import IMU_FRAMES_ALONE
 Kind = type[Frame]
 
 LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
+
+
+class Cycle:
+    """``after[kind][at]``: where a board is that was at ``at`` and now sent this."""
+
+    def __init__(self, *kinds: Kind) -> None:
+        self.kinds = kinds
+        size = len(kinds)
+        self.after = {
+            kind: [
+                next((at + n + 1) % size for n in range(size) if kinds[(at + n) % size] is kind)
+                for at in range(size)
+            ]
+            for kind in set(kinds)
+        }
+
+
 _DELTA_PERIOD: Final[tuple[Kind, ...]] = (*(ImuFrame,) * 4, DeltaFrame)
-NOMINAL: Final[tuple[Kind, ...]] = (*_DELTA_PERIOD * 5, PoseFrame)
-IMU_ONLY: Final[tuple[Kind, ...]] = (ImuFrame,)
+NOMINAL: Final = Cycle(*_DELTA_PERIOD * 5, PoseFrame)
+IMU_ONLY: Final = Cycle(ImuFrame)
 
 
 class Rhythm:
@@ -33,21 +50,27 @@ class Rhythm:
 
         With those that a pose came after, but not beyond a delta: its SEQ counts what is before it.
         """
-        while skipped >= LENGTH[self._cycle[self._next]] / 2:
-            passed = self._cycle[self._next]
+        cycle = self._cycle
+        while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:
+            passed = cycle.kinds[self._next]
             skipped -= LENGTH[passed]
             self._lost += passed is ImuFrame
-            self._next = (self._next + 1) % len(self._cycle)
-        self._imus = self._imus + 1 if kind is ImuFrame else 0
-        if kind is not ImuFrame:
-            self._cycle = NOMINAL
-        elif self._imus >= IMU_FRAMES_ALONE:
-            self._cycle, self._next = IMU_ONLY, 0
-        cycle, at = self._cycle, self._next
-        while cycle[at] is not kind:
-            at = (at + 1) % len(cycle)
-        self._next = (at + 1) % len(cycle)
-        if kind is PoseFrame:
-            return 0
+            self._next = (self._next + 1) % len(cycle.kinds)
+        if kind is ImuFrame:
+            self.hear_imus(1)
+        else:
+            self._imus, self._cycle = 0, NOMINAL
+            self._next = NOMINAL.after[kind][self._next]
+            if kind is PoseFrame:
+                return 0
         lost, self._lost = self._lost, 0
         return lost
+
+    def hear_imus(self, count: int) -> None:
+        """So many IMU frames came in, with nothing between them."""
+        self._imus += count
+        if self._imus >= IMU_FRAMES_ALONE:
+            self._cycle, self._next = IMU_ONLY, 0
+        after = self._cycle.after[ImuFrame]
+        for _ in range(count):
+            self._next = after[self._next]
