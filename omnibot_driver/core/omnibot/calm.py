@@ -9,7 +9,14 @@ a test holds one against the other. What costs anything else is left to that loo
 import struct
 from typing import Any, Final
 
-from omnibot_driver.core.omnibot.evidence import LARGEST_DELTA, Context, Expectation
+from omnibot_driver.core.omnibot.evidence import (
+    FARTHEST_POSE,
+    LARGEST_DELTA,
+    LONGEST_STEP,
+    ROUNDING,
+    Context,
+    Expectation,
+)
 from omnibot_driver.core.omnibot.frames import (
     DELTA_HEADER,
     DELTA_LENGTH,
@@ -159,17 +166,27 @@ def take_calm(
             frame.__class__ = DeltaFrame
             seq, imus, deltas = count, 0, deltas + 1
             turned = None if turned is None else turned + dtheta
-        elif kind == _POSE_KIND:
+        elif kind == _POSE_KIND and deltas == 5 and imus == 0:
             end = at + POSE_LENGTH
-            if end > size:
+            if end > size or pose is None or turned is None:
+                break
+            x, y, theta, count = _POSE[order](held, at + 2)
+            if (
+                count != (pose.seq + 1) & 255
+                or not -FARTHEST_POSE < x < FARTHEST_POSE
+                or not -FARTHEST_POSE < y < FARTHEST_POSE
+                or not -FARTHEST_POSE < theta < FARTHEST_POSE
+                or not -LONGEST_STEP <= x - pose.x <= LONGEST_STEP
+                or not -LONGEST_STEP <= y - pose.y <= LONGEST_STEP
+                or not -LONGEST_STEP <= theta - pose.theta <= LONGEST_STEP
+                or not -ROUNDING <= 10.0 * (theta - pose.theta) - turned <= ROUNDING
+                or (end == size and count in LENT)
+            ):
                 break
             frame = _Pose()
-            frame.x, frame.y, frame.theta, frame.seq = _POSE[order](held, at + 2)
+            frame.x, frame.y, frame.theta, frame.seq = x, y, theta, count
             frame.__class__ = PoseFrame
-            cost, after = expectation.weigh(frame, tuple.__new__(Context, known))
-            if cost or (end == size and frame.seq in LENT):
-                break
-            _, _, pose, _, deltas, _, turned = after
+            pose, deltas, turned = frame, 0, 0
         else:
             break
         frames.append(frame)
