@@ -15,9 +15,11 @@ from truth import CHUNKERS, FAULTS, SCENARIOS, generate, receive
 
 from omnibot_driver.core.omnibot import (
     FrameDecoder,
+    ImuFrame,
     OmniBot,
     OmniBotSettings,
     decoder,
+    encode,
     lattice,
 )
 from omnibot_driver.core.omnibot.bounds import least_costs
@@ -140,6 +142,21 @@ def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> No
     found = outcome(chunks, quick=True)
     imus = sum(type(frame) is decoder.ImuFrame for frames, *_ in found for frame in frames)
     assert weighed.count(decoder.ImuFrame) < 0.1 * imus
+
+
+def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A leap, its aftershocks and the leap back, with frames behind them: nothing is weighed."""
+    rest = ImuFrame((120, -80, -16384), (1, 2, 3))
+    shock = [ImuFrame((9000, -80, -16384), (1, 2, 3)), ImuFrame((120, 7000, -16384), (1, 9000, 3))]
+    sent = [rest, *shock, rest, rest, rest]
+    tested = FrameDecoder()
+    tested.feed(encode(rest) * 20, 0.0)
+
+    def weigh(*_: object) -> None:
+        pytest.fail("weighed")
+
+    monkeypatch.setattr(decoder.Expectation, "weigh", weigh)
+    assert tested.feed(b"".join(map(encode, sent)), 0.0) == sent
 
 
 def test_most_of_the_lattice_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:

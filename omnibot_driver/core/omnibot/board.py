@@ -116,7 +116,7 @@ class OmniBot:
         self._paused_count: int | None = None
         self._imus = 0
         self._alone = self._most_alone = 0
-        """IMU frames that came alone and were not told on; so many may be before they tell anything."""
+        """IMU frames that came alone and were not told on, and how many may be."""
         self._heard_s = -math.inf
 
     @property

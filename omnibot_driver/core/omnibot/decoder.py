@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.omnibot import evidence
-from omnibot_driver.core.omnibot.calm import LENT, Walk, take_calm, take_lone
+from omnibot_driver.core.omnibot.calm import LENT, Walk, goes_on, take_calm, take_lone
 from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Context, Expectation
 from omnibot_driver.core.omnibot.frames import (
     IMU_LENGTH,
@@ -215,7 +215,7 @@ class FrameDecoder:
             frame = decode_measured(held[at:end], order)
             cost, after = expectation.weigh(frame, context)
             if cost >= SPOKEN_AGAINST and (
-                cost >= evidence.LOOK_ALIKE or not self._goes_on(end, closed)
+                cost >= evidence.LOOK_ALIKE or not goes_on(held, end, closed=closed)
             ):
                 return self._believe_but_the_last(walk, found)
             if end == size and not closed and _may_end_in_a_header(frame, context):
@@ -234,17 +234,6 @@ class FrameDecoder:
         if believed > 0:
             self._take(walk, believed, Context._make(walk.before_last[0]), found)
         return False
-
-    def _goes_on(self, at: int, closed: bool) -> bool:
-        """Whether a whole frame follows, and perhaps one more: then it is a shock, no damage."""
-        held = self._held
-        if at == len(held):
-            return closed
-        length = measure(held, at)
-        if length <= 0:
-            return False
-        at += length
-        return at == len(held) or measure(held, at) != NO_FRAME
 
     def _take(self, walk: Walk, count: int, after: Context, found: list[Frame]) -> None:
         """Believe the first so many of these frames."""
