@@ -119,15 +119,6 @@ class Odometry:
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
         """The estimates that this displacement completes: none while a pose must tell first."""
-        if (
-            not reading.restarted
-            and self._restarted is None
-            and (self._board is not None or reading.frame != "earth")
-            and reading.lost <= LONG_GAP
-            and not self._backlog
-        ):
-            self._belief.displaced(reading)
-            return [self._integrate(reading, stamp_s)]
         estimates = []
         if reading.restarted:
             estimates = self._release() if self._board is not None else []
@@ -136,9 +127,13 @@ class Odometry:
         if self._restarted is not None:
             self._restarted = advanced(self._restarted, reading)
         self._belief.displaced(reading)
+        is_nowhere = self._board is None or self._restarted is not None
+        means_nothing = is_nowhere and reading.frame == "earth"
+        if not (means_nothing or self._backlog or reading.lost > LONG_GAP):
+            return [*estimates, self._integrate(reading, stamp_s)]
         self._backlog.add(reading, stamp_s)
         waited_s = self._backlog.duration_s
-        if reading.frame == "earth" and (self._board is None or self._restarted is not None):
+        if means_nothing:
             if waited_s < LONGEST_WAIT_S:
                 return estimates
             self._assume()

@@ -15,7 +15,7 @@ A refused displacement is as if it had been lost on the line. This module knows 
 robot's limits; it knows no bytes and no clock.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import hypot
 from operator import sub
@@ -212,12 +212,6 @@ class _Leaps:
 
         ``topmost_bit``: what it is worth in those that may be knocked.
         """
-        if self._leaping is None and self._sure is not None:
-            largest = max(map(abs, map(sub, self._sure, values)))
-            if largest <= periods or largest <= OUT_OF_PROPORTION * self._restless:
-                self._restless = max(CALMING * self._restless, largest)
-                self._sure = values
-                return False, False
         leaping, self._leaping = self._leaping, None
         was_single = False
         if leaping is not None and self._sure is not None:
@@ -231,10 +225,10 @@ class _Leaps:
         if self._sure is None:
             self._sure = values
             return False, False
-        steps = _steps(self._sure, values)
+        largest = max(_steps(self._sure, values))
         least = max(periods, OUT_OF_PROPORTION * self._restless)
-        largest = max(steps)
         if largest > least:
+            steps = list(_steps(self._sure, values))
             alone = sorted(steps)[-2] <= self._left * largest
             value = abs(values[steps.index(largest)])
             flipped = alone and self._is_a_bit(largest, value, topmost_bit)
@@ -255,6 +249,6 @@ class _Leaps:
         return abs(step - bit) <= slack
 
 
-def _steps(before: Sequence[float], after: Sequence[float]) -> list[float]:
+def _steps(before: Sequence[float], after: Sequence[float]) -> Iterator[float]:
     """How far each value moved."""
-    return list(map(abs, map(sub, after, before)))
+    return map(abs, map(sub, after, before))
