@@ -33,10 +33,10 @@ def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) 
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)
     try:
-        for library in ("numpy", "scipy", "rich", "matplotlib"):
-            need(library)
-        arguments = _parser().parse_args(own)
         with Interruption() as interruption:
+            for library in ("numpy", "scipy", "rich", "matplotlib"):
+                need(library)
+            arguments = _parser().parse_args(own)
             _calibrate(arguments, ros, interruption, interruption.reading(read))
     except Interrupted as error:
         print(f"\ncalibrate: {error}", file=sys.stderr)
