@@ -3,21 +3,14 @@
 """The driver as a process: signals, executor, exit code. Knows nothing of what the node does."""
 
 import os
+import select
 import signal
 import sys
 import threading
 import time
 from typing import Final
 
-import rclpy
-from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
-from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
-
 from omnibot_driver.core.errors import ParameterError
-from omnibot_driver.node import OmniBotDriver
 from omnibot_driver.output import UnblockedOutput
 
 STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
@@ -46,6 +39,11 @@ class Ending:
         self.defect = self.defect or defect
         os.write(self._wake, b"\0")
 
+    @property
+    def begun(self) -> bool:
+        """Whether ``wait`` would return at once."""
+        return bool(select.select([self._wakes], [], [], 0)[0])
+
     def wait(self) -> None:
         """Until a signal arrives or somebody calls ``begin``."""
         os.read(self._wakes, 1)
@@ -64,6 +62,13 @@ def main(args: list[str] | None = None) -> int:
 
 def _main(args: list[str]) -> int:
     ending = Ending()
+    # Only now, as it takes half a second: a signal meanwhile ends the driver as any other does.
+    import rclpy
+    from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
+    from rclpy.exceptions import ParameterException
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
+
     try:
         if unknown := remove_ros_args(args)[1:]:
             raise ParameterError(f"it does not know {' '.join(unknown)}; {USAGE}")
@@ -81,6 +86,12 @@ def _main(args: list[str]) -> int:
 
 
 def _run(ending: Ending) -> None:
+    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+
+    from omnibot_driver.node import OmniBotDriver
+
+    if ending.begun:
+        return
     driver = OmniBotDriver(end=ending.begin)
     executor = SingleThreadedExecutor()
     executor.add_node(driver)

@@ -24,6 +24,8 @@ RESTART_S: Final = 1.0
 HANGS_AFTER: Final = 50
 """A guard that has not read so many beats would not stop the robot either."""
 LEAVES_WITHIN_S: Final = 0.5
+DIES_WITHIN_S: Final = 1.0
+"""One that is killed and does not is in an uninterruptible sleep; nobody waits for that."""
 SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + LEAVES_WITHIN_S
 
 
@@ -106,11 +108,12 @@ class Keeper:
         with contextlib.suppress(OSError):
             process.stdin.write(word)
         process.stdin.close()
-        try:
+        with contextlib.suppress(subprocess.TimeoutExpired):
             return process.wait(within_s)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            return process.wait()
+        process.kill()
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return process.wait(DIES_WITHIN_S)
+        return None
 
     def _tell(self, trouble: str) -> None:
         if not self._told:

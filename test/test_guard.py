@@ -7,6 +7,7 @@ import contextlib
 import os
 import select
 import signal
+import threading
 import time
 import tty
 from collections.abc import Iterator
@@ -207,6 +208,26 @@ def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
     (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)
     keeper.end(stopped=True)
+
+
+@pytest.mark.filterwarnings("ignore:subprocess .* is still running:ResourceWarning")
+def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in an uninterruptible sleep, which a stopped process stands for that no signal reaches."""
+    keeper = Keeper(line.near, LAST_WORDS)
+    (pid,) = line.children()
+    os.kill(pid, signal.SIGSTOP)
+    monkeypatch.setattr("subprocess.Popen.kill", lambda _process: None)
+    ending = threading.Thread(target=keeper.end, kwargs={"stopped": True})
+    ending.start()
+    ending.join(PATIENCE_S)
+    ended = not ending.is_alive()
+    os.kill(pid, signal.SIGKILL)
+    ending.join()
+    with contextlib.suppress(ChildProcessError):
+        os.waitpid(pid, 0)
+    assert ended
 
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:

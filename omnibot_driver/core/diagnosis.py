@@ -24,6 +24,8 @@ LATE_S: Final = 0.005
 """Half a tick: the mean age of what waits for a timer of 10 ms."""
 LARGEST_SKEW_PPM: Final = 115.0
 """More than two crystals differ by."""
+SKEW_KNOWN_S: Final = 75.0
+"""Arrivals count for so long; a skew that lasts less may be that of a computer that was busy."""
 
 RUNNING: Final = ("nominal", "imu_only")
 
@@ -61,6 +63,7 @@ class Diagnosis:
     def __init__(self) -> None:
         self._counts: dict[str, tuple[int, float]] = {}
         self._window: deque[tuple[float, SessionFigures]] = deque()
+        self._skewed_since = math.inf
 
     def judge(
         self, link: LinkFigures, session: SessionFigures, refusals: Refusals, now: float
@@ -71,7 +74,7 @@ class Diagnosis:
             self._link(link, now),
             self._board(session, now),
             self._stream(session, now),
-            self._time(session),
+            self._time(session, now),
             self._commands(session, refusals, now),
             self._estop(session),
             self._imu(session),
@@ -194,15 +197,17 @@ class Diagnosis:
         imu, displacements, poses = (count / self._span_s for count in counts)
         return imu, displacements, poses
 
-    def _time(self, session: SessionFigures) -> Status:
+    def _time(self, session: SessionFigures, now: float) -> Status:
         old, new = self._window[0][1].tally, self._window[-1][1].tally
         reads = new.reads - old.reads
+        skewed = session.state in RUNNING and abs(session.skew_ppm) > LARGEST_SKEW_PPM
+        self._skewed_since = min(self._skewed_since, now) if skewed else math.inf
         if session.state not in RUNNING or not reads:
             return Status("Time", Level.STALE, "no measurements tell the board's time", {})
         delay_s = (new.delay_s - old.delay_s) / reads
         variance = (new.squared_delay_s2 - old.squared_delay_s2) / reads - delay_s * delay_s
         level, message = Level.OK, "stamps are sampling times"
-        if abs(session.skew_ppm) > LARGEST_SKEW_PPM:
+        if now - self._skewed_since > SKEW_KNOWN_S:
             level = Level.WARN
             message = "the two clocks differ more than crystals do: is this computer's clock right?"
         elif delay_s > LATE_S:
@@ -225,7 +230,7 @@ class Diagnosis:
         limited = self._grew("limited", commands.limited, now)
         level = Level.OK
         if refused:
-            level, message = Level.WARN, refusals.last
+            level, message = Level.WARN, f"lately: {refusals.last}"
         elif too_large:
             level = Level.WARN
             message = "speeds do not fit into a command: lower the scales or the speed limits"

@@ -131,7 +131,7 @@ def imports(times: int) -> Figure:
         subprocess.run([sys.executable, "-c", f"import {names}"], check=True)
         return time.monotonic() - begun
 
-    ours, least = partial(seconds, "omnibot_driver.driver"), partial(seconds, floor_names)
+    ours, least = partial(seconds, "omnibot_driver.node"), partial(seconds, floor_names)
     return alternate("importing", "s", ours, least, times=times)
 
 

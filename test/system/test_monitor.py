@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import sys
+import termios
 from collections.abc import Callable
 from contextlib import ExitStack
 
@@ -177,3 +178,21 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
     terminal.type("q")
     assert terminal.end() == 0
     assert not any(twist.linear.x for twist in said[before:])
+
+
+def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
+    driver: Driver, monitor_of: Callable[..., PseudoTerminal]
+) -> None:
+    """SIGSTOP leaves it no time to leave the screen; once it goes on, q ends it all the same."""
+    terminal = monitor_of(driver)
+    terminal.wait_for("nominal")
+    line = os.open(f"/proc/{terminal.process.pid}/fd/0", os.O_RDWR | os.O_NOCTTY)
+    terminal.process.send_signal(signal.SIGSTOP)
+    os.waitid(os.P_PID, terminal.process.pid, os.WSTOPPED)
+    terminal.process.send_signal(signal.SIGCONT)
+    terminal.wait_for("\x1b[?1049h")  # the screen anew
+    terminal.type("q")
+    assert terminal.end() == 0
+    echoes = termios.tcgetattr(line)[3] & termios.ECHO
+    os.close(line)
+    assert echoes

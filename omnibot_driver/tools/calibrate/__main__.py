@@ -20,23 +20,24 @@ SUBCOMMANDS: Final = {
     "commission": "which way round everything is: a guided walk, wheels off the ground",
     "imu": "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
     "scale": "linear_scale and angular_scale from commanded and measured speeds: the robot drives",
-    "geometry": "wheel and base radius from lines, turns, squares and a tape measure",
-    "step": "step response of each wheel, its motor, and gains for its controller: in the air",
+    "geometry": "wheel and base radius by your tape measure: the robot drives lines and squares",
+    "step": "how each wheel follows a step, its motor, better gains: wheels off the ground",
 }
 
 
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
-    """Return 0 when a calibration was found, 1 with a sentence when not, 2 for wrong usage.
+    """Return 0 when a calibration was found, 1 with a sentence when not, 2 for wrong usage, 130
+    when interrupted.
 
     ``read`` answers questions.
     """
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)
     try:
-        for library in ("numpy", "scipy", "rich", "matplotlib"):
-            need(library)
-        arguments = _parser().parse_args(own)
         with Interruption() as interruption:
+            for library in ("numpy", "scipy", "rich", "matplotlib"):
+                need(library)
+            arguments = _parser().parse_args(own)
             _calibrate(arguments, ros, interruption, interruption.reading(read))
     except Interrupted as error:
         print(f"\ncalibrate: {error}", file=sys.stderr)
@@ -54,7 +55,11 @@ def _parser() -> argparse.ArgumentParser:
         prog="calibrate",
         description="Finds what the driver's parameters ought to be, with uncertainties.",
     )
-    parser.epilog = "ROS's own arguments (--ros-args -r …) may follow. See docs/calibrate.md."
+    parser.epilog = (
+        "WHAT --help lists the options. ROS's own arguments follow --ros-args. Ends with 0, with 1"
+        " and a sentence when nothing was found, with 2 on wrong usage, with 130 when interrupted."
+        " See docs/calibrate.md."
+    )
     subparsers = parser.add_subparsers(dest="subcommand", required=True, metavar="WHAT")
     for name, summary in SUBCOMMANDS.items():
         subparser = subparsers.add_parser(name, help=summary, description=summary)
@@ -67,14 +72,18 @@ def _parser() -> argparse.ArgumentParser:
             " omnibot_calibration.yaml here)",
         )
         subparser.add_argument(
-            "--plot", metavar="FILE", help=f"picture, or a folder for calibrate_{name}.png"
+            "--plot",
+            metavar="FILE",
+            help=f"picture, or a folder for it (default: calibrate_{name}.png here)",
         )
         subparser.add_argument(
             "--apply",
             action="store_true",
             help="also set what was found in the running driver, as far as it may change there",
         )
-        subparser.add_argument("--namespace", default="", help="of the driver")
+        subparser.add_argument(
+            "--namespace", default="", metavar="NAME", help="the driver's, such as /robot1"
+        )
     return parser
 
 

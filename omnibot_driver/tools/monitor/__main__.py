@@ -44,16 +44,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     parser = argparse.ArgumentParser(
         prog="monitor",
-        description="A running driver on one screen. ROS arguments follow --ros-args.",
+        description="A running driver on one screen, with an e-stop under the space bar.",
+        epilog="ROS's own arguments follow --ros-args. Ends with 0, with 1 and a sentence when"
+        " something is missing or wrong, with 2 on wrong usage. See docs/monitor.md.",
     )
-    parser.add_argument("--namespace", default="", help="the driver's, such as /robot1")
     parser.add_argument(
-        "--driver", default="omnibot_driver", help="its node name (default: %(default)s)"
+        "--namespace", default="", metavar="NAME", help="the driver's, such as /robot1"
+    )
+    parser.add_argument(
+        "--driver",
+        default="omnibot_driver",
+        metavar="NAME",
+        help="its node name (default: %(default)s)",
     )
     parser.add_argument("--once", action="store_true", help="print what is known and end")
     parser.add_argument("--json", action="store_true", help="print it as JSON; means --once")
     parser.add_argument(
-        "--teleop", action="store_true", help="steer with WASD or arrows; J and L turn"
+        "--teleop",
+        action="store_true",
+        help="steer with WASD or arrows, J and L turn, + and - change the speed",
     )
     parser.add_argument(
         "--timeout",

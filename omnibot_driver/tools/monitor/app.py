@@ -121,10 +121,19 @@ class Monitor(App[None]):
 
     def on_mount(self) -> None:
         """Begin to show, and to heed signals."""
+        loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            asyncio.get_running_loop().add_signal_handler(number, self.exit)
+            loop.add_signal_handler(number, self.exit)
+        loop.add_signal_handler(signal.SIGCONT, self._come_back)
         self.set_interval(REFRESH_S, self.refresh_view)
         self.refresh_view()
+
+    def _come_back(self) -> None:
+        """To the screen, which SIGSTOP has not left: else keys would have two readers from now on,
+        one of which nobody ends.
+        """
+        with self.suspend():
+            pass
 
     def refresh_view(self) -> None:
         """Show what is known now."""

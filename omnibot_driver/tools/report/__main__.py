@@ -27,12 +27,22 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
         prog="report",
         description="What a drive was like: a page with pictures, and a verdict in words.",
         epilog="Ends with 0, with 3 where the report says that something is wrong, with 1 where"
-        " there is nothing to report on.",
+        " there is nothing to report on, with 2 on wrong usage. See docs/report.md.",
     )
     parser.add_argument("bag", nargs="?", type=Path, help="folder of a rosbag2, or a file of it")
-    parser.add_argument("--live", type=float, metavar="SECONDS", help="listen to a running driver")
+    parser.add_argument(
+        "--live",
+        type=float,
+        metavar="SECONDS",
+        help="instead of a bag, listen to a running driver for so long, or until ctrl-C",
+    )
     parser.add_argument("--namespace", metavar="NAME", help="of the robot, where there are several")
-    parser.add_argument("--output", type=Path, metavar="FOLDER", help="default: BAG_report")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        metavar="FOLDER",
+        help="to write page and pictures into (default: BAG_report or live_report here)",
+    )
     parsed = parser.parse_args(given)
     if (parsed.bag is None) == (parsed.live is None):
         parser.error("give either a bag or --live SECONDS")
