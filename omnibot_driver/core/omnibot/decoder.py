@@ -92,6 +92,7 @@ class FrameDecoder:
         self._gaps: list[Gap] = []
         self._arrived = 0
         self._sharp = self._between = 0  # how often pauses ended where a frame began, or before
+        self._certain = False
         self._wait_for = 0
         self._last_arrival_s = -math.inf
 
@@ -105,9 +106,11 @@ class FrameDecoder:
         if not data:
             return found
         self._arrived = len(data)
-        last, self._last_arrival_s = self._last_arrival_s, now
-        if now - last > GAP_S:
-            self._pause(now - last, len(data), found)
+        pause_s, self._last_arrival_s = now - self._last_arrival_s, now
+        if self.at_rest and self._take_whole(data, pause_s, found):
+            return found
+        if pause_s > GAP_S:
+            self._pause(pause_s, len(data), found)
         self._held += data
         self._settle(found, closed=False)
         known = self._sharp >= PAUSES_TO_TRUST <= self._between
@@ -127,8 +130,8 @@ class FrameDecoder:
             return None
         self._last_arrival_s = now
         self.statistics.frames += 1
-        if pause_s - IMU_LENGTH * BYTE_S > GAP_S:
-            self._trust(sharp=True, between=True)
+        if not self._certain:
+            self._trust_pause(pause_s, IMU_LENGTH)
         frame, self._context = taken
         return frame
 
@@ -178,6 +181,23 @@ class FrameDecoder:
             width = 1 if sharp else arrived
             price = evidence.KNOWN_GAP if known else evidence.GAP
             self._gaps.append((place, place + width, price))
+
+    def _trust_pause(self, pause_s: float, arrived: int) -> None:
+        """What came after this pause began with a frame and ended with one."""
+        if pause_s - arrived * BYTE_S > GAP_S:
+            self._trust(sharp=True, between=True)
+
+    def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
+        """Take all that came, if frames were due and they are calm from the first to the last."""
+        if pause_s > TICK_S or len(data) > TICK_BYTES:
+            return False
+        walk, order = Walk(), self._pose_byte_order
+        end, context = take_calm(data, 0, self._context, self._expectation, order, walk)
+        if end < len(data):
+            return False
+        self._take(walk, len(walk.frames), context, found)
+        self._trust_pause(pause_s, len(data))
+        return True
 
     def _settle(self, found: list[Frame], *, closed: bool) -> None:
         """Take frames from what is held, until nothing is left or more bytes must tell."""
@@ -273,6 +293,7 @@ class FrameDecoder:
             at = min(half, pieces[0].start) if pieces else half
             self._drop(at)
             self._sharp = self._between = 0  # the pauses may have deceived us
+            self._certain = False
         return at > 0
 
     def _settled(
@@ -336,9 +357,10 @@ class FrameDecoder:
 
     def _trust(self, *, sharp: bool, between: bool) -> None:
         most = 2 * PAUSES_TO_TRUST
-        if not (sharp and between and self._sharp == self._between == most):
+        if not (sharp and between and self._certain):
             self._sharp = min(self._sharp + 1, most) if sharp else max(self._sharp - 4, 0)
             self._between = min(self._between + 1, most) if between else max(self._between - 4, 0)
+            self._certain = self._sharp == self._between == most
 
 
 def _may_end_in_a_header(frame: Frame, before: Context) -> bool:
