@@ -54,8 +54,8 @@ class Link:
         deliver: Callable[[Sequence[Event]], None],
         report: Callable[[str | None], None],
         failed: Callable[[BaseException], None],
-        on_read: Callable[[bytes], None] = lambda _data: None,
-        on_write: Callable[[bytes], None] = lambda _data: None,
+        on_read: Callable[[bytes], None] | None = None,
+        on_write: Callable[[bytes], None] | None = None,
     ) -> None:
         self._session = session
         self._url = url
@@ -204,7 +204,8 @@ class Link:
 
     def _read(self, port: Port) -> None:
         while not self._closing.is_set():
-            if data := port.read():
+            data = port.read()
+            if data and self._on_read is not None:
                 self._on_read(data)
             with self._lock:
                 if self._write_error is not None:
@@ -292,7 +293,8 @@ class Link:
             self._write_error = error
             self._interrupt()
         else:
-            self._on_write(data)
+            if self._on_write is not None:
+                self._on_write(data)
 
     def _interrupt(self) -> None:
         if self._port is not None:

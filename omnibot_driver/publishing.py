@@ -103,10 +103,11 @@ class Publishing:
         before_ns = time.monotonic_ns()
         # Where nobody simulates ROS time it is the system's, which costs a tenth.
         wall_ns = self._clock.now().nanoseconds if self._time_is_simulated else time.time_ns()
-        self._clock_offset_ns = messages.clock_offset(
+        offset_ns = self._clock_offset_ns = messages.clock_offset(
             self._clock_offset_ns, before_ns, wall_ns, time.monotonic_ns()
         )
-        self.publish(events, self._clock_offset_ns)
+        for event in events:
+            self._handlers[type(event)](event, offset_ns)
 
     def publish(self, events: Sequence[Event], clock_offset_ns: int) -> None:
         """Publish events whose stamps are so far behind ROS time."""
