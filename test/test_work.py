@@ -82,7 +82,7 @@ def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     assert most_calls(FrameDecoder().feed)[kind] <= bound
 
 
-@pytest.mark.parametrize(("kind", "bound"), [(IMU, 66), (DELTA, 201), (POSE, 413)])
+@pytest.mark.parametrize(("kind", "bound"), [(IMU, 63), (DELTA, 135), (POSE, 300)])
 def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     """From the bytes of one read to its events, and what the link asks after each."""
     session = opened_session()
@@ -96,7 +96,7 @@ def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     assert most_calls(work)[kind] <= bound
 
 
-@pytest.mark.parametrize(("kind", "bound"), [(IMU, 50), (DELTA, 68), (POSE, 228)])
+@pytest.mark.parametrize(("kind", "bound"), [(IMU, 49), (DELTA, 63), (POSE, 195)])
 def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound: int) -> None:
     """What is called before the reading can be published."""
     session = opened_session()

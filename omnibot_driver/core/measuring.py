@@ -54,7 +54,7 @@ class Measuring:
         self, odometry: OdometrySettings, motion: MotionLimits, imu: ImuCorrection
     ) -> None:
         """New settings, from the next reading on."""
-        self.odometry.settings = odometry
+        self.odometry.configure(odometry)
         self._plausibility.limits = motion
         self.inertial.configure(imu)
 

@@ -77,7 +77,7 @@ class Odometry:
         self.alignments = 0
         """How often the odometry frame has come to lie otherwise in the board's."""
         self._track = Track(axis_signs)
-        self.settings = settings
+        self.configure(settings)
         self._board: Pose | None = None
         self._belief = Belief()
         self._restarted: Pose | None = None
@@ -91,20 +91,13 @@ class Odometry:
         """Poses that are not possible, or that the next one did not confirm."""
         return self._belief.refused
 
-    @property
-    def settings(self) -> OdometrySettings:
-        """What may change while it runs."""
-        return self._settings
-
-    @settings.setter
-    def settings(self, settings: OdometrySettings) -> None:
+    def configure(self, settings: OdometrySettings) -> None:
+        """From the next displacement on."""
         self._settings = settings
         self._track.configure(
             settings.noise,
-            linear_scale=settings.linear_scale,
-            angular_scale=settings.angular_scale,
-            fastest_mps=settings.fastest_mps,
-            fastest_radps=settings.fastest_radps,
+            scale=(settings.linear_scale, settings.angular_scale),
+            fastest=(settings.fastest_mps, settings.fastest_radps),
         )
 
     def reset(self) -> None:

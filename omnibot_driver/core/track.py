@@ -29,19 +29,14 @@ class Track:
         self.follower, self.uncertainty = Follower(), Uncertainty(OdometryNoise())
 
     def configure(
-        self,
-        noise: OdometryNoise,
-        *,
-        linear_scale: float,
-        angular_scale: float,
-        fastest_mps: float,
-        fastest_radps: float,
+        self, noise: OdometryNoise, *, scale: tuple[float, float], fastest: tuple[float, float]
     ) -> None:
-        """The scales are true way and turn over those that the board tells."""
+        """``scale``: true way and turn over those that the board tells; ``fastest``: m/s, rad/s."""
         x, y, yaw = self._axis_signs
-        self._size = linear_scale, linear_scale, angular_scale
-        self._signed_size = x * linear_scale, y * linear_scale, yaw * angular_scale
-        self._fastest_mps, self._fastest_radps = fastest_mps, fastest_radps
+        linear, angular = scale
+        self._size = linear, linear, angular
+        self._signed_size = x * linear, y * linear, yaw * angular
+        self._fastest_mps, self._fastest_radps = fastest
         self.uncertainty.noise = noise
 
     def begin(self) -> None:
@@ -83,12 +78,8 @@ class Track:
 
     def _part(self, tangent: Pose) -> Pose:
         """It was rolled, and is uncertain; in REP-103's axes."""
-        true = signed = tangent
-        if self._size != AS_TOLD:
-            true = tangent.times(*self._size)
-        if self._signed_size != AS_TOLD:
-            signed = tangent.times(*self._signed_size)
-        self.rolled += true
+        self.rolled += _times(tangent, self._size)
+        signed = _times(tangent, self._signed_size)
         self.uncertainty.move(self.follower.target.yaw_rad, signed)
         return signed
 
