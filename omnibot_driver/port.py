@@ -51,6 +51,7 @@ class Port:
         self._url = url
         self._is_terminal = False
         self._peer: socket.socket | None = None
+        self._descriptor: int | None = None
         self._arrivals: select.poll | None = None
         try:
             self._serial = serial.serial_for_url(
@@ -104,10 +105,10 @@ class Port:
     def write(self, data: bytes) -> None:
         """All of it, or LinkError; then nothing that was written and is still here will be sent."""
         try:
-            if (descriptor := self.descriptor) is None:
+            if self._descriptor is None:
                 self._serial.write(data)
             else:
-                _write_whole(descriptor, data)
+                _write_whole(self._descriptor, data)
         except OSError as error:
             with contextlib.suppress(OSError, termios.error):
                 self._serial.reset_output_buffer()
@@ -130,13 +131,13 @@ class Port:
         if self._is_terminal:
             with contextlib.suppress(OSError):
                 fcntl.ioctl(self._serial.fileno(), termios.TIOCNXCL)
-        self._is_terminal = False
+        self._is_terminal, self._descriptor = False, None
         self._serial.close()
         if self._peer is not None:
             self._peer.close()  # pyserial leaves a socket open whose peer has gone
 
     def _settle_in(self) -> None:
-        descriptor = self.descriptor
+        descriptor = self._descriptor = self.descriptor
         self._is_terminal = descriptor is not None and os.isatty(descriptor)
         if type(self._serial) is serial.Serial:  # what its URLs are made of may look at each read
             self._arrivals = select.poll()
@@ -177,8 +178,11 @@ def _write_whole(descriptor: int, data: bytes) -> None:
     """Unlike pyserial's, it sleeps while there is no room, and late is not failed."""
     until = time.monotonic() + WRITE_TIMEOUT_S
     while True:
-        with contextlib.suppress(BlockingIOError):
-            data = data[os.write(descriptor, data) :]
+        try:
+            written = os.write(descriptor, data)
+        except BlockingIOError:
+            written = 0
+        data = data[written:]
         if not data:
             return
         left_s = max(0.0, until - time.monotonic())
