@@ -107,7 +107,7 @@ def twist(data: bytes) -> BodyTwist:
     """
     try:
         encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)
-        finite = 0.0 * x * y * z * roll * pitch * yaw == 0.0
+        finite = 0.0 * x * y * z * roll * pitch * yaw == 0.0  # otherwise it is NaN
         if finite and encapsulation == LITTLE_ENDIAN:
             return BodyTwist(x, y, yaw)
         return messages.body_twist(deserialize_message(data, Twist))

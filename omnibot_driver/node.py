@@ -130,7 +130,7 @@ class OmniBotDriver(Node):
         self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
 
     def _obey(self, action: Callable[[Session, Any, float], None]) -> Callable[..., None]:
-        """A callback that does this with a message, at its time, unless it is refused."""
+        """A callback that hands each message to ``action``, or tells why it is refused."""
 
         def callback(message: Any, info: MessageInfo) -> None:
             try:

@@ -51,7 +51,8 @@ class Port:
         self._url = url
         self._is_terminal = False
         self._peer: socket.socket | None = None
-        self._descriptor: int | None = None
+        self.descriptor: int | None = None
+        """What another process may inherit to write the same bytes; None where there is none."""
         self._arrivals: select.poll | None = None
         try:
             self._serial = serial.serial_for_url(
@@ -71,14 +72,6 @@ class Port:
         except (OSError, termios.error) as error:
             self.close()
             raise LinkError(_explain(url, error)) from error
-
-    @property
-    def descriptor(self) -> int | None:
-        """What another process may inherit to write the same bytes; None where there is none."""
-        try:
-            return int(self._serial.fileno())
-        except io.UnsupportedOperation:
-            return None
 
     @property
     def ends_with_us(self) -> bool:
@@ -105,10 +98,10 @@ class Port:
     def write(self, data: bytes) -> None:
         """All of it, or LinkError; then nothing that was written and is still here will be sent."""
         try:
-            if self._descriptor is None:
+            if self.descriptor is None:
                 self._serial.write(data)
             else:
-                _write_whole(self._descriptor, data)
+                _write_whole(self.descriptor, data)
         except OSError as error:
             with contextlib.suppress(OSError, termios.error):
                 self._serial.reset_output_buffer()
@@ -116,9 +109,9 @@ class Port:
 
     def write_if_room(self, data: bytes) -> None:
         """As much of it as is taken at once, be it nothing."""
-        if (descriptor := self.descriptor) is not None:
+        if self.descriptor is not None:
             with contextlib.suppress(OSError):
-                os.write(descriptor, data)
+                os.write(self.descriptor, data)
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, where the port can do so."""
@@ -131,13 +124,15 @@ class Port:
         if self._is_terminal:
             with contextlib.suppress(OSError):
                 fcntl.ioctl(self._serial.fileno(), termios.TIOCNXCL)
-        self._is_terminal, self._descriptor = False, None
+        self._is_terminal, self.descriptor = False, None
         self._serial.close()
         if self._peer is not None:
             self._peer.close()  # pyserial leaves a socket open whose peer has gone
 
     def _settle_in(self) -> None:
-        descriptor = self._descriptor = self.descriptor
+        with contextlib.suppress(io.UnsupportedOperation):
+            self.descriptor = self._serial.fileno()
+        descriptor = self.descriptor
         self._is_terminal = descriptor is not None and os.isatty(descriptor)
         if type(self._serial) is serial.Serial:  # what its URLs are made of may look at each read
             self._arrivals = select.poll()

@@ -96,7 +96,8 @@ class CommandStream:
         frame = self._frame(next_write, now)
         self._fresh, self._urgent, self._switching = self._switching, False, False
         if frame:
-            self._last_written, self._said_at, self._written_at = frame, now, now
+            self._said_at = now
+            self.wrote(frame, now)
         else:
             self._quiet = True
         return frame

@@ -30,7 +30,7 @@ class SpeedLimits:
     angular_radps2: float = 0.0
 
     def allow(self, twist: BodyTwist) -> bool:
-        """Whether it is below them, as nothing is that is not finite."""
+        """Whether it is below them, as NaN and infinity never are."""
         return (
             twist.vx_mps * twist.vx_mps + twist.vy_mps * twist.vy_mps
             < self.linear_mps * self.linear_mps
@@ -99,11 +99,6 @@ def slow(values: Sequence[float], limit: float) -> tuple[float, ...]:
     """The values scaled together until the largest magnitude is at most ``limit``."""
     largest = max(map(abs, values))
     return tuple(values) if largest <= limit else _scale(values, limit / largest)
-
-
-def to_words(counts: Sequence[float]) -> tuple[int, ...]:
-    """Counts rounded to the nearest (halves away from zero), scaled together to fit 16 bits."""
-    return tuple(map(to_nearest, slow(counts, MAX_WORD)))
 
 
 def to_nearest(count: float) -> int:

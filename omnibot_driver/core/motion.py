@@ -96,14 +96,13 @@ class BaseMotion:
 
     def frame(self, now: float) -> bytes:
         """The set-point of this time; asking moves it."""
-        duration_s, self._reached_at = now - self._reached_at, now
-        if self.settled:
-            return self._frame
-        self._setpoint = self._limits.approach(
-            self._setpoint, self._wanted, min(duration_s, LONGEST_STEP_S)
-        )
-        self.settled = self._setpoint == self._wanted
-        return self._encode(self._setpoint)
+        if not self.settled:
+            duration_s = min(now - self._reached_at, LONGEST_STEP_S)
+            self._setpoint = self._limits.approach(self._setpoint, self._wanted, duration_s)
+            self._frame = self._encode(self._setpoint)
+            self.settled = self._setpoint == self._wanted
+        self._reached_at = now
+        return self._frame
 
 
 class SteadyMotion:

@@ -313,10 +313,9 @@ class Session:
 
     def take_output(self, now: float) -> bytes:
         """The bytes to write now; they count as written."""
-        supervisor = self._supervisor
-        if supervisor.phase is Phase.CLOSED:
+        if self._supervisor.phase is Phase.CLOSED:
             return b""
-        if data := supervisor.take_output():
+        if data := self._supervisor.take_output():
             self._commands.wrote(data, now)
         return data + self._commands.due(now)
 
@@ -383,5 +382,5 @@ class Session:
         ):
             raise CommandRefused(f"motion command refused: {reason}")
         self._commands.command(motion, now, expires_at=expires_at)
-        if self._inertial.calibration.measuring and not motion.stands:
+        if not motion.stands:
             self._inertial.calibration.give_up("a motion command came in; cease, then call again")
