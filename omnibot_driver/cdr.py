@@ -106,9 +106,10 @@ def twist(data: bytes) -> BodyTwist:
     Raises CommandRefused for what is none, as another middleware might let through.
     """
     try:
-        encapsulation, *values = TWIST(data)
-        if encapsulation == LITTLE_ENDIAN:
-            return messages.planar_twist(values)
+        encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)
+        finite = 0.0 * x * y * z * roll * pitch * yaw == 0.0  # otherwise it is NaN
+        if finite and encapsulation == LITTLE_ENDIAN:
+            return BodyTwist(x, y, yaw)
         return messages.body_twist(deserialize_message(data, Twist))
     except (RMWError, struct.error) as error:
         raise CommandRefused(

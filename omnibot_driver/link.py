@@ -29,6 +29,7 @@ from omnibot_driver.standstill import Standstill
 JOIN_TIMEOUT_S: Final = 1.0
 BACK_OFF: Final = 1.5
 LONGEST_WAIT_S: Final = 2.0
+WAITED: Final = "motion command refused: it waited while the driver stood still; send it again"
 
 T = TypeVar("T")
 
@@ -111,20 +112,24 @@ class Link:
         with self._changed:
             return self._write_error is not None
 
-    def command(self, action: Callable[[Session, float], None], sent_ns: int) -> None:
-        """``call``, with a command sent at this time of day by the sender's clock.
+    def command(self, action: Callable[[Session, T, float], None], wish: T, sent_ns: int) -> None:
+        """``call``, with a wish that was sent at this time of day by the sender's clock.
 
         Raises CommandRefused for one that has been waiting while this process stood still.
         """
-
-        def unless_it_waited(session: Session, now: float) -> None:
-            if not self._standstill.outlived_by(sent_ns, now):
-                raise CommandRefused(
-                    "motion command refused: it waited while the driver stood still; send it again"
-                )
-            action(session, now)
-
-        self.call(unless_it_waited)
+        events: Sequence[Event] = ()
+        try:
+            with self._lock:
+                now = time.monotonic()
+                try:
+                    if not self._standstill.outlived_by(sent_ns, now):
+                        self._heed_standstill(now)
+                        raise CommandRefused(WAITED)
+                    action(self._session, wish, now)
+                finally:
+                    events = self._settle()
+        finally:
+            self._deliver(events)
 
     def figures(self) -> tuple[LinkFigures, SessionFigures]:
         """All that is counted and measured, at one moment."""

@@ -164,13 +164,8 @@ def body_twist(twist: Any) -> BodyTwist:
     axis is not to be trusted with the others.
     """
     linear, angular = twist.linear, twist.angular
-    return planar_twist((linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
-
-
-def planar_twist(values: Sequence[float]) -> BodyTwist:
-    """``body_twist`` of its six numbers, the linear ones first."""
-    require_finite("cmd_vel", values)
-    return BodyTwist(values[0], values[1], values[5])
+    require_finite("cmd_vel", (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
+    return BodyTwist(linear.x, linear.y, angular.z)
 
 
 def goal_pose(stamped: Any, odom_frame: str) -> Pose:

@@ -10,6 +10,7 @@ import math
 import time
 import traceback
 from collections.abc import Callable
+from typing import Any
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
@@ -119,26 +120,33 @@ class OmniBotDriver(Node):
 
     def _create_inputs(self) -> None:
         if self._values["enable_stamped_cmd_vel"]:
-            self.create_subscription(TwistStamped, "cmd_vel", self._on_twist_stamped, 1)
+            self.create_subscription(TwistStamped, "cmd_vel", self._obey(self._twist_stamped), 1)
         else:
-            self.create_subscription(Twist, "cmd_vel", self._on_twist, 1, raw=True)
+            self.create_subscription(Twist, "cmd_vel", self._obey(_twist), 1, raw=True)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._looking = self.create_timer(LOOK_EVERY_S, self._look_for_other_types, clock=steady)
-        self.create_subscription(Float32MultiArray, "wheel_cmd", self._on_wheels, 1)
-        self.create_subscription(PoseStamped, "cmd_pose", self._on_pose, 1)
+        self.create_subscription(Float32MultiArray, "wheel_cmd", self._obey(_wheels), 1)
+        self.create_subscription(PoseStamped, "cmd_pose", self._obey(self._pose), 1)
         self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
 
-    def _on_twist(self, data: bytes, info: MessageInfo) -> None:
-        self._command(lambda session, now: session.command_twist(cdr.twist(data), now), info)
+    def _obey(self, action: Callable[[Session, Any, float], None]) -> Callable[..., None]:
+        """A callback that hands each message to ``action``, or tells why it is refused."""
 
-    def _on_twist_stamped(self, stamped: TwistStamped, info: MessageInfo) -> None:
+        def callback(message: Any, info: MessageInfo) -> None:
+            try:
+                self._link.command(action, message, info["source_timestamp"])
+            except CommandRefused as error:
+                self._refuse(str(error))
+
+        return callback
+
+    def _twist_stamped(self, session: Session, stamped: TwistStamped, now: float) -> None:
         age_s = messages.age(stamped.header.stamp, self.get_clock().now().nanoseconds)
-        self._command(
-            lambda session, now: session.command_twist(
-                messages.body_twist(stamped.twist), now, age_s=age_s
-            ),
-            info,
-        )
+        session.command_twist(messages.body_twist(stamped.twist), now, age_s=age_s)
+
+    def _pose(self, session: Session, goal: PoseStamped, now: float) -> None:
+        frame = self._publishing.settings.odom_frame
+        session.command_pose(messages.goal_pose(goal, frame), now)
 
     def _look_for_other_types(self) -> None:
         """The middleware says nothing when two types meet on one topic. Told once."""
@@ -150,24 +158,9 @@ class OmniBotDriver(Node):
             self.get_logger().warning(warning)
             self._looking.cancel()
 
-    def _on_wheels(self, wheels: Float32MultiArray, info: MessageInfo) -> None:
-        self._command(lambda session, now: session.command_wheels(wheels.data, now), info)
-
-    def _on_pose(self, goal: PoseStamped, info: MessageInfo) -> None:
-        frame = self._publishing.settings.odom_frame
-        self._command(
-            lambda session, now: session.command_pose(messages.goal_pose(goal, frame), now), info
-        )
-
-    def _command(self, action: Callable[[Session, float], None], info: MessageInfo) -> None:
-        try:
-            self._link.command(action, info["source_timestamp"])
-        except CommandRefused as error:
-            self._refusals = Refusals(count=self._refusals.count + 1, last=str(error))
-            self._warn_of_refusal(str(error))
-
-    def _warn_of_refusal(self, text: str) -> None:
-        """Each kind now and then: a flood of one does not hide another."""
+    def _refuse(self, text: str) -> None:
+        """Counted each time, told now and then by its kind: a flood of one hides no other."""
+        self._refusals = Refusals(count=self._refusals.count + 1, last=text)
         kind, now_s = text.partition(":")[0], time.monotonic()
         if now_s - self._refused_at_s.get(kind, -math.inf) >= WARN_EVERY_S:
             self._refused_at_s[kind] = now_s
@@ -176,3 +169,11 @@ class OmniBotDriver(Node):
     def _on_estop_topic(self, message: Bool) -> None:
         if message.data:
             self._link.call(lambda session, now: session.estop(True, now))
+
+
+def _twist(session: Session, data: bytes, now: float) -> None:
+    session.command_twist(cdr.twist(data), now)
+
+
+def _wheels(session: Session, wheels: Float32MultiArray, now: float) -> None:
+    session.command_wheels(wheels.data, now)

@@ -51,6 +51,8 @@ class Port:
         self._url = url
         self._is_terminal = False
         self._peer: socket.socket | None = None
+        self.descriptor: int | None = None
+        """What another process may inherit to write the same bytes; None where there is none."""
         self._arrivals: select.poll | None = None
         try:
             self._serial = serial.serial_for_url(
@@ -70,14 +72,6 @@ class Port:
         except (OSError, termios.error) as error:
             self.close()
             raise LinkError(_explain(url, error)) from error
-
-    @property
-    def descriptor(self) -> int | None:
-        """What another process may inherit to write the same bytes; None where there is none."""
-        try:
-            return int(self._serial.fileno())
-        except io.UnsupportedOperation:
-            return None
 
     @property
     def ends_with_us(self) -> bool:
@@ -104,10 +98,10 @@ class Port:
     def write(self, data: bytes) -> None:
         """All of it, or LinkError; then nothing that was written and is still here will be sent."""
         try:
-            if (descriptor := self.descriptor) is None:
+            if self.descriptor is None:
                 self._serial.write(data)
             else:
-                _write_whole(descriptor, data)
+                _write_whole(self.descriptor, data)
         except OSError as error:
             with contextlib.suppress(OSError, termios.error):
                 self._serial.reset_output_buffer()
@@ -115,9 +109,9 @@ class Port:
 
     def write_if_room(self, data: bytes) -> None:
         """As much of it as is taken at once, be it nothing."""
-        if (descriptor := self.descriptor) is not None:
+        if self.descriptor is not None:
             with contextlib.suppress(OSError):
-                os.write(descriptor, data)
+                os.write(self.descriptor, data)
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, where the port can do so."""
@@ -130,12 +124,14 @@ class Port:
         if self._is_terminal:
             with contextlib.suppress(OSError):
                 fcntl.ioctl(self._serial.fileno(), termios.TIOCNXCL)
-        self._is_terminal = False
+        self._is_terminal, self.descriptor = False, None
         self._serial.close()
         if self._peer is not None:
             self._peer.close()  # pyserial leaves a socket open whose peer has gone
 
     def _settle_in(self) -> None:
+        with contextlib.suppress(io.UnsupportedOperation):
+            self.descriptor = self._serial.fileno()
         descriptor = self.descriptor
         self._is_terminal = descriptor is not None and os.isatty(descriptor)
         if type(self._serial) is serial.Serial:  # what its URLs are made of may look at each read
@@ -177,8 +173,11 @@ def _write_whole(descriptor: int, data: bytes) -> None:
     """Unlike pyserial's, it sleeps while there is no room, and late is not failed."""
     until = time.monotonic() + WRITE_TIMEOUT_S
     while True:
-        with contextlib.suppress(BlockingIOError):
-            data = data[os.write(descriptor, data) :]
+        try:
+            written = os.write(descriptor, data)
+        except BlockingIOError:
+            written = 0
+        data = data[written:]
         if not data:
             return
         left_s = max(0.0, until - time.monotonic())

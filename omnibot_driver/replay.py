@@ -76,9 +76,9 @@ class Replay:
         """Nothing is written, so nothing is in its way."""
         return False
 
-    def command(self, action: Callable[[Session, float], None], _sent_ns: int) -> None:
+    def command(self, action: Callable[[Session, T, float], None], wish: T, _sent_ns: int) -> None:
         """``call``; nobody is moved by it."""
-        self.call(action)
+        self.call(lambda session, now: action(session, wish, now))
 
     def close(self, _on_exit: OnExit) -> None:
         """End the thread; harmless to repeat."""

@@ -18,7 +18,10 @@ SETTLE_S: Final = 0.25
 
 
 class Standstill:
-    """``passed`` by the watchdog's thread, ``begun`` by every thread before it does something."""
+    """``passed`` by the watchdog's thread, ``begun`` by every thread before it does something.
+
+    ``outlived_by`` is never true of what ``begun`` would tell.
+    """
 
     def __init__(self) -> None:
         self._passed_at = math.inf
@@ -45,6 +48,6 @@ class Standstill:
 
     def outlived_by(self, sent_ns: int, now: float) -> bool:
         """A command, sent at this time of day by the sender's clock, is not from before its end."""
-        if self._begun or now < self._over_at + SETTLE_S:
+        if self._begun or now - self._passed_at >= STANDSTILL_S or now < self._over_at + SETTLE_S:
             return False
         return not self._from_ns <= sent_ns <= self._until_ns

@@ -155,7 +155,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
     link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
-    drive = partial(link.command, lambda s, now: s.command_twist(BodyTwist(0.2, 0.0, 0.0), now))
+    drive = partial(link.command, Session.command_twist, BodyTwist(0.2, 0.0, 0.0))
     drive(time.time_ns())
     hold, held = threading.Event(), threading.Event()
 

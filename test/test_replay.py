@@ -17,6 +17,7 @@ from omnibot_driver.core.events import Event, Notice, StateChanged
 from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.session import Session
 from omnibot_driver.core.supervisor import Request
 from omnibot_driver.replay import Replay
 from omnibot_driver.simulator import BoardSettings, FaultyLine, LineFaults, SimulatedBoard
@@ -193,7 +194,7 @@ def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
     tape = Tape(itertools.takewhile(lambda _: not stop.is_set(), endless), speed=1.0)
     replay, heard = start(tape)
     heard.wait_for(lambda: heard.session.state == "nominal")
-    replay.command(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now), 0)
+    replay.command(Session.command_twist, BodyTwist(0.3, 0.0, 0.0), 0)
     replay.call(lambda s, now: s.request(Request.PAUSE, "token", now))
     stop.set()
     heard.wait_for(lambda: ENDED in heard.events)

@@ -50,6 +50,7 @@ def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
     """Another thread may run first, or alone."""
     standstill = Standstill()
     standstill.passed(100.0, wall_ns(100.0))
+    assert not standstill.outlived_by(wall_ns(100.0 + STANDSTILL_S), 100.0 + STANDSTILL_S)
     standstill.begun(103.0)
     assert not standstill.outlived_by(wall_ns(103.5), 103.5)
 
@@ -57,8 +58,9 @@ def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
 def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
     """However late a retransmission brings it."""
     standstill = resumed(5.0)
+    standstill.passed(108.0, wall_ns(108.0))
     assert not standstill.outlived_by(wall_ns(104.9), 108.0)
-    assert standstill.outlived_by(wall_ns(105.5), 105.5)
+    assert standstill.outlived_by(wall_ns(105.5), 108.0)
 
 
 @pytest.mark.parametrize("skew_s", [-1e6, 1e6])
@@ -66,6 +68,7 @@ def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(ske
     """It cannot lock itself out."""
     standstill = resumed(5.0)
     assert not standstill.outlived_by(wall_ns(104.9 + skew_s), 105.0 + SETTLE_S / 2)
+    standstill.passed(106.0, wall_ns(106.0))
     assert standstill.outlived_by(wall_ns(105.9 + skew_s), 106.0)
 
 

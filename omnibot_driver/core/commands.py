@@ -36,6 +36,7 @@ class CommandStream:
         self._stop, self._emergency_stop = stop, emergency_stop
         self.current: Motion | None = None
         """The command that is being carried out."""
+        self.commanded_at = -math.inf
         self._expires_at = -math.inf
         self._stopping_until = -math.inf
         self._written_at = self._said_at = -math.inf
@@ -48,12 +49,12 @@ class CommandStream:
     def command(self, motion: Motion, now: float, *, expires_at: float) -> None:
         """The newest command replaces whatever was current; another's is stopped in between."""
         before, self.current = self.current, motion
-        self._expires_at = expires_at
+        self.commanded_at, self._expires_at = now, expires_at
         self._fresh, self._quiet = True, False
         self._switching |= before is not None and before.authority is not motion.authority
-        stopped = self._just_written(self._stop, now)
-        self._switching &= not stopped
-        self._urgent = (self._switching or motion.stands) and not stopped
+        self._urgent = self._switching or motion.stands
+        if self._urgent and self._just_written(self._stop, now):
+            self._switching = self._urgent = False
 
     def discard(self) -> None:
         """No command is current and the line goes quiet; an e-stop stays."""

@@ -48,7 +48,6 @@ class Driving:
         self._helm = Helm(board, odometry, limits, axis_signs, control)
         self._watch = Watch()
         self._obeys = obeys
-        self._commanded_at = -math.inf
 
     def configure(self, limits: SpeedLimits, commands: CommandSettings) -> None:
         """New settings, from the next command and frame on."""
@@ -59,7 +58,7 @@ class Driving:
         current = self.stream.current
         return CommandFigures(
             source=current.authority.value if current else None,
-            age_s=now - self._commanded_at,
+            age_s=now - self.stream.commanded_at,
             limited=self._helm.limited,
             estop=self.stream.latched,
         )
@@ -77,9 +76,12 @@ class Driving:
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Wish:
         """Drive the body. Raises CommandRefused, as all wishes do."""
         timeout_s = self.stream.settings.timeout_s
-        require_timely("cmd_vel", age_s, timeout_s)
+        expires_at = now + timeout_s
+        if age_s:
+            require_timely("cmd_vel", age_s, timeout_s)
+            expires_at -= max(0.0, age_s)
         motion = self._helm.base(twist, before=self.stream.current, since=now - PACE_S)
-        return motion, now - max(0.0, age_s) + timeout_s
+        return motion, expires_at
 
     def wheels(self, rates_radps: Sequence[float], now: float) -> Wish:
         """Turn wheels A, B, C."""
@@ -88,12 +90,6 @@ class Driving:
     def pose(self, goal: Pose) -> Wish:
         """Drive to a pose in the odometry frame."""
         return self._helm.pose(goal), NEVER
-
-    def command(self, wish: Wish, now: float) -> None:
-        """It is granted."""
-        motion, expires_at = wish
-        self.stream.command(motion, now, expires_at=expires_at)
-        self._commanded_at = now
 
     def look(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float

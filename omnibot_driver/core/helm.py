@@ -36,29 +36,34 @@ class Helm:
     ) -> None:
         self.limits = limits
         self._board, self._odometry = board, odometry
+        self._stop = board.stop()
         self._axis_signs, self._control = axis_signs, control
         self.limited = 0
         """Wishes that went beyond the limits."""
 
     def base(self, twist: BodyTwist, *, before: Motion | None, since: float) -> Motion:
         """Drive the body, from what was commanded ``before``."""
-        self._require_switch(Authority.BASE)
-        require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
+        if self._control == "position":
+            raise self._at_odds(Authority.BASE)
+        limited = twist
+        if not self.limits.allow(twist):
+            require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
+            limited = self.limits.twist(twist)
+            self.limited += limited != twist
         x, y, yaw = self._axis_signs
-        limited = self.limits.twist(twist)
-        self.limited += limited != twist
         return BaseMotion(
             BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps),
             self.limits,
             self._board.velocity,
-            stop=self._board.stop(),
+            stop=self._stop,
             before=before,
             since=since,
         )
 
     def wheels(self, rates_radps: Sequence[float]) -> Motion:
         """Turn the wheels A, B, C."""
-        self._require_switch(Authority.WHEELS)
+        if self._control == "position":
+            raise self._at_odds(Authority.WHEELS)
         if len(rates_radps) != 3:
             raise CommandRefused(
                 f"wheel_cmd refused: it has {len(rates_radps)} values; send exactly 3,"
@@ -71,13 +76,14 @@ class Helm:
         return SteadyMotion(
             Authority.WHEELS,
             frame,
-            stands=frame == self._board.stop(),
+            stands=frame == self._stop,
             plain=max(map(abs, limited)) > PLAIN_WHEEL_RADPS,
         )
 
     def pose(self, goal: Pose) -> Motion:
         """Drive to a pose in the odometry frame and stay there."""
-        self._require_switch(Authority.POSE)
+        if self._control != "position":
+            raise self._at_odds(Authority.POSE)
         require_finite("cmd_pose", (goal.x_m, goal.y_m, goal.yaw_rad))
         place = self._odometry.in_board_frame(goal)
         if place is None or self._board.mode is Mode.IMU_ONLY:
@@ -87,9 +93,8 @@ class Helm:
             )
         return GoalMotion(goal, self._board.drive_to(place), self._odometry.alignments)
 
-    def _require_switch(self, authority: Authority) -> None:
-        if (authority is Authority.POSE) is not (self._control == "position"):
-            raise CommandRefused(
-                f"{authority.value} refused: the parameter `control_method` is '{self._control}';"
-                " it must say where the board's switch stands"
-            )
+    def _at_odds(self, authority: Authority) -> CommandRefused:
+        return CommandRefused(
+            f"{authority.value} refused: the parameter `control_method` is '{self._control}';"
+            " it must say where the board's switch stands"
+        )

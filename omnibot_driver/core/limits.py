@@ -29,6 +29,14 @@ class SpeedLimits:
     linear_mps2: float = 0.0
     angular_radps2: float = 0.0
 
+    def allow(self, twist: BodyTwist) -> bool:
+        """Whether it is below them, as NaN and infinity never are."""
+        return (
+            twist.vx_mps * twist.vx_mps + twist.vy_mps * twist.vy_mps
+            < self.linear_mps * self.linear_mps
+            and abs(twist.yaw_rate_radps) < self.angular_radps
+        )
+
     def twist(self, wanted: BodyTwist) -> BodyTwist:
         """The linear velocity shortened in its own direction, the yaw rate clamped."""
         vx, vy = shorten((wanted.vx_mps, wanted.vy_mps), self.linear_mps)
@@ -37,8 +45,6 @@ class SpeedLimits:
 
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
         """The velocity after ``duration_s`` on the straight way to what is wanted."""
-        if not self.linear_mps2 and not self.angular_radps2:
-            return wanted
         vx, vy = _step(
             (now.vx_mps, now.vy_mps),
             (wanted.vx_mps, wanted.vy_mps),
@@ -92,17 +98,12 @@ def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
 def slow(values: Sequence[float], limit: float) -> tuple[float, ...]:
     """The values scaled together until the largest magnitude is at most ``limit``."""
     largest = max(map(abs, values))
-    return _scale(values, limit / largest) if largest else tuple(values)
-
-
-def to_words(counts: Sequence[float]) -> tuple[int, ...]:
-    """Counts rounded to the nearest (halves away from zero), scaled together to fit 16 bits."""
-    return tuple(map(to_nearest, slow(counts, MAX_WORD)))
+    return tuple(values) if largest <= limit else _scale(values, limit / largest)
 
 
 def to_nearest(count: float) -> int:
     """The nearest whole count; halves away from zero, so that both signs are alike."""
-    return int(math.copysign(math.floor(abs(count) + 0.5), count))
+    return int(count + 0.5) if count > 0.0 else int(count - 0.5)
 
 
 def _step(now: Sequence[float], wanted: Sequence[float], longest: float) -> tuple[float, ...]:

@@ -78,18 +78,16 @@ class BaseMotion:
         since: float,
     ) -> None:
         self._wanted, self._limits, self._encode = wanted, limits, encode
-        self.stands = encode(wanted) == stop
-        self._setpoint, self._reached_at = AT_REST, since
-        if isinstance(before, BaseMotion):
-            self._setpoint = before._setpoint
-            self._reached_at = max(before._reached_at, since)
-        if self.stands:
-            self._setpoint = wanted
-
-    @property
-    def settled(self) -> bool:
+        self._frame = encode(wanted)
+        self.stands = self._frame == stop
+        self._setpoint, self._reached_at = wanted, since
+        self.settled = self.stands or not (limits.linear_mps2 or limits.angular_radps2)
         """Whether the set-point has arrived."""
-        return self._setpoint == self._wanted
+        if not self.settled:
+            self._setpoint = AT_REST
+            if isinstance(before, BaseMotion):
+                self._setpoint = before._setpoint
+                self._reached_at = max(before._reached_at, since)
 
     @property
     def plain(self) -> bool:
@@ -98,10 +96,13 @@ class BaseMotion:
 
     def frame(self, now: float) -> bytes:
         """The set-point of this time; asking moves it."""
-        duration_s = min(now - self._reached_at, LONGEST_STEP_S)
-        self._setpoint = self._limits.approach(self._setpoint, self._wanted, duration_s)
+        if not self.settled:
+            duration_s = min(now - self._reached_at, LONGEST_STEP_S)
+            self._setpoint = self._limits.approach(self._setpoint, self._wanted, duration_s)
+            self._frame = self._encode(self._setpoint)
+            self.settled = self._setpoint == self._wanted
         self._reached_at = now
-        return self._encode(self._setpoint)
+        return self._frame
 
 
 class SteadyMotion:

@@ -324,8 +324,7 @@ class Session:
         """The bytes to write now; they count as written."""
         if self._supervisor.phase is CLOSED:
             return b""
-        data = self._supervisor.take_output()
-        if data:
+        if data := self._supervisor.take_output():
             self._commands.wrote(data, now)
         return data + self._commands.due(now)
 
@@ -386,15 +385,15 @@ class Session:
             self._events += map(Notice, sentences)
 
     def _command(self, wish: Wish, now: float) -> None:
-        motion, _ = wish
+        motion, expires_at = wish
         unheard = now - self._heard_at >= UNHEARD_S and not motion.stands
         if reason := why_not_drive(
             self._supervisor.phase,
             self._board.mode,
-            latched=self.estop_active,
+            latched=self._commands.latched,
             unheard_s=UNHEARD_S if unheard else 0.0,
         ):
             raise CommandRefused(f"motion command refused: {reason}")
-        self._driving.command(wish, now)
+        self._commands.command(motion, now, expires_at=expires_at)
         if not motion.stands:
             self._inertial.calibration.give_up("a motion command came in; cease, then call again")

@@ -80,7 +80,7 @@ class Supervisor:
         self.answers: list[RequestDone] = []
         self._board = board
         self._wanted = Wanted.RUNNING if run else Wanted.ANY
-        self._output = bytearray()
+        self._output = b""
         self._said_at = self._data_at = -math.inf
         self._flowed_s = 0.0
         self._paused_with_p = self._was_running = False
@@ -91,10 +91,7 @@ class Supervisor:
 
     def take_output(self) -> bytes:
         """What to write now, before anything else."""
-        if not self._output:
-            return b""
-        data = bytes(self._output)
-        self._output.clear()
+        data, self._output = self._output, b""
         return data
 
     @property
@@ -111,7 +108,7 @@ class Supervisor:
 
     def opened(self, now: float) -> None:
         """The port is open; the board may be in any state, half-way through a command too."""
-        self._output.clear()
+        self._output = b""
         self._begin(now)
 
     def closed(self) -> None:

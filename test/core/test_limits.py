@@ -12,12 +12,13 @@ from strategies import any_twists, finite
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import (
+    MAX_WORD,
     SpeedLimits,
     require_finite,
     require_timely,
     shorten,
     slow,
-    to_words,
+    to_nearest,
 )
 
 limits = st.one_of(st.just(0.0), st.floats(1e-3, 200.0))
@@ -34,6 +35,11 @@ def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
     return all(
         math.isclose(x, y, rel_tol=1e-9, abs_tol=1e-9) for x, y in zip(unit_a, unit_b, strict=True)
     )
+
+
+def words_of(counts: list[float]) -> tuple[int, ...]:
+    """As a board is told them."""
+    return tuple(map(to_nearest, slow(counts, MAX_WORD)))
 
 
 @given(vectors, limits)
@@ -83,6 +89,29 @@ def test_a_limited_twist_is_within_every_limit_and_points_the_same_way(twist: Bo
     assert limited.yaw_rate_radps * math.copysign(1, twist.yaw_rate_radps) >= 0
 
 
+@given(any_twists)
+def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
+    """And what is not is at a limit, or beyond it."""
+    limits = SpeedLimits(linear_mps=0.5, angular_radps=0.7)
+    if limits.allow(twist):
+        limited = limits.twist(twist)
+        assert (limited.vx_mps, limited.vy_mps) == pytest.approx((twist.vx_mps, twist.vy_mps))
+        assert limited.yaw_rate_radps == twist.yaw_rate_radps
+    else:
+        assert twist.faster_than(0.5 / ULPS, 0.7 / ULPS)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
+    """Not even without limits."""
+    values = [0.0, 0.1, -0.1]
+    values[place] = bad
+    none = SpeedLimits(linear_mps=math.inf, angular_radps=math.inf)
+    assert none.allow(BodyTwist(0.0, 0.1, -0.1))
+    assert not none.allow(BodyTwist(*values))
+
+
 def test_the_linear_speed_is_limited_as_a_vector_and_not_by_axis() -> None:
     """3 and 4 m/s become 0.3 and 0.4, not 0.5 and 0.5; a turn is no part of it."""
     limited = SpeedLimits().twist(BodyTwist(3.0, -4.0, 0.1))
@@ -107,7 +136,7 @@ def test_a_limit_of_zero_lets_nothing_through() -> None:
 @example([0.49999999999999994, 2.5, -2.4999])
 def test_words_are_the_nearest_integers(counts: list[float]) -> None:
     """Never cut off towards zero."""
-    for word, count in zip(to_words(counts), counts, strict=True):
+    for word, count in zip(words_of(counts), counts, strict=True):
         assert isinstance(word, int)
         assert abs(word - count) <= 0.5
 
@@ -115,8 +144,8 @@ def test_words_are_the_nearest_integers(counts: list[float]) -> None:
 @given(st.lists(st.floats(-32767, 32767), min_size=3, max_size=3))
 def test_rounding_is_the_same_to_both_sides(counts: list[float]) -> None:
     """A robot does not drift backwards."""
-    mirrored = to_words([-count for count in counts])
-    assert mirrored == tuple(-word for word in to_words(counts))
+    mirrored = words_of([-count for count in counts])
+    assert mirrored == tuple(-word for word in words_of(counts))
 
 
 @given(st.lists(finite, min_size=3, max_size=3))
@@ -124,7 +153,7 @@ def test_rounding_is_the_same_to_both_sides(counts: list[float]) -> None:
 @example([32768.0, 100.0, 0.0])
 def test_words_fit_16_bits_and_keep_the_direction(counts: list[float]) -> None:
     """What is too large is scaled down as a whole, to half a count."""
-    words = to_words(counts)
+    words = words_of(counts)
     assert all(-32768 <= word <= 32767 for word in words)
     largest = max(map(abs, counts))
     if largest > 32767:

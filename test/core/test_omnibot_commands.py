@@ -132,6 +132,8 @@ def test_commands_that_do_not_fit_the_wire_are_counted() -> None:
     assert board.figures.saturated == 0
     board.velocity(BodyTwist(3.3, 0.0, 0.0))
     assert board.figures.saturated == 1
+    sent = board.velocity(BodyTwist(6.5534, 2.0, 0.0))
+    assert sent == bytes.fromhex("FF FE 01 7F FF 27 10 00 00")  # twice too fast: slowed as a whole
 
 
 def test_settings_may_be_replaced_while_it_runs() -> None:

@@ -26,12 +26,11 @@ from omnibot_driver.core.board import (
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, ImuScale, gravity_advice
 from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
-from omnibot_driver.core.limits import MAX_WORD, to_nearest, to_words
+from omnibot_driver.core.limits import MAX_WORD, slow, to_nearest
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
 from omnibot_driver.core.omnibot.frames import (
     ByteOrder,
-    CommandFrame,
     DeltaFrame,
     Frame,
     ImuFrame,
@@ -216,7 +215,8 @@ class OmniBot:
 
     def velocity(self, twist: BodyTwist) -> bytes:
         """Base vector control; Stop when it rounds to nothing."""
-        linear, angular = self._settings.linear_scale, self._settings.angular_scale
+        settings = self._settings
+        linear, angular = settings.linear_scale, settings.angular_scale
         counts = (twist.vx_mps * linear, twist.vy_mps * linear, twist.yaw_rate_radps * angular)
         return self._drive(frames.VELOCITY_MODE, counts)
 
@@ -238,12 +238,15 @@ class OmniBot:
                 " ~/reset begins a new frame where the robot stands"
             )
         x, y, yaw = map(to_nearest, counts)
-        return frames.encode(CommandFrame(frames.VELOCITY_MODE, (x, y, yaw)))
+        return frames.command(frames.VELOCITY_MODE, x, y, yaw)
 
     def _drive(self, mode: int, counts: Vector3) -> bytes:
-        self._saturated += max(map(abs, counts)) > MAX_WORD
-        a, b, c = to_words(counts)
-        return frames.encode(CommandFrame(mode, (a, b, c))) if (a, b, c) != (0, 0, 0) else STOP
+        a, b, c = counts
+        if abs(a) > MAX_WORD or abs(b) > MAX_WORD or abs(c) > MAX_WORD:
+            self._saturated += 1
+            a, b, c = slow(counts, MAX_WORD)
+        x, y, z = to_nearest(a), to_nearest(b), to_nearest(c)
+        return frames.command(mode, x, y, z) if x or y or z else STOP
 
     def _read_all(self, found: list[Frame], now: float) -> list[Reading]:
         """What a read brings at once did not come at once: each frame has a time of its own."""

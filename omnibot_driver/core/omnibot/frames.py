@@ -106,6 +106,11 @@ STOP: Final = CommandFrame(WHEEL_MODE, (0, 0, 0))
 EMERGENCY_STOP: Final = CommandFrame(EMERGENCY_STOP_MODE, (0, 0, 0))
 
 
+def command(mode: int, a: int, b: int, c: int) -> bytes:
+    """The bytes of a CommandFrame whose values fit."""
+    return _COMMAND.pack(COMMAND_HEADER, mode, a, b, c)
+
+
 def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> bytes:
     """The bytes of one frame. Raises FrameError when a value does not fit its field."""
     try:
@@ -117,7 +122,7 @@ def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> b
             case PoseFrame(x, y, theta, seq):
                 return _POSE[pose_byte_order].pack(POSE_HEADER, x, y, theta, seq)
             case CommandFrame(mode, values):
-                return _COMMAND.pack(COMMAND_HEADER, mode, *values)
+                return command(mode, *values)
             case PausedFrame(count):
                 if not 0 <= count <= 255:
                     raise FrameError(f"{frame} does not fit the wire: the count is 0..255")
