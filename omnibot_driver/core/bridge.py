@@ -14,7 +14,7 @@ from omnibot_driver.core.se2 import Pose, unroll
 
 LONGEST_BRIDGE: Final = 50
 """Displacements that a bridge stands for at the most; a robot that is not heard is soon stopped."""
-AT_REST: Final = Pose()
+NO_WAY: Final = Pose()
 
 
 class Bridge:
@@ -35,7 +35,7 @@ class Bridge:
         """
         last, self.last = self.last, None
         if reading.duration_s is None:
-            return AT_REST, _tangent(reading, heading_rad)
+            return NO_WAY, _tangent(reading, heading_rad)
         half = min(reading.lost, LONGEST_BRIDGE) / 2
         if half and heading_rad is not None:
             last_turn_rad = last[0].yaw_rad if last else reading.dyaw_rad
@@ -43,7 +43,7 @@ class Bridge:
         tangent = _tangent(reading, heading_rad)
         self.last = tangent, reading.duration_s
         if not half:
-            return AT_REST, tangent
+            return NO_WAY, tangent
         before = last[0] if last else tangent
         return (before + tangent).times(half, half, half), tangent
 

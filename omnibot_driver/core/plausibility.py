@@ -136,8 +136,9 @@ class Plausibility:
             return []
         was_flip = leaps = False
         if reading.duration_s is not None:
-            turn = self.limits.fastest_radps2 * reading.duration_s**2
-            way = self.limits.fastest_mps2 * reading.duration_s**2
+            square_s2 = reading.duration_s * reading.duration_s
+            turn = self.limits.fastest_radps2 * square_s2
+            way = self.limits.fastest_mps2 * square_s2
             values = (reading.dx_m / way, reading.dy_m / way, reading.dyaw_rad / turn)
             periods = reading.lost + self._lost + 1
             was_flip, leaps = self._motion_leaps.judge(values, periods)

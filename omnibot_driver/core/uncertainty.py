@@ -170,20 +170,12 @@ class Uncertainty:
         """Of a pose that is known to be off by ``open_error`` and otherwise at its best."""
         noise, (a, b, c) = self.noise, self._levers
         scale = noise.wheel_scale * noise.wheel_scale
+        slip = noise.wheel_slip * noise.wheel_slip
+        alike = a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]
+        wrong = open_error.x_m, open_error.y_m, open_error.yaw_rad
         known = self._walk if self.gap is NOTHING else self._walk + self.gap
         return known.with_errors(
-            (
-                (scale, *a),
-                (scale, *b),
-                (scale, *c),
-                (
-                    noise.wheel_slip * noise.wheel_slip,
-                    a[0] + b[0] + c[0],
-                    a[1] + b[1] + c[1],
-                    a[2] + b[2] + c[2],
-                ),
-                (1.0, open_error.x_m, open_error.y_m, open_error.yaw_rad),
-            )
+            ((scale, *a), (scale, *b), (scale, *c), (slip, *alike), (1.0, *wrong))
         )
 
 

@@ -8,13 +8,12 @@ other frame. This module knows what the wire says in each setting; not how anybo
 
 import math
 import struct
-from dataclasses import replace
 from typing import Final, Literal
 
-from omnibot_driver.core.backlog import advanced
+from omnibot_driver.core.backlog import chord
 from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.omnibot.frames import ByteOrder, PoseFrame
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.se2 import Pose, roll
 
 SURE: Final = 10
 """So many poses that speak against a setting, and none for it: two seconds."""
@@ -66,10 +65,8 @@ class Suspicion:
         if before is None or not moved:
             return
         frame = moved[0].frame
-        said, other = (
-            _distance(before, [replace(reading, frame=meant) for reading in moved], told)
-            for meant in (frame, _OTHER_FRAME[frame])
-        )
+        said = _distance(before, moved, frame, told)
+        other = _distance(before, moved, _OTHER_FRAME[frame], told)
         if said > max(CLEARLY_M, TIMES * other):
             self._against_frame += 1
         elif other > max(CLEARLY_M, TIMES * said):
@@ -89,7 +86,8 @@ def _swapped(values: tuple[float, ...]) -> tuple[float, ...]:
     return struct.unpack("<3f", struct.pack(">3f", *values))
 
 
-def _distance(start: Pose, moved: list[DisplacementReading], told: Pose) -> float:
+def _distance(start: Pose, moved: list[DisplacementReading], frame: str, told: Pose) -> float:
     for reading in moved:
-        start = advanced(start, reading)
+        way = chord(reading)
+        start = start + way if frame == "earth" else start.moved(roll(way))
     return math.hypot(told.x_m - start.x_m, told.y_m - start.y_m)
