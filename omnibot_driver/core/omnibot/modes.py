@@ -69,6 +69,8 @@ class ModeTracker:
             self.hear_imus(1)
         elif isinstance(frame, PausedFrame):
             self.apply(Happening.HEARD_PAUSED)
+        elif self.mode is _N:
+            self.imus_to_come = IMU_FRAMES_ALONE
         else:
             self.apply(Happening.HEARD_MOTION)
 
