@@ -71,13 +71,13 @@ class OmniBotDriver(Node):
         self._publishing.publish_state()
         self._link.start()
 
-    def create_publisher(self, *args: Any, **options: Any) -> Publisher:
+    def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
         """Without events: the executor looks at each of them before it takes a command.
 
         Whoever subscribes with another quality of service is told so on their own side.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
-        return super().create_publisher(*args, **{"event_callbacks": quiet, **options})
+        return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)
 
     def _make_link(self, port: str) -> Link | Replay:
         if is_recording(port):
