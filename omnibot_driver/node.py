@@ -16,7 +16,9 @@ import rclpy
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from std_msgs.msg import Bool, Float32MultiArray
 
 from omnibot_driver import cdr, declaration, messages, parameters, selfcheck
@@ -68,6 +70,14 @@ class OmniBotDriver(Node):
             self.get_logger().warning(advice)
         self._publishing.publish_state()
         self._link.start()
+
+    def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
+        """Without events: the executor looks at each of them before it takes a command.
+
+        Whoever subscribes with another quality of service is told so on their own side.
+        """
+        quiet = PublisherEventCallbacks(use_default_callbacks=False)
+        return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)
 
     def _make_link(self, port: str) -> Link | Replay:
         if is_recording(port):

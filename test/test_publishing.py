@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The stamps of what is published, by a real node's clock."""
+"""Publishers of a real node, and the stamps of what is published by its clock."""
 
 import time
 from collections.abc import Iterator
@@ -17,6 +17,7 @@ from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.omnibot import OmniBot
 from omnibot_driver.core.session import Session
 from omnibot_driver.messages import MessageSettings
+from omnibot_driver.node import OmniBotDriver
 from omnibot_driver.publishing import Publishing
 
 
@@ -28,6 +29,20 @@ def node() -> Iterator[Node]:
     yield node
     node.destroy_node()
     rclpy.try_shutdown(context=context)
+
+
+def test_a_command_waits_for_no_events_of_publishers() -> None:
+    """The executor looks at each thing that it waits for, rclpy's own publisher's included."""
+    rclpy.init(args=["--ros-args", "-p", "port:=sim://"])
+    driver = OmniBotDriver()
+    try:
+        publishers = list(driver.publishers)
+        assert len(publishers) >= 6
+        assert not any(publisher.event_handlers for publisher in publishers)
+    finally:
+        driver.close()
+        driver.destroy_node()
+        rclpy.try_shutdown()
 
 
 def test_stamps_follow_simulated_time_while_there_is_any(
