@@ -2,10 +2,8 @@
 
 """What stands around a link in place of a node."""
 
-import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 
 from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.events import Event
@@ -75,21 +73,6 @@ def link_to(
         failed=listener.failed,
         **taps,
     )
-
-
-def driver_threads() -> list[str]:
-    """Those of links, recordings and simulated boards; a test runner has threads of its own."""
-    names = (thread.name for thread in threading.enumerate())
-    return sorted(name for name in names if name.startswith(("omnibot-", "simulated board")))
-
-
-@contextmanager
-def nothing_left_behind() -> Iterator[None]:
-    """As many descriptors afterwards as before, and the same threads."""
-    threads, descriptors = driver_threads(), os.listdir("/proc/self/fd")
-    yield
-    assert driver_threads() == threads
-    assert len(os.listdir("/proc/self/fd")) == len(descriptors)
 
 
 def wait_for_the_end_of(*names: str) -> None:

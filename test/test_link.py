@@ -9,15 +9,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from listener import (
-    EMERGENCY_STOP,
-    PATIENCE_S,
-    STOP,
-    Listener,
-    link_to,
-    nothing_left_behind,
-    session,
-)
+from listener import EMERGENCY_STOP, PATIENCE_S, STOP, Listener, link_to, session
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Event, Notice
@@ -25,18 +17,13 @@ from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.session import Session
 from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
 
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
+
 
 @pytest.fixture
 def board() -> Iterator[PtyBoard]:
     with PtyBoard(SimulatedBoard(BoardSettings(running=True))) as board:
         yield board
-
-
-@pytest.fixture(autouse=True)
-def _nothing_is_left_behind() -> Iterator[None]:
-    """Every link and port that a test opens gives its threads and descriptors back."""
-    with nothing_left_behind():
-        yield
 
 
 def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> None:

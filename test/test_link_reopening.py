@@ -5,29 +5,15 @@
 import itertools
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from listener import (
-    PATIENCE_S,
-    STOP,
-    Listener,
-    link_to,
-    nothing_left_behind,
-    session,
-    wait_for_the_end_of,
-)
+from listener import PATIENCE_S, STOP, Listener, link_to, session, wait_for_the_end_of
 
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
 
-
-@pytest.fixture(autouse=True)
-def _nothing_is_left_behind() -> Iterator[None]:
-    """Every link and port that a test opens gives its threads and descriptors back."""
-    with nothing_left_behind():
-        yield
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:

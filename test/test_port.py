@@ -6,28 +6,15 @@ import fcntl
 import os
 import termios
 import threading
-from collections.abc import Iterator
 
 import pytest
-from listener import PATIENCE_S, STOP, nothing_left_behind
+from listener import PATIENCE_S, STOP
 from terminal import Terminal
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.port import Port
 
-
-@pytest.fixture
-def terminal() -> Iterator[Terminal]:
-    terminal = Terminal()
-    yield terminal
-    terminal.close()
-
-
-@pytest.fixture(autouse=True)
-def _nothing_is_left_behind() -> Iterator[None]:
-    """Every link and port that a test opens gives its threads and descriptors back."""
-    with nothing_left_behind():
-        yield
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 @pytest.mark.parametrize(

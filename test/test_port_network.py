@@ -8,23 +8,18 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing
 
 import pytest
 import serial
 import serial.rfc2217
-from listener import PATIENCE_S, STOP, nothing_left_behind
+from listener import PATIENCE_S, STOP
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.port import PEER_OPTIONS, Port
 
-
-@pytest.fixture(autouse=True)
-def _nothing_is_left_behind() -> Iterator[None]:
-    """Every link and port that a test opens gives its threads and descriptors back."""
-    with nothing_left_behind():
-        yield
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def connected(server: socket.socket) -> tuple[Port, socket.socket]:
