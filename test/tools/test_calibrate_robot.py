@@ -5,12 +5,12 @@
 import os
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calibrate_rig import BUSY_S, Rig, rig
+from calibrate_rig import BUSY_S, Rig
 from driver_process import PATIENCE_S
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
@@ -19,30 +19,15 @@ from std_msgs.msg import Bool, Float32MultiArray
 from omnibot_driver.simulator import SimulatedBoard
 from omnibot_driver.tools.calibrate import listener
 from omnibot_driver.tools.calibrate import robot as robot_module
-from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
+from omnibot_driver.tools.calibrate.interruption import Interrupted
 from omnibot_driver.tools.calibrate.motion import Bounds, steady
-from omnibot_driver.tools.calibrate.robot import Robot, connect
+from omnibot_driver.tools.calibrate.robot import Robot
 from omnibot_driver.tools.needs import ToolError
 
 SLOWLY = (0.15, 0.0, 0.0)
 BOUNDS = Bounds(speed=0.2, turning=0.5, way=0.8, turn=1.0, seconds=20.0, acceleration=1.0)
 AFTER_S = 0.4
 LOST_S = listener.LOST_S
-
-
-@pytest.fixture(scope="module")
-def rigged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    with rig(tmp_path_factory.mktemp("robot")) as robot:
-        yield robot
-
-
-@pytest.fixture
-def robot(rigged: Rig) -> Iterator[Robot]:
-    with (
-        Interruption() as interruption,
-        connect(rigged.driver.namespace, [], interruption) as robot,
-    ):
-        yield robot
 
 
 def stands(board: SimulatedBoard) -> bool:
