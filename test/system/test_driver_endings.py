@@ -84,7 +84,7 @@ def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
     probe.wait_for_state("nominal")
     driving(probe, board)
     probe.publisher(Bool, "estop").publish(Bool(data=True))
-    assert driver.process.wait(20.0) == exit_code, driver.output
+    assert driver.end() == exit_code, driver.output
     assert ("a defect in a callback" in driver.output) == bool(exit_code)
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), 20.0)
 
