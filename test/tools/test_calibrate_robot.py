@@ -51,7 +51,9 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
     log = robot.drive(steady((0.0, 0.15, 0.3), 1.0), BOUNDS)
     after = rigged.port.board.truth
     assert rigged.port.wait_for(stands, PATIENCE_S)
-    assert after.yaw_rad - before.yaw_rad == pytest.approx(0.35, abs=0.1)
+    told = np.diff(log.commands.stamp_s) @ log.commands.values[:-1, 2]  # each until the next
+    assert told > 0.3
+    assert after.yaw_rad - before.yaw_rad == pytest.approx(told, abs=0.03)
     assert log.odometry.pose[-1, 2] - log.odometry.pose[0, 2] == pytest.approx(
         after.yaw_rad - before.yaw_rad, abs=0.005
     )
@@ -128,7 +130,7 @@ def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(robot_module, "time", clock)
-        with pytest.raises(ToolError, match=r"this program was held up for 3\.\d s"):
+        with pytest.raises(ToolError, match=r"this program was held up for \d\.\d s"):
             robot.drive(steady(SLOWLY, 10.0), BOUNDS, show=once(suspend))
     values = robot.log.commands.values
     halted = int(np.flatnonzero(values[:, 0])[-1]) + 1
