@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import Driver
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
@@ -153,8 +154,12 @@ def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is
 
 def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver) -> None:
     """The middleware would leave them unheard in silence."""
+    reports = probe.listen(DiagnosticArray, "/diagnostics")
     probe.node.create_publisher(TwistStamped, "cmd_vel", 1)
     driver.wait_for_line("probe publishes something else.*enable_stamped_cmd_vel:=true")
+    until = len(reports) + 4  # one a second; it looks every two
+    probe.wait_for(lambda: len(reports) >= until)
+    assert driver.output.count("publishes something else") == 1
 
 
 def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
