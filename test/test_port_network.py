@@ -4,6 +4,7 @@
 
 import contextlib
 import ctypes
+import os
 import socket
 import struct
 import threading
@@ -84,6 +85,19 @@ def test_a_board_behind_a_socket_is_served_as_well() -> None:
         port.read()
     port.close()
     server.close()
+
+
+def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
+    """pyserial closes only one that it can still shut down."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        descriptors = len(os.listdir("/proc/self/fd"))
+        port, far = connected(server)
+        far.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        far.close()
+        with pytest.raises(LinkError, match="lost"):
+            go_on(port.read)
+        port.close()
+        assert len(os.listdir("/proc/self/fd")) == descriptors
 
 
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name)")  # pyserial 3.5
