@@ -146,8 +146,12 @@ def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
 def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
     """It leaves, and so does the driver."""
     keeper = Keeper(line.near, LAST_WORDS)
+    process = keeper._process
+    assert process is not None
+    started(process.pid)
     line.hang_up()
     keeper.end(stopped=False)
+    assert process.returncode == 0  # nobody had to kill it
 
 
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:

@@ -74,7 +74,7 @@ def test_what_cannot_be_done_is_said_before_anything_moves(
         still("y", *words)
 
 
-def test_no_is_no() -> None:
-    """Nothing moves."""
+def test_a_no_moves_nothing() -> None:
+    """It is an error, told as one."""
     with pytest.raises(ToolError, match="you said no"):
         still("n")
