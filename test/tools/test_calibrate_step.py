@@ -32,7 +32,7 @@ def test_a_planted_motor_is_found(
         ("B: gain", 1.0, 0.05),
         ("B: PWM per count", 35.0, 1.75),
         ("B: motor time constant", 0.1, 0.005),
-        ("B: overshoot", 0.25, 0.05),  # as the loop is calculated with these constants
+        ("B: overshoot", 0.25, 0.08),  # as the loop is calculated with them and the delay below
     ):
         found, sigma = row(table, name)
         assert found == pytest.approx(planted, abs=tolerance), name
