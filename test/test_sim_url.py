@@ -27,13 +27,16 @@ def test_a_robot_drives_without_a_port_and_without_another_process() -> None:
     link = link_to("sim://", listener, ours)
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
-    link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
-    listener.wait_for(
-        lambda: any(
+
+    def drives() -> bool:
+        """Commanded again and again: a machine that hangs stops the robot."""
+        link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
+        return any(
             isinstance(event, OdometryEstimate) and event.twist and event.twist.vx_mps > 0.1
             for event in listener.events
         )
-    )
+
+    listener.wait_for(drives)
     link.close("stop")
     assert listener.reports == [None]
 
