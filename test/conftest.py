@@ -1,14 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Keeps the tests' ROS traffic to this machine and to this run of them.
+"""Keeps the tests' ROS traffic to this machine and to this run of them; what many tests ask for.
 
 Hypothesis tries the same examples in every run, so what turns red was changed;
 ``pytest --hypothesis-profile exploring`` looks for others. None is timed.
 """
 
 import os
+import threading
+from collections.abc import Iterator
 
+import pytest
 from hypothesis import HealthCheck, settings
+from terminal import Terminal
 
 # Domains 0 to 101 are safe on every platform; 0 is everybody's default.
 os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
@@ -17,3 +21,26 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 settings.register_profile("exploring", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("same", settings.get_profile("exploring"), derandomize=True)
 settings.load_profile("same")
+
+
+@pytest.fixture
+def nothing_left_behind() -> Iterator[None]:
+    """Every link, port and board that a test opens gives its threads and descriptors back."""
+    threads, descriptors = driver_threads(), os.listdir("/proc/self/fd")
+    yield
+    assert driver_threads() == threads
+    assert len(os.listdir("/proc/self/fd")) == len(descriptors)
+
+
+def driver_threads() -> list[str]:
+    """Those of links, recordings and simulated boards; a test runner has threads of its own."""
+    names = (thread.name for thread in threading.enumerate())
+    return sorted(name for name in names if name.startswith(("omnibot-", "simulated board")))
+
+
+@pytest.fixture
+def terminal() -> Iterator[Terminal]:
+    """Closed before it is looked what was left behind."""
+    terminal = Terminal()
+    yield terminal
+    terminal.close()

@@ -2,10 +2,8 @@
 
 """What stands around a link in place of a node."""
 
-import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 
 from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.events import Event
@@ -15,6 +13,7 @@ from omnibot_driver.core.odometry import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link
+from omnibot_driver.simulator import SimulatedBoard
 
 PATIENCE_S = 20.0
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
@@ -77,19 +76,9 @@ def link_to(
     )
 
 
-def driver_threads() -> list[str]:
-    """Those of links, recordings and simulated boards; a test runner has threads of its own."""
-    names = (thread.name for thread in threading.enumerate())
-    return sorted(name for name in names if name.startswith(("omnibot-", "simulated board")))
-
-
-@contextmanager
-def nothing_left_behind() -> Iterator[None]:
-    """As many descriptors afterwards as before, and the same threads."""
-    threads, descriptors = driver_threads(), os.listdir("/proc/self/fd")
-    yield
-    assert driver_threads() == threads
-    assert len(os.listdir("/proc/self/fd")) == len(descriptors)
+def kinds(board: SimulatedBoard) -> list[str]:
+    """Of the commands that it obeyed."""
+    return [command.kind for command in board.commands]
 
 
 def wait_for_the_end_of(*names: str) -> None:

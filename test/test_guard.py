@@ -94,12 +94,15 @@ def status_of(pid: int, field: str) -> str:
     return text.partition(f"{field}:")[2].split()[0]
 
 
-def alive(keeper: Keeper, seconds: float) -> None:
-    """Beat as the driver does, whose pace is the thing itself."""
-    end = time.monotonic() + seconds
-    while (now := time.monotonic()) < end:
+def alive(keeper: Keeper, seconds: float) -> float:
+    """Beat as the driver does, whose pace is the thing itself; the longest pause in between."""
+    begun_s = beaten_s = time.monotonic()
+    longest_s = 0.0
+    while (now := time.monotonic()) < begun_s + seconds:
         keeper.beat(now)
         time.sleep(0.05)
+        longest_s, beaten_s = max(longest_s, time.monotonic() - beaten_s), now
+    return longest_s
 
 
 def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
@@ -122,9 +125,10 @@ def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None
 def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line: Line) -> None:
     """And it goes on guarding: the next time as well."""
     keeper = Keeper(line.near, LAST_WORDS)
-    alive(keeper, 2 * guard.LIMIT_S)
-    assert line.heard == b""
-    line.hear(2 * LAST_WORDS)
+    longest_s = alive(keeper, 2 * guard.LIMIT_S)
+    os.write(line.near, b"so far: ")
+    assert line.hear(b"so far: ") == b"so far: " or longest_s > 0.9 * guard.LIMIT_S
+    line.hear(b"so far: " + 2 * LAST_WORDS)
     alive(keeper, 2 * guard.LIMIT_S)
     os.write(line.near, b"and again: ")
     heard = line.hear(b"and again: " + LAST_WORDS)
@@ -143,8 +147,12 @@ def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
 def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
     """It leaves, and so does the driver."""
     keeper = Keeper(line.near, LAST_WORDS)
+    process = keeper._process
+    assert process is not None
+    started(process.pid)
     line.hang_up()
     keeper.end(stopped=False)
+    assert process.returncode == 0  # nobody had to kill it
 
 
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
@@ -191,6 +199,7 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
     (first,) = line.children()
     started(first)
     os.kill(first, signal.SIGSTOP)
+    os.waitid(os.P_PID, first, os.WSTOPPED)
     for _ in range(HANGS_AFTER):
         keeper.beat(1000.0)
     assert keeper.trouble == ""

@@ -4,7 +4,6 @@
 
 import os
 import threading
-from collections.abc import Iterator
 
 import pytest
 from listener import (
@@ -14,27 +13,16 @@ from listener import (
     STOP,
     Listener,
     link_to,
-    nothing_left_behind,
     session,
     wait_for_the_end_of,
 )
 from terminal import Terminal
 
 from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.session import Session
+from omnibot_driver.link import Link
 
-
-@pytest.fixture
-def terminal() -> Iterator[Terminal]:
-    terminal = Terminal()
-    yield terminal
-    terminal.close()
-
-
-@pytest.fixture(autouse=True)
-def _nothing_is_left_behind() -> Iterator[None]:
-    """Every link and port that a test opens gives its threads and descriptors back."""
-    with nothing_left_behind():
-        yield
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
@@ -55,12 +43,18 @@ def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     link.close("stop")
 
 
-def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) -> None:
-    """Closing does not hang; the robot is stopped as soon as the board listens again."""
-    listener, ours = Listener(), session(run=False)
-    link = link_to(terminal.path, listener, ours)
+def at_rest(terminal: Terminal) -> tuple[Link, Session]:
+    """A link that has opened this port and wants nothing more of the board."""
+    ours = session(run=False)
+    link = link_to(terminal.path, Listener(), ours)
     link.start()
     terminal.read_until(STOP)
+    return link, ours
+
+
+def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) -> None:
+    """Closing does not hang; the robot is stopped as soon as the board listens again."""
+    link, _ours = at_rest(terminal)
     terminal.fill()
     link.close("stop")
     terminal.read_until(LAST_WORDS)
@@ -69,10 +63,7 @@ def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) 
 
 def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
     """Whoever pressed it is told; it is the first to be written once there is room."""
-    listener, ours = Listener(), session(run=False)
-    link = link_to(terminal.path, listener, ours)
-    link.start()
-    terminal.read_until(STOP)
+    link, _ours = at_rest(terminal)
     assert not link.blocked
     terminal.fill()
     link.call(lambda session, now: session.estop(True, now))
@@ -83,12 +74,8 @@ def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: T
 
 def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: Terminal) -> None:
     """The driver's own farewell finds no room; somebody has to say it."""
-    listener, ours = Listener(), session(run=False)
-    link = link_to(terminal.path, listener, ours)
-    link.start()
-    terminal.read_until(STOP)
+    link, ours = at_rest(terminal)
     terminal.fill()
-
     closed, farewell_over = ours.closed, threading.Event()
 
     def defective(data: bytes, now: float) -> list[ImuEstimate]:

@@ -44,6 +44,25 @@ def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
         os.close(descriptor)
 
 
+def test_who_prints_more_than_nobody_reads_is_not_held_up() -> None:
+    """More than all buffers on the way hold together."""
+    program = """
+import contextlib, os
+from omnibot_driver.output import UnblockedOutput
+with UnblockedOutput():
+    for _ in range(100):
+        with contextlib.suppress(BlockingIOError):
+            os.write(2, bytes(4096))
+"""
+    unread, pipe = os.pipe()
+    done = subprocess.run(
+        [sys.executable, "-c", program], stderr=pipe, timeout=PATIENCE_S, check=False
+    )
+    assert done.returncode == 0
+    os.close(unread)
+    os.close(pipe)
+
+
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
     """What is printed would go to the board."""

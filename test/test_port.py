@@ -6,28 +6,15 @@ import fcntl
 import os
 import termios
 import threading
-from collections.abc import Iterator
 
 import pytest
-from listener import PATIENCE_S, STOP, nothing_left_behind
+from listener import PATIENCE_S, STOP
 from terminal import Terminal
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.port import Port
 
-
-@pytest.fixture
-def terminal() -> Iterator[Terminal]:
-    terminal = Terminal()
-    yield terminal
-    terminal.close()
-
-
-@pytest.fixture(autouse=True)
-def _nothing_is_left_behind() -> Iterator[None]:
-    """Every link and port that a test opens gives its threads and descriptors back."""
-    with nothing_left_behind():
-        yield
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 @pytest.mark.parametrize(
@@ -64,9 +51,12 @@ def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
 
 
 def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
-    """DTR falling would restart a board that is wired to it."""
-    Port(terminal.path, 115200).close()
+    """DTR falling would restart a board that is wired to it; here it was set to."""
     near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)
+    attributes = termios.tcgetattr(near)
+    attributes[2] |= termios.HUPCL
+    termios.tcsetattr(near, termios.TCSANOW, attributes)
+    Port(terminal.path, 115200).close()
     assert not termios.tcgetattr(near)[2] & termios.HUPCL
     os.close(near)
 

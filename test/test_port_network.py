@@ -4,27 +4,23 @@
 
 import contextlib
 import ctypes
+import os
 import socket
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing
 
 import pytest
 import serial
 import serial.rfc2217
-from listener import PATIENCE_S, STOP, nothing_left_behind
+from listener import PATIENCE_S, STOP
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.port import PEER_OPTIONS, Port
 
-
-@pytest.fixture(autouse=True)
-def _nothing_is_left_behind() -> Iterator[None]:
-    """Every link and port that a test opens gives its threads and descriptors back."""
-    with nothing_left_behind():
-        yield
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def connected(server: socket.socket) -> tuple[Port, socket.socket]:
@@ -89,6 +85,19 @@ def test_a_board_behind_a_socket_is_served_as_well() -> None:
         port.read()
     port.close()
     server.close()
+
+
+def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
+    """pyserial closes only one that it can still shut down."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        descriptors = len(os.listdir("/proc/self/fd"))
+        port, far = connected(server)
+        far.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        far.close()
+        with pytest.raises(LinkError, match="lost"):
+            go_on(port.read)
+        port.close()
+        assert len(os.listdir("/proc/self/fd")) == descriptors
 
 
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name)")  # pyserial 3.5

@@ -63,8 +63,8 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
     assert list(recording.chunks()) == CHUNKS
 
 
-def test_what_is_said_without_options(tmp_path: Path) -> None:
-    """As fast as it was, once others had time to find the driver."""
+def test_without_options_it_is_played_at_its_own_speed_after_five_seconds(tmp_path: Path) -> None:
+    """Others have time to find the driver; the topic is the one there is."""
     recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
     assert (recording.speed, recording.delay_s, recording.topic) == (1.0, 5.0, RX)
 

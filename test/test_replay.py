@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import pytest
-from listener import Listener, driver_threads, link_to, session
+from listener import Listener, link_to, session
 
 from omnibot_driver.core.errors import LinkError, RequestRefused
 from omnibot_driver.core.events import Event, Notice, StateChanged
@@ -21,6 +21,8 @@ from omnibot_driver.core.session import Session
 from omnibot_driver.core.supervisor import Request
 from omnibot_driver.replay import Replay
 from omnibot_driver.simulator import BoardSettings, FaultyLine, LineFaults, SimulatedBoard
+
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 EPOCH_NS = 1_790_000_000_123_456_789
 TICK_NS = 10_000_000
@@ -76,13 +78,6 @@ def play(tape: Tape) -> Heard:
     replay.close("stop")
     assert not heard.failures
     return heard
-
-
-@pytest.fixture(autouse=True)
-def _nothing_is_left_behind() -> Iterator[None]:
-    threads = driver_threads()
-    yield
-    assert driver_threads() == threads
 
 
 def simulated(ticks: int, *, silent: range = range(0), line: FaultyLine | None = None) -> Chunks:

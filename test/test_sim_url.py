@@ -3,11 +3,10 @@
 """``sim://``: a simulated board in the driver's own process, without ROS."""
 
 import threading
-from collections.abc import Iterator
 
 import pytest
 import serial
-from listener import PATIENCE_S, Listener, driver_threads, link_to, session
+from listener import PATIENCE_S, Listener, link_to, session
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.events import Notice
@@ -19,13 +18,7 @@ from omnibot_driver.simulator.motors import TICK_S
 from omnibot_driver.simulator.running import UNREAD_LIMIT
 from omnibot_driver.urls.protocol_sim import InProcessBoard
 
-
-@pytest.fixture(autouse=True)
-def _nothing_is_left_behind() -> Iterator[None]:
-    """The board ends with its port."""
-    threads = driver_threads()
-    yield
-    assert driver_threads() == threads
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_a_robot_drives_without_a_port_and_without_another_process() -> None:
@@ -34,13 +27,16 @@ def test_a_robot_drives_without_a_port_and_without_another_process() -> None:
     link = link_to("sim://", listener, ours)
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
-    link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
-    listener.wait_for(
-        lambda: any(
+
+    def drives() -> bool:
+        """Commanded again and again: a machine that hangs stops the robot."""
+        link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
+        return any(
             isinstance(event, OdometryEstimate) and event.twist and event.twist.vx_mps > 0.1
             for event in listener.events
         )
-    )
+
+    listener.wait_for(drives)
     link.close("stop")
     assert listener.reports == [None]
 

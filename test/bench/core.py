@@ -12,8 +12,9 @@ from pathlib import Path
 from random import Random
 from statistics import median
 
+from carriage import FAULTS, receive
 from ratios import Figure, alternate, short
-from truth import FAULTS, SCENARIOS, generate, receive
+from truth import SCENARIOS, generate
 
 from omnibot_driver import parameters
 from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, OmniBot, PoseFrame

@@ -16,6 +16,14 @@ def standing() -> Bench:
     return bench
 
 
+def paused() -> Bench:
+    """A board that is not to run and says that it does not."""
+    bench = Bench(run=False)
+    bench.open()
+    bench.run_until_state("paused")
+    return bench
+
+
 def driving(**settings: object) -> Bench:
     """A board that carries out 0.4 m/s, commanded just now."""
     bench = Bench(BoardSettings(running=True, **settings))  # type: ignore[arg-type]

@@ -4,7 +4,7 @@
 
 import pytest
 from bench import EMERGENCY_STOP, STOP, Bench
-from robots import standing
+from robots import paused, standing
 
 from omnibot_driver.core.supervisor import Request
 from omnibot_driver.simulator import BoardMode
@@ -27,9 +27,7 @@ def test_the_farewell_stops_the_robot_whatever_else_it_does(
 
 def test_a_farewell_to_a_paused_board_does_not_unpause_it() -> None:
     """P is a toggle."""
-    bench = Bench(run=False)
-    bench.open()
-    bench.run_until_state("paused")
+    bench = paused()
     assert bench.session.farewell("pause") == STOP
 
 
@@ -50,9 +48,7 @@ def test_a_farewell_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
 
 def test_a_farewell_while_a_start_is_in_flight_ends_paused() -> None:
     """The notice is still believed, but S is on its way."""
-    bench = Bench(run=False)
-    bench.open()
-    bench.run_until_state("paused")
+    bench = paused()
     bench.session.request(Request.START, object(), bench.now)
     bench.settle()
     bench.board.receive(bench.session.farewell("pause"))

@@ -148,6 +148,11 @@ def test_rounding_is_the_same_to_both_sides(counts: list[float]) -> None:
     assert mirrored == tuple(-word for word in words_of(counts))
 
 
+def test_halves_are_rounded_away_from_zero() -> None:
+    """The even ones, too: 0.15 m/s are 10.5 LSB, and 11 on the wire."""
+    assert words_of([0.5, -0.5, 10.5]) == (1, -1, 11)
+
+
 @given(st.lists(finite, min_size=3, max_size=3))
 @example([1e308, -1e308, 5e307])
 @example([32768.0, 100.0, 0.0])

@@ -4,7 +4,7 @@
 
 import pytest
 from bench import STOP, Bench
-from robots import drive_on, standing
+from robots import drive_on, paused, standing
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.supervisor import Request, RequestDone
@@ -87,9 +87,7 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 
 def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_paused() -> None:
     """S is in flight, and the notice was sent before it was obeyed."""
-    bench = Bench(run=False)
-    bench.open()
-    bench.run_until_state("paused")
+    bench = paused()
     notice = b""
     while not notice:
         notice = bench.board.step()

@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 from bench import OPENING, STOP, Bench
-from robots import drive_on, driving, standing
+from robots import drive_on, driving, paused, standing
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import StateChanged
@@ -119,12 +119,9 @@ def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Ben
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
     """Whether it was found so or asked to be; and the answer says so."""
-    bench = standing() if asked else Bench(run=False)
+    bench = standing() if asked else paused()
     if asked:
         assert bench.ask(Request.PAUSE, 5.0).success
-    else:
-        bench.open()
-        bench.run_until_state("paused")
     bench.run(0.5)
     answer = bench.ask(Request.RESET, 10.0)
     assert answer.success

@@ -37,12 +37,24 @@ def test_damaged_bytes_tell_how_many_imu_frames_they_were(
 
 
 def test_a_damaged_pose_is_no_imu_frame() -> None:
-    """Though it is as long as one; and an IMU frame before a pose is told with the next one."""
+    """Though it is as long as one."""
     rhythm = nominal(0)
     for _ in range(5):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
             rhythm.hear(kind, 0)
     assert rhythm.hear(ImuFrame, 14) == 0
+
+
+def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
+    """With the delta in between it is gone, whose SEQ counts what is before it."""
+    rhythm = nominal(0)
+    for _ in range(4):
+        for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
+            rhythm.hear(kind, 0)
+    for _ in range(3):
+        rhythm.hear(ImuFrame, 0)
+    assert rhythm.hear(PoseFrame, 14 + 9) == 0
+    assert rhythm.hear(ImuFrame, 0) == 1
 
 
 def test_imu_frames_alone_are_all_that_was_lost() -> None:

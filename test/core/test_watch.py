@@ -4,7 +4,7 @@
 
 import pytest
 from bench import STOP, Bench
-from robots import drive_on, driving, push
+from robots import drive_on, driving, push, standing
 
 from omnibot_driver.simulator import BoardSettings
 
@@ -23,6 +23,20 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
         drive_on(bench)
     assert len(bench.notices) == 1
     assert "`control_method`" in bench.notices[0]
+
+
+def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
+    """The cable to it was cut twice."""
+    bench = standing()
+    for hears in (False, True, False):
+        bench.hears = hears
+        for _ in range(10):
+            drive_on(bench)
+        bench.drive()
+        bench.run(3.0)
+        bench.hears = True
+        bench.run(3.0)
+    assert len(bench.notices) == 2
 
 
 def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:

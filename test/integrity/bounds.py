@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from random import Random
 
 import parsers
+from carriage import CHUNKERS, FAULTS, GAPS_VISIBLE, receive
 from judge import Score, judge
-from truth import CHUNKERS, FAULTS, GAPS_VISIBLE, SCENARIOS, generate, receive
+from truth import SCENARIOS, generate
 
 
 @dataclass(frozen=True, slots=True)

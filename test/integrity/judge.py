@@ -5,7 +5,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from truth import Chunks, Key, Received
+from carriage import Chunks, Received
+from truth import Key
 
 Feed = Callable[[bytes, float], list[Key]]
 

@@ -14,8 +14,9 @@ from multiprocessing import Pool
 from pathlib import Path
 
 from bounds import BOUNDS, Scores, add, over_chunkers, over_scenarios, run
+from carriage import CHUNKERS, FAULTS
 from judge import Score
-from truth import CHUNKERS, FAULTS, SCENARIOS, WITH_TEXTS
+from truth import SCENARIOS, WITH_TEXTS
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "integrity.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"

@@ -9,10 +9,11 @@ from random import Random
 
 import pytest
 from bounds import BOUNDS, Scores, add, over_scenarios
+from carriage import CHUNKERS, FAULTS, receive
 from judge import judge
 from parsers import plain
 from report import one
-from truth import CHUNKERS, FAULTS, SCENARIOS, generate, receive
+from truth import SCENARIOS, generate
 
 SECONDS, SEEDS = 30.0, 2
 

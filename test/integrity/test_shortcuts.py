@@ -9,9 +9,10 @@ from math import inf
 from random import Random
 
 import pytest
+from carriage import CHUNKERS, FAULTS, receive
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from truth import CHUNKERS, FAULTS, SCENARIOS, generate, receive
+from truth import SCENARIOS, generate
 
 from omnibot_driver.core.omnibot import (
     FrameDecoder,

@@ -82,9 +82,10 @@ class Driver:
         return line
 
     def end(self, *signals: signal.Signals) -> int:
-        """Send the signals, one after the other, and return the exit code."""
+        """Send the signals, one after the other; the exit code, once ``lines`` has all it said."""
         for number in signals:
             self.process.send_signal(number)
+        self._listener.join(PATIENCE_S)
         return self.process.wait(PATIENCE_S)
 
     def guards(self) -> list[int]:

@@ -3,7 +3,6 @@
 """What a driver publishes fits into a bag and comes out of it; a recorded wire is heard again."""
 
 import signal
-from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,7 +38,7 @@ class Drive:
 
 
 @pytest.fixture(scope="module")
-def drive(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Drive]:
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Drive:
     with ExitStack() as stack:
         driver = stack.enter_context(Driver(port="sim://?seed=1", publish_raw="true"))
         probe = stack.enter_context(Probe(driver.namespace))
@@ -56,9 +55,9 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Drive]:
             probe.wait_for(lambda goal=goal: len(imu) >= goal)
         assert probe.call(SetBool, "pause", data=True).success
         assert driver.end(signal.SIGINT) == 0
-        bag = tmp_path_factory.mktemp("drive") / "bag"
-        recorder.write(bag, StoragePlugin.MCAP)
-        yield Drive(recorder, driver.namespace, bag)
+    bag = tmp_path_factory.mktemp("drive") / "bag"
+    recorder.write(bag, StoragePlugin.MCAP)
+    return Drive(recorder, driver.namespace, bag)
 
 
 @pytest.mark.parametrize("plugin", StoragePlugin)

@@ -104,7 +104,7 @@ def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
     path.write_text("gyro_bias: [1, 2")
     driver = start_driver("/dev/null", calibration_file=path)
     driver.wait_for_line("calibration_file.*mend it, or remove it")
-    assert driver.process.wait(20.0) == 2
+    assert driver.end() == 2
 
 
 def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
@@ -122,8 +122,12 @@ def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
     turned = [b - a for a, b in zip(joints[0].position, joints[-1].position, strict=True)]
     ratio = turned[1] / turned[0]
     assert ratio == pytest.approx(-0.5, abs=0.1)
+    on = robot.probe.node.create_timer(
+        0.05, lambda: commands.publish(Float32MultiArray(data=wanted))
+    )
     refused = robot.probe.call(Trigger, "calibrate_gyro")
     assert not refused.success
+    robot.probe.remove(on)
     robot.probe.call(SetBool, "estop", data=True)
     robot.probe.wait_for(lambda: robot.status("E-stop").level == b"\x01")
     assert "~/estop" in robot.status("E-stop").message
@@ -133,7 +137,16 @@ def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
 
 def test_diagnostics_come_with_figures(robot: Robot) -> None:
     """Seven of them; the rates are those of the manual, and nothing is lost."""
-    robot.probe.wait_for(lambda: robot.status("IMU") and "nan" not in str(robot.status("Stream")))
+
+    def keeps_pace() -> bool:
+        """A machine that hangs sees fewer for a while, and then more."""
+        if (status := robot.status("Stream")) is None:
+            return False
+        values = {value.key: value.value for value in status.values}
+        rate, _, wanted = values["IMU rate (Hz)"].partition(" of ")
+        return float(rate) == pytest.approx(float(wanted), rel=0.2)
+
+    robot.probe.wait_for(keeps_pace)
     names = [status.name for status in robot.reports[-1].status]
     assert len(names) == 7
     link = {value.key: value.value for value in robot.status("Link").values}
@@ -141,8 +154,6 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
     assert int(link["Bytes received"]) > 1000
     stream = {value.key: value.value for value in robot.status("Stream").values}
     assert stream["Framing faults"] == stream["Sequence gaps"] == "0"
-    rate, _, wanted = stream["IMU rate (Hz)"].partition(" of ")
-    assert float(rate) == pytest.approx(float(wanted), rel=0.2)
 
 
 def test_the_updater_publishes_where_it_is_installed(robot: Robot) -> None:

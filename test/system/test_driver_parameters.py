@@ -39,7 +39,7 @@ def test_wrong_parameters_end_the_start_with_a_sentence(
     """Exit code 2, no traceback."""
     driver: Driver = start_driver("/dev/null", **parameters)
     driver.wait_for_line(message)
-    assert driver.process.wait(20.0) == 2
+    assert driver.end() == 2
     assert "Traceback" not in driver.output
 
 

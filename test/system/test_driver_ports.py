@@ -52,6 +52,7 @@ def test_an_unplugged_board_is_found_again(
     probe.wait_for_state("nominal")
     descriptors.append(len(os.listdir(f"/proc/{driver.process.pid}/fd")))
     assert descriptors[0] == descriptors[1]
+    assert driver.end(signal.SIGINT) == 0
     assert driver.output.count("lost") == 2
 
 
@@ -93,9 +94,9 @@ def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
     """A wrong baud rate looks like this."""
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
+    imu = probe.listen(Imu, "imu/data_raw")
     probe.wait_for_state("connecting")
     driver.wait_for_line("nothing comes from the board.*power")
-    imu = probe.listen(Imu, "imu/data_raw")
     write_to_silent_port(bytes(range(256)) * 40)
     write_to_silent_port(bytes.fromhex("FF FA 00 00 00 00 40 00 00 01 00 02 00 03") * 3)
     probe.wait_for(lambda: len(imu) >= 2)

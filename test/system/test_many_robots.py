@@ -27,6 +27,10 @@ class Robot:
     odom: list[Any]
     estop_active: list[Any]
 
+    def heard(self) -> bool:
+        """Something on every topic."""
+        return bool(self.imu and self.odom and self.estop_active)
+
     @property
     def x_m(self) -> float:
         return float(self.odom[-1].pose.pose.position.x)
@@ -56,13 +60,13 @@ def fleet() -> Iterator[list[Robot]]:
             )
         for robot in robots:
             robot.probe.wait_for_state("nominal")
+            robot.probe.wait_for(robot.heard)
         yield robots
 
 
 def test_each_speaks_of_its_own_frames(fleet: list[Robot]) -> None:
     """No two robots share a frame, so one tree can hold them all."""
     for seed, robot in enumerate(fleet):
-        robot.probe.wait_for(lambda robot=robot: robot.imu and robot.odom)
         assert robot.imu[-1].header.frame_id == f"r{seed}/imu_frame"
         assert robot.odom[-1].header.frame_id == f"r{seed}/odom_frame"
         assert robot.odom[-1].child_frame_id == f"r{seed}/base_frame"

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import termios
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
 import pytest
@@ -36,11 +36,14 @@ def stands(board: SimulatedBoard) -> bool:
     return newest(board) == ("wheels", (0, 0, 0))
 
 
-def steer(terminal: PseudoTerminal, board: PtyBoard) -> None:
-    """Press a key until the robot drives: a machine that hangs takes one for a key that waited."""
+def steer(terminal: PseudoTerminal, board: PtyBoard, said: Sequence[object] = (True,)) -> None:
+    """Press a key until the robot drives: a machine that hangs takes one for a key that waited.
+
+    And until something has been ``said``: the monitor may find who listens later than the driver.
+    """
     for _ in range(20):
         terminal.type("w")
-        if board.wait_for(drives, 1.0):
+        if board.wait_for(lambda b: drives(b) and said, 1.0):
             return
     raise AssertionError("the robot does not drive")
 
@@ -88,7 +91,7 @@ def test_a_snapshot_in_a_pipe_tells_what_is_so(
     assert told["pose"]["y_m"] == pytest.approx(truth.y_m, abs=2e-3)
     assert told["pose"]["x_m"] == pytest.approx(truth.x_m, abs=2e-3)
     rates_hz = told["rates_hz"]
-    assert rates_hz["imu/data_raw"] / rates_hz["odom"] == pytest.approx(4.0, rel=0.15)
+    assert rates_hz["imu/data_raw"] / rates_hz["odom"] == pytest.approx(4.0, rel=0.3)
     assert abs(told["imu"]["linear_acceleration_mps2"][2]) == pytest.approx(9.8, abs=0.5)
     assert told["diagnostics"]["Link"]["values"]["Port"] == board.path
 
@@ -144,7 +147,7 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
     """Killed, or its window closed, in the middle of a motion; here with stamped commands."""
-    driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=5.0)
+    driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe_of(driver).wait_for_state("nominal")
 
     def kill(terminal: PseudoTerminal) -> None:
@@ -156,7 +159,7 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
         terminal.wait_for("0.15 m/s")
         steer(terminal, board)
         end(terminal)
-        assert board.wait_for(stands, 4.0)
+        assert board.wait_for(stands, 9.0)
 
 
 def test_keys_pressed_while_it_was_suspended_move_nothing(
@@ -166,7 +169,7 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
     terminal.wait_for("0.15 m/s")
-    steer(terminal, board)
+    steer(terminal, board, said)
     terminal.process.send_signal(signal.SIGTSTP)
     os.waitid(os.P_PID, terminal.process.pid, os.WSTOPPED)
     assert board.wait_for(stands, 20.0)

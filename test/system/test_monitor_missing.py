@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,24 +16,34 @@ import pytest
 from nav_msgs.msg import Odometry
 from probe import Probe
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, String
 
 from omnibot_driver.tools.monitor.__main__ import main
 from omnibot_driver.tools.monitor.feed import Feed
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-QUICKLY = ["--timeout", "1"]
+QUICKLY = ["--timeout", "4"]
+"""Where something is missing, which is awaited for so long."""
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
 def fake(stack: ExitStack) -> Probe:
-    """Says that it is a driver that runs, and nothing else."""
+    """Says that it is a driver that runs, again and again, and nothing else."""
     probe = stack.enter_context(Probe("fake"))
-    for kind, topic, value in ((String, "state", "nominal"), (Bool, "estop_active", False)):
-        publisher = probe.node.create_publisher(kind, f"omnibot_driver/{topic}", LATCHED)
-        publisher.publish(kind(data=value))
+    estop = probe.node.create_publisher(Bool, "omnibot_driver/estop_active", LATCHED)
+    estop.publish(Bool(data=False))
+    state = probe.node.create_publisher(String, "omnibot_driver/state", LATCHED)
+    probe.node.create_timer(0.5, partial(state.publish, String(data="nominal")))
     return probe
+
+
+def measure(fake: Probe, odometry: Odometry) -> None:
+    """As a driver does, this and an IMU's readings."""
+    for topic, message in (("odom", odometry), ("imu/data_raw", Imu())):
+        publisher = fake.node.create_publisher(type(message), topic, 10)
+        fake.node.create_timer(0.02, partial(publisher.publish, message))
 
 
 def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
@@ -65,7 +76,7 @@ def test_without_a_driver_one_sentence_says_how_to_start_one(
     """With the domain that was searched."""
     domain = str((int(os.environ["ROS_DOMAIN_ID"]) + 50) % 101 + 1)
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
-    said = sentence(capsys, "--once", *QUICKLY)
+    said = sentence(capsys, "--once", "--timeout", "1")
     assert f"no driver is running in ROS domain {domain}: start one" in said
 
 
@@ -89,7 +100,8 @@ def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFi
 def test_two_drivers_of_one_name_are_told(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
     """What is shown is of both, and both obey."""
     fake.node.create_publisher(String, "omnibot_driver/state", LATCHED)
-    assert main(["--once", "--namespace", "fake", *QUICKLY]) == 1
+    measure(fake, Odometry())
+    assert main(["--once", "--namespace", "fake"]) == 1
     assert "there are 2 drivers called /fake/omnibot_driver" in capsys.readouterr().err
 
 
@@ -97,9 +109,8 @@ def test_nan_is_named_and_shown(fake: Probe, capsys: pytest.CaptureFixture[str])
     """Where a number would be, and in one sentence."""
     bad = Odometry()
     bad.pose.pose.position.x = bad.twist.twist.linear.y = float("nan")
-    publisher = fake.node.create_publisher(Odometry, "odom", 10)
-    fake.node.create_timer(0.02, lambda: publisher.publish(bad))
-    assert main(["--once", "--namespace", "fake", *QUICKLY]) == 1
+    measure(fake, bad)
+    assert main(["--once", "--namespace", "fake"]) == 1
     output = capsys.readouterr()
     assert "nan" in output.out
     assert "not a finite number: pose x, measured y" in output.err
@@ -110,9 +121,8 @@ def test_a_heading_is_within_half_a_turn(fake: Probe, capsys: pytest.CaptureFixt
     odometry = Odometry()
     turn = odometry.pose.pose.orientation
     turn.z, turn.w = -math.sin(math.radians(72.5)), -math.cos(math.radians(72.5))
-    publisher = fake.node.create_publisher(Odometry, "odom", 10)
-    fake.node.create_timer(0.02, lambda: publisher.publish(odometry))
-    main(["--json", "--namespace", "fake", *QUICKLY])
+    measure(fake, odometry)
+    assert main(["--json", "--namespace", "fake"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["pose"]["yaw_rad"] == pytest.approx(math.radians(145.0))
 
@@ -124,7 +134,8 @@ def test_a_pipe_cannot_steer(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_pipe_gets_a_snapshot(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
     """As with --once, and one sentence says so."""
-    main(["--namespace", "fake", *QUICKLY])
+    measure(fake, Odometry())
+    assert main(["--namespace", "fake"]) == 0
     output = capsys.readouterr()
     assert output.out.startswith("/fake/omnibot_driver")
     assert "no terminal here, so this is a snapshot" in output.err

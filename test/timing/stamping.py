@@ -2,7 +2,7 @@
 
 """Stamps of a generated line against its true sampling times.
 
-The line is that of ``test/integrity/truth.py``, with a crystal that is off, through the driver's
+The line is that of ``test/integrity``, with a crystal that is off, through the driver's
 decoder and clock as a session uses them. What is true of every stamp is asserted on the way.
 """
 
@@ -17,7 +17,8 @@ from statistics import fmean
 
 sys.path.append(str(Path(__file__).parents[1] / "integrity"))
 
-from truth import CHUNKERS, SCENARIOS, TICK_S, Chunks, Received, Truth, generate, receive
+from carriage import CHUNKERS, Chunks, Received, receive
+from truth import SCENARIOS, TICK_S, Truth, generate
 
 from omnibot_driver.core.board import ImuReading, PausedReading
 from omnibot_driver.core.device_clock import DeviceClock

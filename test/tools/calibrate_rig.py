@@ -18,7 +18,7 @@ from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
 from omnibot_driver.tools.calibrate import listener
 from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.interruption import Interruption
-from omnibot_driver.tools.calibrate.robot import connect
+from omnibot_driver.tools.calibrate.robot import Robot, connect
 
 Answer = Callable[[str], str]
 
@@ -76,9 +76,16 @@ def rig(
         yield Rig(port, driver, folder)
 
 
+@contextmanager
+def robot_of(driver: Driver) -> Iterator[Robot]:
+    """As a calibration has it."""
+    with Interruption() as interruption, connect(driver.namespace, [], interruption) as robot:
+        yield robot
+
+
 def parameters_of(driver: Driver) -> dict[str, Any]:
     """What the driver says that its parameters are."""
-    with Interruption() as interruption, connect(driver.namespace, [], interruption) as robot:
+    with robot_of(driver) as robot:
         return dict(robot.parameters)
 
 

@@ -4,37 +4,20 @@
 
 import os
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from calibrate_rig import Rig, rig
+from calibrate_rig import Rig
 from driver_process import PATIENCE_S
 from std_msgs.msg import String
 
 from omnibot_driver.parameters import PARAMETERS
 from omnibot_driver.tools.calibrate import client, listener
 from omnibot_driver.tools.calibrate.__main__ import main
-from omnibot_driver.tools.calibrate.interruption import Interruption
 from omnibot_driver.tools.calibrate.motion import Bounds, steady
-from omnibot_driver.tools.calibrate.robot import Robot, connect
+from omnibot_driver.tools.calibrate.robot import Robot
 from omnibot_driver.tools.needs import ToolError
-
-
-@pytest.fixture(scope="module")
-def rigged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
-    with rig(tmp_path_factory.mktemp("robot")) as robot:
-        yield robot
-
-
-@pytest.fixture
-def robot(rigged: Rig) -> Iterator[Robot]:
-    with (
-        Interruption() as interruption,
-        connect(rigged.driver.namespace, [], interruption) as robot,
-    ):
-        yield robot
 
 
 def test_a_wrong_namespace_names_the_drivers_there_are(

@@ -72,7 +72,7 @@ def test_three_signs_are_understood(answer: str) -> None:
 
 
 @pytest.mark.parametrize("answer", ["", "+", "++", "+0-+", "abc", "1 0 -1", "yes"])
-def test_anything_else_is_not(answer: str) -> None:
+def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
     """And is asked again."""
     assert understand(answer) is None
 

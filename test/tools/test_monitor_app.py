@@ -118,8 +118,8 @@ def test_space_stops_even_while_a_question_stands() -> None:
 
 
 @pytest.mark.parametrize("keys", [["q"], ["ctrl+c"], ["ctrl+q"]])
-def test_it_can_be_left(keys: list[str]) -> None:
-    """With the key that the last line names, and those that people try."""
+def test_q_and_what_people_try_instead_leave_the_dashboard(keys: list[str]) -> None:
+    """The last line names the first of them."""
     robot = FakeRobot()
 
     async def steps(pilot: Pilot[Any], app: Monitor) -> None:
@@ -131,8 +131,8 @@ def test_it_can_be_left(keys: list[str]) -> None:
 
 
 @pytest.mark.parametrize("key", ["w", "up", "j"])
-def test_keys_steer(key: str) -> None:
-    """With --teleop only: without it nobody is asked for anything."""
+def test_keys_steer_with_teleop_alone(key: str) -> None:
+    """Without it nobody is asked for anything."""
     robot = press(key, teleop=True)
     assert robot.dead_man
     assert robot.dead_man.command(0.0) not in (None, HALT)

@@ -1,0 +1,22 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A robot for all tests of a module, and the tool's own view of it."""
+
+from collections.abc import Iterator
+
+import pytest
+from calibrate_rig import Rig, rig, robot_of
+
+from omnibot_driver.tools.calibrate.robot import Robot
+
+
+@pytest.fixture(scope="module")
+def rigged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
+    with rig(tmp_path_factory.mktemp("robot")) as robot:
+        yield robot
+
+
+@pytest.fixture
+def robot(rigged: Rig) -> Iterator[Robot]:
+    with robot_of(rigged.driver) as robot:
+        yield robot
