@@ -56,7 +56,7 @@ class Link:
         report: Callable[[str | None], None],
         failed: Callable[[BaseException], None],
         on_read: Callable[[bytes], None] | None = None,
-        on_write: Callable[[bytes], None] | None = None,
+        on_write: Callable[[bytes], None] = lambda _data: None,
     ) -> None:
         self._session = session
         self._url = url
@@ -274,11 +274,10 @@ class Link:
 
     def _heed_standstill(self, now: float) -> bool:
         """With the lock held: whether this process stood still, and the robot is to be stopped."""
-        length_s = self._standstill.begun(now)
-        if not length_s or self._closing.is_set():
-            return False
-        self._session.stood_still(length_s, now)
-        return True
+        length_s = 0.0 if self._closing.is_set() else self._standstill.begun(now)
+        if length_s:
+            self._session.stood_still(length_s, now)
+        return length_s > 0.0
 
     def _settle(self) -> Sequence[Event]:
         """With the lock held: write what is due, wake the pacer if it sleeps for too long."""
@@ -298,8 +297,7 @@ class Link:
             self._write_error = error
             self._interrupt()
         else:
-            if self._on_write is not None:
-                self._on_write(data)
+            self._on_write(data)
 
     def _interrupt(self) -> None:
         if self._port is not None:
