@@ -204,6 +204,7 @@ class Session:
         if after is before:
             return estimates
         self._events += estimates
+        self._tell_at = now
         self.heed(now)
         if after.running and not before.running:
             self._commands.halt(now)
@@ -213,7 +214,7 @@ class Session:
         """What comes of the bytes that were heard last. False: nothing to write or to tell."""
         last, self._last = self._last, None
         if last is None:
-            return bool(self._events)
+            return True
         if (
             now < self._tell_at
             and not self._measuring.undigested

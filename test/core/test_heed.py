@@ -1,0 +1,53 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is left of a read when its IMU readings are told: mostly nothing, and nothing is missed."""
+
+from contextlib import suppress
+
+import pytest
+
+from omnibot_driver import parameters
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.omnibot import OmniBot
+from omnibot_driver.core.session import Session
+from omnibot_driver.core.supervisor import Request
+from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+
+TICK_S = 0.01
+
+
+def opened() -> Session:
+    values = parameters.check_all({})
+    board, settings = parameters.board_settings(values), parameters.session_settings(values)
+    session = Session(OmniBot(board), settings, run=True)
+    session.opened(0.0)
+    return session
+
+
+@pytest.mark.parametrize("drives", [False, True])
+def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(drives: bool) -> None:
+    """While the board starts, runs, is paused and started again; commands are due at times of
+    their own."""
+    session, board = opened(), SimulatedBoard(BoardSettings(seed=2))
+    nothing_left, told = 0, 0
+    for tick in range(3000):
+        now = tick * TICK_S
+        data = board.step()
+        if tick in (1000, 1500):
+            session.request(Request.PAUSE if tick == 1000 else Request.START, "asked", now)
+        if drives and tick % 5 == 0:
+            with suppress(CommandRefused):
+                session.command_twist(BodyTwist(0.1, 0.0, 0.0), now)
+        board.receive(session.take_output(now))
+        told += len(session.take_events())
+        if data:
+            session.hear(data, now)
+            if not session.heed(now):
+                nothing_left += 1
+                assert session.take_output(now) == b""
+                assert session.take_events() == []
+        if session.wake_at <= now:
+            session.tick(now)
+    assert nothing_left > 1200
+    assert told > 500
