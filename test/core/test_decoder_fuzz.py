@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 from strategies import any_streams, believable_frames, calm_frames, chunkings, paused_frames
 
 from omnibot_driver.core.omnibot import FrameDecoder, ImuFrame, decoder, encode, lattice
-from omnibot_driver.core.omnibot.decoder import DOUBT_BYTES, LENT
-from omnibot_driver.core.omnibot.frames import Frame, decode_measured, measure
+from omnibot_driver.core.omnibot.decoder import DOUBT_BYTES
+from omnibot_driver.core.omnibot.frames import LENT, Frame, decode_measured, measure
 
 REST = encode(ImuFrame((120, -80, -16384), (1, 2, 3)))
 MOST_WORK = 250

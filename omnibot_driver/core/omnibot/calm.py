@@ -22,6 +22,7 @@ from omnibot_driver.core.omnibot.frames import (
     DELTA_LENGTH,
     IMU_HEADER,
     IMU_LENGTH,
+    LENT,
     NO_FRAME,
     POSE_HEADER,
     POSE_LENGTH,
@@ -32,9 +33,6 @@ from omnibot_driver.core.omnibot.frames import (
     PoseFrame,
     measure,
 )
-
-LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
-"""Last bytes of a frame that may be the first of a header, or its second."""
 
 _FIRST, _IMU_KIND = IMU_HEADER
 _DELTA_KIND, _POSE_KIND = DELTA_HEADER[1], POSE_HEADER[1]

@@ -22,21 +22,21 @@ from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.omnibot import evidence
-from omnibot_driver.core.omnibot.calm import LENT, Walk, goes_on, take_calm, take_lone
+from omnibot_driver.core.omnibot.calm import Walk, goes_on, take_calm, take_lone
 from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Context, Expectation
 from omnibot_driver.core.omnibot.frames import (
     IMU_LENGTH,
     INCOMPLETE,
     NO_FRAME,
     ByteOrder,
-    DeltaFrame,
     Frame,
     ImuFrame,
     PausedFrame,
     decode_measured,
     measure,
 )
-from omnibot_driver.core.omnibot.lattice import Gap, Piece, read
+from omnibot_driver.core.omnibot.lattice import Piece, read
+from omnibot_driver.core.omnibot.pauses import GAP_S, IDLE_S, TICK_BYTES, TICK_S, Pauses
 
 SPOKEN_AGAINST: Final = 3.0
 """A content of this cost waits for what follows."""
@@ -44,22 +44,6 @@ DOUBT_BYTES: Final = 170
 """100 ms of the nominal stream."""
 FRAMES_TO_SETTLE: Final = 3
 """So many sure frames behind a doubtful one, and nothing more will be learnt about it."""
-
-IDLE_S: Final = 0.1
-"""Longer than any adapter keeps a byte back (16 ms), and ten times the board's 10 ms tick."""
-TICK_S: Final = 0.011
-"""While the board runs its line is never idle for longer, unless bytes were lost; an adapter that
-collects bytes for longer shows pauses of its own."""
-GAP_S: Final = 4e-3
-"""No frame is sent with such a pause in it."""
-BYTE_S: Final = 10 / 115200
-TICK_BYTES: Final = 14 + 9 + 15
-"""All that one tick can bring. More at once after a pause means that we were late, not the line."""
-PAUSES_TO_TRUST: Final = 16
-"""So many pauses that stood where they should, and they are taken for the line's own."""
-
-IMUS_ONLY: Final = 8
-"""So many IMU frames without a delta, and none is expected."""
 
 
 @dataclass(slots=True)
@@ -89,10 +73,8 @@ class FrameDecoder:
         self._context = NOTHING_KNOWN
         self._held = bytearray()
         self._in_step = False
-        self._gaps: list[Gap] = []
+        self._pauses = Pauses()
         self._arrived = 0
-        self._sharp = self._between = 0  # how often pauses ended where a frame began, or before
-        self._certain = False
         self._wait_for = 0
         self._last_arrival_s = -math.inf
 
@@ -109,12 +91,15 @@ class FrameDecoder:
         pause_s, self._last_arrival_s = now - self._last_arrival_s, now
         if self.at_rest and self._take_whole(data, pause_s, found):
             return found
-        if pause_s > GAP_S:
-            self._pause(pause_s, len(data), found)
+        pauses = self._pauses
+        if pause_s > GAP_S and len(data) <= TICK_BYTES:
+            if pause_s >= IDLE_S:
+                self._close(found)
+            else:
+                pauses.add(pause_s, len(data), len(self._held))
         self._held += data
         self._settle(found, closed=False)
-        known = self._sharp >= PAUSES_TO_TRUST <= self._between
-        self.at_rest = known and self._in_step and not self._held
+        self.at_rest = pauses.sharp and pauses.between and self._in_step and not self._held
         return found
 
     def take_lone(self, data: bytes, now: float) -> ImuFrame | None:
@@ -130,8 +115,8 @@ class FrameDecoder:
             return None
         self._last_arrival_s = now
         self.statistics.frames += 1
-        if not self._certain:
-            self._trust_pause(pause_s, IMU_LENGTH)
+        if not self._pauses.certain:
+            self._pauses.stood_between(pause_s, IMU_LENGTH)
         frame, self._context = taken
         return frame
 
@@ -165,28 +150,6 @@ class FrameDecoder:
             self._drop(len(self._held))
         self._context = NOTHING_KNOWN
 
-    def _pause(self, pause_s: float, arrived: int, found: list[Frame]) -> None:
-        """The line was idle; or we were late, and then there is more than one tick to read."""
-        if arrived > TICK_BYTES:
-            return
-        if pause_s >= IDLE_S:
-            self._close(found)
-        elif pause_s - arrived * BYTE_S > GAP_S:
-            known = self._between >= PAUSES_TO_TRUST
-            sharp = self._sharp >= PAUSES_TO_TRUST
-            if pause_s > TICK_S:
-                sharp = sharp or known  # bytes were lost here, and hardly whole frames
-                self._trust(sharp=False, between=False)
-            place = len(self._held)
-            width = 1 if sharp else arrived
-            price = evidence.KNOWN_GAP if known else evidence.GAP
-            self._gaps.append((place, place + width, price))
-
-    def _trust_pause(self, pause_s: float, arrived: int) -> None:
-        """What came after this pause began with a frame and ended with one."""
-        if pause_s - arrived * BYTE_S > GAP_S:
-            self._trust(sharp=True, between=True)
-
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
         """Take all that came, if frames were due and they are calm from the first to the last."""
         if pause_s > TICK_S or len(data) > TICK_BYTES:
@@ -196,7 +159,7 @@ class FrameDecoder:
         if end < len(data):
             return False
         self._take(walk, len(walk.frames), context, found)
-        self._trust_pause(pause_s, len(data))
+        self._pauses.stood_between(pause_s, len(data))
         return True
 
     def _settle(self, found: list[Frame], *, closed: bool) -> None:
@@ -215,10 +178,9 @@ class FrameDecoder:
 
     def _walk(self, found: list[Frame], closed: bool) -> bool:
         """In step: take the frames that nothing speaks against. Whether no doubt is left."""
-        held, gaps, expectation = self._held, self._gaps, self._expectation
+        held, gaps, expectation = self._held, self._pauses.gaps, self._expectation
         order, context = self._pose_byte_order, self._context
-        at, size = 0, len(held)
-        walk = Walk()
+        at, size, walk = 0, len(held), Walk()
         while at < size:
             if not gaps or gaps[-1][0] <= at:  # no pause within what follows
                 at, context = take_calm(held, at, context, expectation, order, walk)
@@ -226,7 +188,7 @@ class FrameDecoder:
                     break
             length = measure(held, at)
             end = at + length
-            if gaps and self._idle_within(at, end if length > 0 else size):
+            if gaps and self._pauses.within(at, end if length > 0 else size):
                 return self._believe_but_the_last(walk, found)
             if length == INCOMPLETE and not closed:
                 break
@@ -238,9 +200,9 @@ class FrameDecoder:
                 cost >= evidence.LOOK_ALIKE or not goes_on(held, end, closed=closed)
             ):
                 return self._believe_but_the_last(walk, found)
-            if end == size and not closed and _may_end_in_a_header(frame, context):
-                sharp = self._sharp >= PAUSES_TO_TRUST  # what is sent at once begins after a pause
-                if not sharp or (self._arrived < length and _more_is_due(frame, context)):
+            if end == size and not closed and evidence.may_be_lent(frame, context):
+                parted = self._arrived < length  # what is sent at once begins after a pause
+                if not self._pauses.sharp or (parted and evidence.more_is_due(frame, context)):
                     break
             walk.add(end, frame, context)
             context = after
@@ -269,13 +231,16 @@ class FrameDecoder:
             self.skipped += [0] * (count - 1)
         self._dropped = 0
         self._context = after
-        if self._gaps:
-            self._compare_pauses(walk.ends[:count])
-        self._forget(walk.ends[count - 1])
+        end = walk.ends[count - 1]
+        if self._pauses.gaps:
+            self._pauses.compare(walk.ends[:count])
+            self._pauses.forget(end)
+        del self._held[:end]
+        self._wait_for = 0
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
         """In doubt: take what is sure, drop what stays doubtful. Whether anything was settled."""
-        state = self._context, self._expectation, self._gaps, self._pose_byte_order
+        state = self._context, self._expectation, self._pauses.gaps, self._pose_byte_order
         pieces = read(stretch, *state, in_step=self._in_step, closed=closed)
         half = len(stretch) // 2 if len(stretch) == DOUBT_BYTES else 0
         at = 0
@@ -292,8 +257,7 @@ class FrameDecoder:
         if half and not at:
             at = min(half, pieces[0].start) if pieces else half
             self._drop(at)
-            self._sharp = self._between = 0  # the pauses may have deceived us
-            self._certain = False
+            self._pauses.doubt()
         return at > 0
 
     def _settled(
@@ -314,7 +278,7 @@ class FrameDecoder:
                 or type(piece.frame) is PausedFrame
             )
             sure = proved and piece.sure
-            if piece.end == size and not closed and _may_end_in_a_header(piece.frame, piece.before):
+            if piece.end == size and not closed and evidence.may_be_lent(piece.frame, piece.before):
                 return
             if not (sure or closed or number < settled_before or piece.end <= until):
                 return
@@ -330,50 +294,6 @@ class FrameDecoder:
         self.statistics.faults += self._in_step
         self._in_step = False
         self._context = self._context.damaged()
-        self._forget(count)
-
-    def _forget(self, count: int) -> None:
+        self._pauses.forget(count)
         del self._held[:count]
         self._wait_for = 0
-        if self._gaps and self._gaps[-1][0] < count:
-            self._gaps = []
-        elif self._gaps:
-            self._gaps = [(a - count, b - count, p) for a, b, p in self._gaps if a >= count]
-
-    def _idle_within(self, start: int, end: int) -> bool:
-        for first, before, _ in self._gaps:  # noqa: SIM110 - the call of a generator costs more
-            if start < first < end and before <= end:
-                return True
-        return False
-
-    def _compare_pauses(self, ends: list[int]) -> None:
-        """Do pauses end where frames begin? Then they are the line's, not the adapter's."""
-        start = 0
-        for end in ends:
-            for first, before, _ in self._gaps:
-                if start <= first < end:
-                    self._trust(sharp=first == start, between=first == start or end < before)
-            start = end
-
-    def _trust(self, *, sharp: bool, between: bool) -> None:
-        most = 2 * PAUSES_TO_TRUST
-        if not (sharp and between and self._certain):
-            self._sharp = min(self._sharp + 1, most) if sharp else max(self._sharp - 4, 0)
-            self._between = min(self._between + 1, most) if between else max(self._between - 4, 0)
-            self._certain = self._sharp == self._between == most
-
-
-def _may_end_in_a_header(frame: Frame, before: Context) -> bool:
-    """Its last byte may be the next header's. Not so if it is what the sensor said before."""
-    if isinstance(frame, ImuFrame):
-        lent = frame.gyro[2] & 0xFF in LENT
-        said = before.imu is not None and frame.gyro[2] == before.imu.gyro[2]
-        return lent and (frame.gyro[2] & 0xFF == 0xFF or not said)
-    return not isinstance(frame, PausedFrame) and frame.seq in LENT
-
-
-def _more_is_due(frame: Frame, before: Context) -> bool:
-    """The board may send another frame in the same tick, without a pause."""
-    if isinstance(frame, ImuFrame):
-        return before.imus >= 3 if before.seq is not None else before.imus < IMUS_ONLY
-    return isinstance(frame, DeltaFrame) and (before.pose is None or before.deltas >= 4)

@@ -13,7 +13,15 @@ damaged, so a true shock between two whole frames is delivered.
 from math import ceil, floor
 from typing import Final, NamedTuple
 
-from omnibot_driver.core.omnibot.frames import DeltaFrame, Frame, ImuFrame, PoseFrame, Words
+from omnibot_driver.core.omnibot.frames import (
+    LENT,
+    DeltaFrame,
+    Frame,
+    ImuFrame,
+    PausedFrame,
+    PoseFrame,
+    Words,
+)
 
 # What the line does.
 ONE_BYTE: Final = 5.5
@@ -79,6 +87,8 @@ FARTHEST_POSE: Final = 1e7
 """Poses are in mm and mrad: beyond 10 km, or 1600 turns, a pose is other bytes misread."""
 LONGEST_STEP: Final = 2000.0
 """Between two poses: 10 m/s, or 10 rad/s, for 200 ms."""
+IMUS_ONLY: Final = 8
+"""So many IMU frames without a delta, and none is expected."""
 
 
 class Context(NamedTuple):
@@ -206,6 +216,22 @@ class Expectation:
         self._accel_limit = 6 * self._accel_scatter + 100
         self._gyro_limit = 6 * self._gyro_scatter + 30
         self.calm = self._calm()
+
+
+def may_be_lent(frame: Frame, before: Context) -> bool:
+    """Its last byte may be the next header's. Not so if it is what the sensor said before."""
+    if isinstance(frame, ImuFrame):
+        lent = frame.gyro[2] & 0xFF in LENT
+        said = before.imu is not None and frame.gyro[2] == before.imu.gyro[2]
+        return lent and (frame.gyro[2] & 0xFF == 0xFF or not said)
+    return not isinstance(frame, PausedFrame) and frame.seq in LENT
+
+
+def more_is_due(frame: Frame, before: Context) -> bool:
+    """The board may send another frame in the same tick, without a pause."""
+    if isinstance(frame, ImuFrame):
+        return before.imus >= 3 if before.seq is not None else before.imus < IMUS_ONLY
+    return isinstance(frame, DeltaFrame) and (before.pose is None or before.deltas >= 4)
 
 
 def _leaps(now: Words, before: Words, limit: float) -> int:

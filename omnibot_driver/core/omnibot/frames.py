@@ -21,6 +21,8 @@ IMU_HEADER: Final = b"\xff\xfa"
 DELTA_HEADER: Final = b"\xff\xfb"
 POSE_HEADER: Final = b"\xff\xfc"
 COMMAND_HEADER: Final = b"\xff\xfe"
+LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
+"""Last bytes of a frame that may be the first of a header, or its second."""
 
 _IMU: Final = struct.Struct(">2s6h")
 _DELTA: Final = struct.Struct(">2s3hB")
