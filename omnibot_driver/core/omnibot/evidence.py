@@ -124,18 +124,10 @@ class Expectation:
         self._gyro_scatter = 100.0
         self._accel_limit = 2400.0
         self._gyro_limit = 800.0
-        self.calm = self._calm()
+        self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
         """Between the first two the squared norm of an acceleration costs nothing; nor does a step
         of less than the third in one of its words, or than the fourth in one of the gyro's. In
         whole numbers, with which Python compares twice as fast."""
-
-    def _calm(self) -> tuple[int, int, int, int]:
-        return (
-            floor(self._lightest),
-            ceil(self._heaviest),
-            ceil(self._accel_limit),
-            ceil(self._gyro_limit),
-        )
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
         """The cost of a whole frame's content, and what is known after it."""
@@ -215,7 +207,8 @@ class Expectation:
         self._gyro_scatter += (d_gyro - self._gyro_scatter) / 8
         self._accel_limit = 6 * self._accel_scatter + 100
         self._gyro_limit = 6 * self._gyro_scatter + 30
-        self.calm = self._calm()
+        lightest, heaviest, _, _ = self.calm
+        self.calm = lightest, heaviest, ceil(self._accel_limit), ceil(self._gyro_limit)
 
 
 def may_be_lent(frame: Frame, before: Context) -> bool:
