@@ -8,8 +8,9 @@ from random import Random
 
 from omnibot_driver.core.board import DisplacementReading, PausedReading, PoseReading
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
-from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings, decode
+from omnibot_driver.core.omnibot import OmniBotSettings, decode
 from omnibot_driver.core.omnibot.frames import DeltaFrame, Frame, PausedFrame, PoseFrame
+from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.simulator import BoardMode, BoardSettings, SimulatedBoard
 
@@ -34,7 +35,7 @@ class Line:
         seed: int = 0,
     ) -> None:
         self.board = SimulatedBoard(board)
-        self.bot = OmniBot(OmniBotSettings(delta_frame=board.frame))
+        self.translation = Translation(OmniBotSettings(delta_frame=board.frame))
         self.odometry = Odometry(settings or OdometrySettings())
         self.loses = loses
         self.now = 0.0
@@ -69,7 +70,7 @@ class Line:
     def _hear(self, data: bytes) -> None:
         if data[:2] == b"\xff\xfa" or self.loses(data, self.now):
             return
-        reading = self.bot._read(decoded(data), self.now)
+        (reading,) = self.translation.readings([decoded(data)], [0], self.now)
         if isinstance(reading, DisplacementReading):
             self.estimates += self.odometry.displace(reading, self.now)
             self.told = board_pose(self.board)

@@ -28,7 +28,9 @@ def stamped(reads: list[Read], *, quick: bool) -> tuple[list[list[float]], str]:
             patch.setattr(device_clock, "CALM", -1.0)
         clock = DeviceClock(0.01)
         stamps_s = [clock.stamps(*read) for read in reads]
-        return stamps_s, str({**vars(clock), "_calm": None, "_line": vars(clock._line)})
+        return stamps_s, str(
+            {**vars(clock), "_calm": None, "_calm_s": None, "_line": vars(clock._line)}
+        )
 
 
 def heard(board: Board, chunker: Chunker, seed: int) -> list[Read]:

@@ -18,6 +18,7 @@ from underway import (
 from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.odometry import Odometry, OdometrySettings
 from omnibot_driver.core.omnibot import DeltaFrame, ImuFrame, OmniBot, OmniBotSettings, encode
+from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.se2 import Pose
 
 # Pauses and restarts
@@ -77,7 +78,7 @@ def test_a_restart_leaves_its_doubt_in_the_covariance_for_good() -> None:
 def test_a_driver_that_restarts_begins_at_the_identity() -> None:
     """Whatever the board's pose is, and follows it from there."""
     on = line(1)
-    on.bot, on.odometry = OmniBot(OmniBotSettings()), Odometry(OdometrySettings())
+    on.translation, on.odometry = Translation(OmniBotSettings()), Odometry(OdometrySettings())
     on.attached = on.told
     first = on.run(0.44)[0].pose
     assert first.way_m < 0.03
@@ -103,7 +104,7 @@ def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
     on = line(2)
     on.loses = lambda _data, _now: True
     on.run(3.0)
-    on.bot.connect()
+    on.translation.connect()
     on.loses = loses_nothing
     on.run(1.0)
     assert settled(on), on.error

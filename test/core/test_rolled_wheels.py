@@ -13,7 +13,8 @@ from strategies import axis_signs, small_moves
 from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate, OdometrySettings
-from omnibot_driver.core.omnibot import DeltaFrame, OmniBot, OmniBotSettings
+from omnibot_driver.core.omnibot import DeltaFrame, OmniBotSettings
+from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.se2 import Pose, roll
 from omnibot_driver.simulator import BoardSettings
 
@@ -64,13 +65,12 @@ def test_wheels_from_the_bodys_displacements_and_back(
 @given(st.lists(st.tuples(*[st.integers(-300, 300)] * 3), min_size=1, max_size=20))
 def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int, int]]) -> None:
     """Through the body and back nothing is lost."""
-    board, odometry = (
-        OmniBot(OmniBotSettings(delta_frame="wheel_counts")),
-        Odometry(OdometrySettings()),
-    )
+    translation = Translation(OmniBotSettings(delta_frame="wheel_counts"))
+    odometry = Odometry(OdometrySettings())
     estimates: list[OdometryEstimate] = []
     for number, words in enumerate(counts):
-        reading = board._read(DeltaFrame(*words, number % 256), number * PERIOD_S)
+        frame = DeltaFrame(*words, number % 256)
+        (reading,) = translation.readings([frame], [0], number * PERIOD_S)
         assert isinstance(reading, DisplacementReading)
         estimates += odometry.displace(reading, number * PERIOD_S)
     turned = [sum(column) * RAD_PER_COUNT for column in zip(*counts, strict=True)]

@@ -2,7 +2,7 @@
 
 """The Neuron OmniBot's STM32 motor board, and nothing else."""
 
-from omnibot_driver.core.omnibot.board import OmniBot, OmniBotSettings
+from omnibot_driver.core.omnibot.board import OmniBot
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
 from omnibot_driver.core.omnibot.frames import (
     CommandFrame,
@@ -13,6 +13,7 @@ from omnibot_driver.core.omnibot.frames import (
     decode,
     encode,
 )
+from omnibot_driver.core.omnibot.settings import OmniBotSettings
 
 __all__ = [
     "CommandFrame",

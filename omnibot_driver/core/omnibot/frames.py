@@ -3,7 +3,8 @@
 """The wire format: every frame the board sends or obeys, as bytes and as values.
 
 Source: the board's manual ver. 0.3, sections "Serial Command (Rx)", "Serial Data Output (Tx)" and
-"Appendix". This module knows layouts only; what a value means in SI units is known in ``board``.
+"Appendix". This module knows layouts only; what a value means in SI units is known in
+``translation`` and ``board``.
 All words are signed, 16 bit, most significant byte first.
 """
 

@@ -1,0 +1,32 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a user has to say of a board, because its wire does not."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from omnibot_driver.core.imu import ImuScale
+from omnibot_driver.core.omnibot.frames import ByteOrder
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OmniBotSettings:
+    """What cannot be known from the wire.
+
+    ``baudrate``: at ten bits to the byte; ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per
+    rad/s; ``position_scale`` and ``heading_scale``: LSB per m and rad of a commanded pose;
+    ``delta_frame``: whether deltas are differences of positions in the board's earth frame, motion
+    along its own axes, or (older firmware) encoder counts of the wheels A, B, C.
+    """
+
+    baudrate: int = 115200
+    linear_scale: float = 70.0
+    angular_scale: float = 500.0
+    position_scale: float = 1000.0
+    heading_scale: float = 1000.0
+    wheel_radius_m: float = 0.029
+    base_radius_m: float = 0.143
+    counts_per_revolution: int = 1560
+    delta_frame: Literal["earth", "body", "wheel_counts"] = "earth"
+    pose_byte_order: ByteOrder = "big"
+    imu: ImuScale = field(default_factory=ImuScale)

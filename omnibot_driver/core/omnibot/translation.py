@@ -1,0 +1,161 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From the frames of one line to readings: in SI units, each at its time, with what was lost.
+
+Source: the board's manual ver. 0.3. Units on the wire: deltas 0.1 mm and 0.1 mrad per 40 ms;
+poses mm and mrad.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.board import (
+    DisplacementReading,
+    ImuReading,
+    PausedReading,
+    PoseReading,
+    Reading,
+    Vector3,
+)
+from omnibot_driver.core.kinematics import OmniKinematics
+from omnibot_driver.core.omnibot.frames import (
+    DeltaFrame,
+    Frame,
+    ImuFrame,
+    PausedFrame,
+    PoseFrame,
+    Words,
+)
+from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
+from omnibot_driver.core.omnibot.rhythm import LENGTH, Rhythm
+from omnibot_driver.core.omnibot.sequence import Sequence
+from omnibot_driver.core.omnibot.settings import OmniBotSettings
+from omnibot_driver.core.omnibot.suspicion import Suspicion
+
+NOMINAL_BYTES_PER_S: Final = 1700
+DELTA_LSB: Final = 1e-4
+"""m, m, rad."""
+POSE_LSB_M: Final = 1e-3
+POSE_LSB_RAD: Final = 1e-3
+
+
+class Translation:
+    """What is made of the frames of a line; what comes most often, in ``lone``, at the least cost.
+
+    ``settings`` may be replaced at any time.
+    """
+
+    def __init__(self, settings: OmniBotSettings) -> None:
+        self.settings = settings
+        self.suspicion = Suspicion()
+        self._sequence = Sequence()
+        self.connect()
+
+    def connect(self) -> None:
+        """A new line: no belief but in the board's counters."""
+        self.modes = ModeTracker()
+        self._rhythm = Rhythm()
+        self._sequence.reconnect()
+        self._paused_count: int | None = None
+        self._imus = 0
+        self.lone_to_come = self._most_alone = 0
+        """IMU frames that may come alone and not be told on, and how many there were to be."""
+        self._heard_s = -math.inf
+
+    def lone(self, frame: ImuFrame, now: float) -> ImuReading:
+        """``readings`` of an IMU frame that came alone, while such are to come."""
+        self.lone_to_come -= 1
+        self._heard_s = now
+        scale = self.settings.imu
+        return ImuReading(scale.specific_force(frame.accel), scale.angular_velocity(frame.gyro))
+
+    def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
+        """Of frames that one read brought, each after so many bytes that made none.
+
+        What a read brings at once did not come at once: each frame has a time of its own.
+        """
+        self._catch_up()
+        before_s, self._heard_s = self._heard_s, now
+        lengths = [LENGTH.get(type(frame), 0) for frame in found]
+        left = sum(skipped) + sum(lengths)
+        readings = []
+        for frame, length, before in zip(found, lengths, skipped, strict=True):
+            left -= before + length
+            came_s = max(before_s, now - left / NOMINAL_BYTES_PER_S)
+            readings.append(self._read(frame, came_s, before))
+        usual = self._paused_count is None and not any(skipped)
+        self.lone_to_come = self._most_alone = self.modes.imus_to_come - 1 if usual else 0
+        return readings
+
+    def apply(self, happening: Happening) -> None:
+        """One step of the mode. Raises RequestRefused, and then nothing changes."""
+        self._catch_up()
+        self.modes.apply(happening)
+
+    def _catch_up(self) -> None:
+        """Modes and rhythm are told of the frames that came alone."""
+        alone, self.lone_to_come = self._most_alone - self.lone_to_come, self._most_alone
+        if alone:
+            self.modes.hear_imus(alone)
+            self._rhythm.hear_imus(alone)
+            self._imus += alone
+
+    def _read(self, frame: Frame, now: float, skipped: int) -> Reading:
+        self.modes.hear(frame)
+        paused_count, self._paused_count = self._paused_count, None
+        match frame:
+            case ImuFrame():
+                self._imus += 1
+                scale = self.settings.imu
+                return ImuReading(
+                    scale.specific_force(frame.accel),
+                    scale.angular_velocity(frame.gyro),
+                    self._rhythm.hear(ImuFrame, skipped),
+                )
+            case DeltaFrame():
+                self._rhythm.hear(DeltaFrame, skipped)
+                return self._displacement(frame, now)
+            case PoseFrame(x, y, theta, seq):
+                self._rhythm.hear(PoseFrame, skipped)
+                step = self._sequence.pose(seq, now)
+                pose = PoseReading(
+                    x * POSE_LSB_M,
+                    y * POSE_LSB_M,
+                    theta * POSE_LSB_RAD,
+                    lost=step.lost,
+                    restarted=step.restarted,
+                )
+                self.suspicion.posed(frame, pose, self.settings.pose_byte_order)
+                return pose
+            case PausedFrame(count):
+                self._paused_count = count
+                self._sequence.pause()
+                self._rhythm = Rhythm()
+                continues = paused_count is not None and count == (paused_count + 1) % 256
+                return PausedReading(continues)
+
+    def _displacement(self, frame: DeltaFrame, now: float) -> DisplacementReading:
+        step = self._sequence.delta(frame.seq, now, imus=self._imus)
+        self._imus = 0
+        dx, dy, dyaw = frame.dx * DELTA_LSB, frame.dy * DELTA_LSB, frame.dtheta * DELTA_LSB
+        if self.settings.delta_frame == "wheel_counts":
+            dx, dy, dyaw = self._rolled((frame.dx, frame.dy, frame.dtheta))
+        displacement = DisplacementReading(
+            dx,
+            dy,
+            dyaw,
+            frame="earth" if self.settings.delta_frame == "earth" else "body",
+            duration_s=step.duration_s,
+            lost=step.lost,
+            restarted=step.restarted,
+        )
+        self.suspicion.displaced(displacement)
+        return displacement
+
+    def _rolled(self, counts: Words) -> Vector3:
+        """The body's displacement from the wheels' counts (manual, "Odometry equation")."""
+        settings = self.settings
+        a, b, c = (count * math.tau / settings.counts_per_revolution for count in counts)
+        wheels = OmniKinematics(settings.wheel_radius_m, settings.base_radius_m)
+        rolled = wheels.body_twist((a, b, c))
+        return rolled.vx_mps, rolled.vy_mps, rolled.yaw_rate_radps
