@@ -2,6 +2,9 @@
 
 """Publishers of a real node, and the stamps of what is published by its clock."""
 
+import json
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 
@@ -17,7 +20,6 @@ from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.omnibot import OmniBot
 from omnibot_driver.core.session import Session
 from omnibot_driver.messages import MessageSettings
-from omnibot_driver.node import OmniBotDriver
 from omnibot_driver.publishing import Publishing
 
 
@@ -33,16 +35,20 @@ def node() -> Iterator[Node]:
 
 def test_a_command_waits_for_no_events_of_publishers() -> None:
     """The executor looks at each thing that it waits for, rclpy's own publisher's included."""
-    rclpy.init(args=["--ros-args", "-p", "port:=sim://"])
-    driver = OmniBotDriver()
-    try:
-        publishers = list(driver.publishers)
-        assert len(publishers) >= 6
-        assert not any(publisher.event_handlers for publisher in publishers)
-    finally:
-        driver.close()
-        driver.destroy_node()
-        rclpy.try_shutdown()
+    script = (
+        "import rclpy\n"
+        "from omnibot_driver.node import OmniBotDriver\n"
+        "rclpy.init(args=['--ros-args', '-p', 'port:=sim://'])\n"
+        "driver = OmniBotDriver()\n"
+        "print([len(publisher.event_handlers) for publisher in driver.publishers])\n"
+        "driver.close()\n"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    handlers = json.loads(told.stdout)
+    assert len(handlers) >= 6
+    assert not any(handlers)
 
 
 def test_stamps_follow_simulated_time_while_there_is_any(
