@@ -4,6 +4,7 @@
 an IMU frame that comes alone, nor what the lattice leaves out."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from math import inf
 from random import Random
@@ -14,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from truth import SCENARIOS, generate
 
+from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.omnibot import (
     FrameDecoder,
     ImuFrame,
@@ -95,7 +97,7 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
 def test_readings_come_out_alike(
     scenario: str, fault: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And where each read ended, and the mode; now and then S is sent, which counts anew."""
+    """And where each read ended, and the mode, whatever is sent meanwhile or refused."""
     chunks = chunks_of(scenario, fault, "whole bursts", 2)
 
     def told() -> list[object]:
@@ -104,6 +106,11 @@ def test_readings_come_out_alike(
         for number, (data, now) in enumerate(chunks):
             if number % 97 == 13:
                 board.start()
+            if number % 89 == 17:
+                board.silence()
+            if number % 31 == 5:
+                with suppress(RequestRefused):
+                    board.pause()
             found.append((board.receive(data, now), board.edge, board.mode, board.figures))
         return found
 

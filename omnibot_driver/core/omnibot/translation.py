@@ -94,7 +94,8 @@ class Translation:
 
     def _catch_up(self) -> None:
         """Modes and rhythm are told of the frames that came alone."""
-        alone, self.lone_to_come = self._most_alone - self.lone_to_come, self._most_alone
+        alone = self._most_alone - self.lone_to_come
+        self.lone_to_come = self._most_alone = 0
         if alone:
             self.modes.hear_imus(alone)
             self._rhythm.hear_imus(alone)
