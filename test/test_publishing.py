@@ -78,3 +78,4 @@ def test_stamps_follow_simulated_time_while_there_is_any(
         assert published_at_s() == pytest.approx(5.0, abs=1.0)
         simulate(False)
         assert published_at_s() == pytest.approx(time.time(), abs=1.0)
+        publishing._time_watch.unregister()  # rcl would go on calling one that is no more
