@@ -58,17 +58,18 @@ LEARN_EVERY: Final = 8
 class Walk:
     """Frames in a row, from the first byte held on, that nothing speaks against.
 
-    ``ends``: of each; ``before_last``: what was known before the last two (fields of a Context);
-    ``lessons``: numbers of frames from which the expectation is to learn, each with two readings.
+    ``ends``: of each; ``lessons``: numbers of frames from which the expectation is to learn, each
+    with two readings; ``known``: what was known after so many frames (fields of a Context), never
+    more than a few apart.
     """
 
-    __slots__ = ("before_last", "ends", "frames", "lessons")
+    __slots__ = ("ends", "frames", "known", "lessons")
 
-    def __init__(self) -> None:
+    def __init__(self, context: Context) -> None:
         self.frames: list[Frame] = []
         self.ends: list[int] = []
-        self.before_last: tuple[tuple[Any, ...], tuple[Any, ...]] = ((), ())
         self.lessons: list[tuple[int, ImuFrame, ImuFrame]] = []
+        self.known: list[tuple[int, tuple[Any, ...]]] = [(0, context)]
 
     def add(self, end: int, frame: Frame, before: Context) -> None:
         """One more."""
@@ -76,9 +77,17 @@ class Walk:
         is_lesson = not number % LEARN_EVERY and not before.imus & 3
         if is_lesson and type(frame) is ImuFrame and before.imu is not None:
             self.lessons.append((number, frame, before.imu))
+        self.known.append((number, before))
         self.frames.append(frame)
         self.ends.append(end)
-        self.before_last = self.before_last[1], before
+
+    def known_after(self, count: int, expectation: Expectation) -> Context:
+        """What was known after so many frames."""
+        at, fields = next(known for known in reversed(self.known) if known[0] <= count)
+        context = Context._make(fields)
+        for frame in self.frames[at:count]:
+            _, context = expectation.weigh(frame, context)
+        return context
 
 
 def take_lone(
@@ -140,24 +149,23 @@ def take_calm(
     last, seq, pose, imus, deltas, shaken, turned = context
     if last is None:
         return at, context
-    known: tuple[Any, ...] = context
-    before_that, before = walk.before_last
     frames, ends = walk.frames, walk.ends
     lightest, heaviest, far, fast = expectation.calm
     back, slow = -far, -fast
     px, py, pz = last.accel
     pu, pv, pw = last.gyro
     size = len(held)
+    final = size - 1
     frame: Any
-    while at + 1 < size and held[at] == _FIRST:
+    while at < final and held[at] == _FIRST:
         kind = held[at + 1]
         if kind == _IMU_KIND:
             end = at + IMU_LENGTH
-            if end > size:
+            if end > final and (end > size or held[final] in LENT):
                 break
             x, y, z, u, v, w = _IMU(held, at + 2)
             norm = x * x + y * y + z * z
-            if not lightest < norm < heaviest or (end == size and w & 0xFF in LENT):
+            if not lightest < norm < heaviest:
                 break
             if (
                 back < x - px < far
@@ -172,13 +180,17 @@ def take_calm(
                 shaken = True
             else:
                 break
-            px, py, pz, pu, pv, pw = x, y, z, u, v, w
+            px, py, pz = x, y, z
+            pu, pv, pw = u, v, w
             frame = _Imu()
             frame.accel = x, y, z
             frame.gyro = u, v, w
             frame.__class__ = ImuFrame
-            if not imus & 3 and not len(frames) % LEARN_EVERY:
-                walk.lessons.append((len(frames), frame, last))
+            if not imus & 3:
+                count = len(frames)
+                if not count % LEARN_EVERY:
+                    walk.lessons.append((count, frame, last))
+                walk.known.append((count + 1, (frame, seq, pose, imus + 1, deltas, shaken, turned)))
             last = frame
             imus += 1
         elif kind == _DELTA_KIND and imus == 4:
@@ -195,7 +207,8 @@ def take_calm(
             ):
                 break
             frame = _Delta()
-            frame.dx, frame.dy, frame.dtheta, frame.seq = dx, dy, dtheta, count
+            frame.dx, frame.dy = dx, dy
+            frame.dtheta, frame.seq = dtheta, count
             frame.__class__ = DeltaFrame
             seq, imus, deltas = count, 0, deltas + 1
             turned = None if turned is None else turned + dtheta
@@ -224,8 +237,5 @@ def take_calm(
             break
         frames.append(frame)
         ends.append(end)
-        before_that, before = before, known
-        known = (last, seq, pose, imus, deltas, shaken, turned)
         at = end
-    walk.before_last = before_that, before
-    return at, tuple.__new__(Context, known)
+    return at, tuple.__new__(Context, (last, seq, pose, imus, deltas, shaken, turned))

@@ -154,7 +154,7 @@ class FrameDecoder:
         """Take all that came, if frames were due and they are calm from the first to the last."""
         if pause_s > TICK_S or len(data) > TICK_BYTES:
             return False
-        walk, order = Walk(), self._pose_byte_order
+        walk, order = Walk(self._context), self._pose_byte_order
         end, context = take_calm(data, 0, self._context, self._expectation, order, walk)
         if end < len(data):
             return False
@@ -180,7 +180,7 @@ class FrameDecoder:
         """In step: take the frames that nothing speaks against. Whether no doubt is left."""
         held, gaps, expectation = self._held, self._pauses.gaps, self._expectation
         order, context = self._pose_byte_order, self._context
-        at, size, walk = 0, len(held), Walk()
+        at, size, walk = 0, len(held), Walk(context)
         while at < size:
             if not gaps or gaps[-1][0] <= at:  # no pause within what follows
                 at, context = take_calm(held, at, context, expectation, order, walk)
@@ -212,9 +212,9 @@ class FrameDecoder:
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
         """Where it breaks, the last two frames are in doubt as well."""
-        believed = len(walk.frames) - len(walk.before_last)
+        believed = len(walk.frames) - 2
         if believed > 0:
-            self._take(walk, believed, Context._make(walk.before_last[0]), found)
+            self._take(walk, believed, walk.known_after(believed, self._expectation), found)
         return False
 
     def _take(self, walk: Walk, count: int, after: Context, found: list[Frame]) -> None:
@@ -247,7 +247,7 @@ class FrameDecoder:
         for piece, sure in self._settled(pieces, len(stretch), half, closed):
             if sure:
                 self._drop(piece.start - at)
-                walk = Walk()
+                walk = Walk(piece.before)
                 walk.add(piece.end - piece.start, piece.frame, piece.before)
                 self._take(walk, 1, piece.after, found)
                 self._in_step = True
