@@ -6,6 +6,7 @@ an IMU frame that comes alone, nor what the lattice leaves out."""
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 from math import inf
 from random import Random
 
@@ -26,9 +27,10 @@ from omnibot_driver.core.omnibot import (
     lattice,
 )
 from omnibot_driver.core.omnibot.bounds import least_costs
+from omnibot_driver.core.omnibot.calm import Walk, take_calm
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics
 from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Expectation
-from omnibot_driver.core.omnibot.frames import Frame
+from omnibot_driver.core.omnibot.frames import Frame, decode_measured, measure
 
 SECONDS = 6.0
 Outcome = list[tuple[list[Frame], list[int], DecoderStatistics, bytes | None]]
@@ -165,6 +167,27 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(decoder.Expectation, "weigh", weigh)
     assert tested.feed(b"".join(map(encode, sent)), 0.0) == sent
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
+    """After any number of frames; and few have to be weighed again to tell it."""
+    data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
+    at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
+    expected = [context]
+    while at < len(data):
+        at, context = take_calm(data, at, context, expectation, "big", walk)
+        if at < len(data):
+            end = at + measure(data, at)
+            frame = decode_measured(data[at:end])
+            walk.add(end, frame, context)
+            _, context = expectation.weigh(frame, context)
+            at = end
+    for frame in walk.frames:
+        expected.append(expectation.weigh(frame, expected[-1])[1])
+    assert [walk.known_after(n, expectation) for n in range(len(expected))] == expected
+    places = [place for place, _ in walk.known]
+    assert max(b - a for a, b in pairwise([*places, len(walk.frames)])) <= 6
 
 
 def test_most_of_the_lattice_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
