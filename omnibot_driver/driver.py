@@ -16,6 +16,10 @@ from omnibot_driver.output import UnblockedOutput
 STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 LONGEST_END_S: Final = 4.0
 USAGE: Final = "parameters are given like this: --ros-args -p port:=/dev/ttyUSB0"
+SETUP: Final = (
+    "ROS 2 is not set up in this shell, or a library is not installed: `source"
+    " /opt/ros/jazzy/setup.bash`, then `rosdep install --from-paths src`"
+)
 
 
 class Ending:
@@ -52,12 +56,16 @@ class Ending:
 def main(args: list[str] | None = None) -> int:
     """Run the driver until SIGINT, SIGTERM, a shutdown of its context or a defect.
 
-    Returns the exit code: 0 when asked to end, 1 after a defect, 2 for wrong parameters. The main
+    Returns the exit code: 0 when asked to end, 1 after a defect, 2 if it cannot start. The main
     thread only waits, so a signal is heard however busy the executor is, and a second one cannot
     break into the shutdown.
     """
     with UnblockedOutput():
-        return _main(sys.argv if args is None else args)
+        try:
+            return _main(sys.argv if args is None else args)
+        except ModuleNotFoundError as error:
+            print(f"omnibot_driver cannot start: {error}; {SETUP}", file=sys.stderr)
+            return 2
 
 
 def _main(args: list[str]) -> int:
