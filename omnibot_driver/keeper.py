@@ -32,12 +32,11 @@ SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + LEAVES_WITHIN_S
 class Keeper:
     """A guard for one open port, from now until ``end``.
 
-    ``last_words``: what the guard is to say. ``trouble``: a sentence once the guard is not as it
-    should be, to be taken away by whoever tells it.
+    ``last_words``: what the guard is to say.
     """
 
     def __init__(self, descriptor: int, last_words: bytes) -> None:
-        self.trouble = ""
+        self._trouble = ""
         self._descriptor = descriptor
         self._last_words = last_words
         self._process: subprocess.Popen[bytes] | None = None
@@ -45,13 +44,18 @@ class Keeper:
         self._told = False
         self._start()
 
-    def beat(self, now: float) -> None:
-        """The driver is alive; call it every ``BEAT_S``."""
+    def beat(self, now: float) -> str:
+        """The driver is alive; call it every ``BEAT_S``, neither more nor less often.
+
+        Returns a sentence, once, when the guard is not as it should be.
+        """
         if self._process is not None and (trouble := self._beat(self._process)):
             self._tell(f"{trouble}; another one is started")
         if self._process is None and now >= self._restart_at:
             self._restart_at = now + RESTART_S
             self._start()
+        trouble, self._trouble = self._trouble, ""
+        return trouble
 
     def end(self, *, stopped: bool) -> None:
         """It leaves, and the port is ours alone; harmless to repeat.
@@ -117,7 +121,7 @@ class Keeper:
 
     def _tell(self, trouble: str) -> None:
         if not self._told:
-            self._told, self.trouble = True, trouble
+            self._told, self._trouble = True, trouble
 
 
 WITHOUT_GUARD: Final = "if the driver is killed, the robot goes on with its last command"

@@ -149,8 +149,9 @@ class Link:
             if not self._closing.is_set():
                 self._on_exit = on_exit
                 self._write(self._session.farewell(on_exit))
-                self._interrupt()
-                self._port = None  # nobody adds to the last words
+                if self._port is not None:
+                    self._port.interrupt()
+                    self._port = None  # nobody adds to the last words
             self._closing.set()
             self._changed.notify_all()
         for thread in self._threads:
@@ -265,11 +266,10 @@ class Link:
         """With the lock held: this thread, and so the watchdog, is alive."""
         self._heed_standstill(now)
         self._standstill.passed(now, time.time_ns())
-        self._beat_at = now + BEAT_S
-        if self._keeper is None:
+        if now < self._beat_at:
             return []
-        self._keeper.beat(now)
-        trouble, self._keeper.trouble = self._keeper.trouble, ""
+        self._beat_at = now + BEAT_S
+        trouble = self._keeper.beat(now) if self._keeper is not None else ""
         return [Notice(trouble)] if trouble else []
 
     def _heed_standstill(self, now: float) -> bool:
@@ -295,10 +295,6 @@ class Link:
             self._sent += len(data)
         except LinkError as error:
             self._write_error = error
-            self._interrupt()
+            self._port.interrupt()
         else:
             self._on_write(data)
-
-    def _interrupt(self) -> None:
-        if self._port is not None:
-            self._port.interrupt()

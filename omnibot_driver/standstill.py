@@ -15,6 +15,8 @@ STANDSTILL_S: Final = 0.4
 limit: whenever the guard steps in, this is noticed as well."""
 SETTLE_S: Final = 0.25
 """What comes so soon after a standstill had been waiting, whatever the sender's clock says."""
+LATEST_S: Final = 10.0
+"""Nothing is retransmitted so late: what seems to be from before has a sender whose clock is."""
 
 
 class Standstill:
@@ -50,4 +52,4 @@ class Standstill:
         """A command, sent at this time of day by the sender's clock, is not from before its end."""
         if self._begun or now - self._passed_at >= STANDSTILL_S or now < self._over_at + SETTLE_S:
             return False
-        return not self._from_ns <= sent_ns <= self._until_ns
+        return now >= self._over_at + LATEST_S or not self._from_ns <= sent_ns <= self._until_ns

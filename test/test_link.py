@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.session import Session
+from omnibot_driver.keeper import BEAT_S, Keeper
 from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
@@ -51,6 +53,26 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
     assert kinds(board.board)[before:].count("velocity") > 3
     assert board.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
     link.close("stop")
+
+
+def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passes(
+    board: PtyBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each repetition of a command is a pass; a guard that hangs is known by unread beats."""
+    beats: list[float] = []
+    monkeypatch.setattr(Keeper, "beat", lambda _keeper, now: beats.append(now) or "")
+    listener, ours = Listener(), session()
+    link = link_to(board.path, listener, ours)
+    link.start()
+    listener.wait_for(lambda: ours.state == "nominal")
+
+    def driven() -> bool:
+        link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
+        return len(beats) > 10
+
+    listener.wait_for(driven)
+    link.close("stop")
+    assert all(later >= earlier + BEAT_S for earlier, later in pairwise(beats))
 
 
 def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: Path) -> None:

@@ -56,11 +56,13 @@ def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
 
 
 def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
-    """However late a retransmission brings it."""
+    """However late a retransmission brings it; later than ten seconds none does."""
     standstill = resumed(5.0)
     standstill.passed(108.0, wall_ns(108.0))
     assert not standstill.outlived_by(wall_ns(104.9), 108.0)
     assert standstill.outlived_by(wall_ns(105.5), 108.0)
+    standstill.passed(116.0, wall_ns(116.0))
+    assert standstill.outlived_by(wall_ns(104.9), 116.0)
 
 
 @pytest.mark.parametrize("skew_s", [-1e6, 1e6])
