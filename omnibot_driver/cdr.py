@@ -27,7 +27,7 @@ from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.odometry import OdometryEstimate
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.core.uncertainty import Covariance
-from omnibot_driver.messages import MessageSettings
+from omnibot_driver.messages import MessageSettings, Wheels
 
 LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 """The encapsulation header; alignment counts from behind it."""
@@ -41,7 +41,6 @@ class Serializer:
     """``imu``, ``odometry`` and ``joint_state`` of one MessageSettings; stamps in ns."""
 
     def __init__(self, settings: MessageSettings) -> None:
-        self._settings = settings
         frame, values = _text(settings.imu_frame)
         self._imu = struct.Struct(f"@{STAMP}{frame}37d")
         self._imu_head = (*values, *NO_TURN, *messages.NO_ORIENTATION)
@@ -91,9 +90,9 @@ class Serializer:
             *twist_noise,
         )
 
-    def joint_state(self, estimate: OdometryEstimate, stamp_ns: int) -> bytes:
+    def joint_state(self, wheels: Wheels, stamp_ns: int) -> bytes:
         """``messages.joint_state_message``."""
-        angles, rates = messages.wheels(estimate, self._settings.wheels)
+        _, angles, rates = wheels
         head = (*divmod(stamp_ns, 10**9), *self._joints_head, *angles)
         if rates:
             return LITTLE_ENDIAN + self._joints.pack(*head, 3, *rates, 0)
@@ -131,10 +130,9 @@ class Messages:
         """``odom``."""
         return messages.odometry_message(estimate, messages.time_message(stamp_ns), self._settings)
 
-    def joint_state(self, estimate: OdometryEstimate, stamp_ns: int) -> JointState:
+    def joint_state(self, wheels: Wheels, stamp_ns: int) -> JointState:
         """``joint_states``."""
-        stamp = messages.time_message(stamp_ns)
-        return messages.joint_state_message(estimate, stamp, self._settings)
+        return messages.joint_state_message(wheels, messages.time_message(stamp_ns))
 
 
 def difference(settings: MessageSettings) -> str:
@@ -142,15 +140,16 @@ def difference(settings: MessageSettings) -> str:
     reading = ImuEstimate(0.0, (1.1, -2.2, 3.3), (-4.4, 5.5, -6.6))
     noise = Covariance(1.2, 2.3, 3.4, 4.5, 5.6, 6.7)
     tangent, twist = Pose(7.7, -8.8, 9.9), BodyTwist(0.1, -0.2, 0.3)
-    known = OdometryEstimate(0.0, tangent, twist, noise, tangent, twist)
-    unknown = OdometryEstimate(0.0, tangent, None, noise, tangent, None)
+    estimates = [OdometryEstimate(0.0, tangent, known, noise) for known in (twist, None)]
+    angles = (10.1, -11.2, 12.3)
+    joints: list[Wheels] = [(tangent, angles, rates) for rates in (angles, ())]
     stamp_ns = 1_234_567_890_987_654_321
     pairs = zip(
         *(
             [
                 make.imu(reading, stamp_ns),
-                *(make.odometry(estimate, stamp_ns) for estimate in (known, unknown)),
-                *(make.joint_state(estimate, stamp_ns) for estimate in (known, unknown)),
+                *(make.odometry(estimate, stamp_ns) for estimate in estimates),
+                *(make.joint_state(wheels, stamp_ns) for wheels in joints),
             ]
             for make in (Messages(settings), Serializer(settings))
         ),

@@ -10,6 +10,7 @@ import math
 from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import add
 from typing import Any, Final
 
 from builtin_interfaces.msg import Time
@@ -33,6 +34,10 @@ SHORTEST_QUATERNION: Final = 1e-3
 MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 WHEEL_JOINTS: Final = ("wheel_a_joint", "wheel_b_joint", "wheel_c_joint")
+
+Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
+"""What was rolled so far, the angles in rad, unwrapped, and the rates in rad/s, if known."""
+UNTURNED: Final[Wheels] = (Pose(), (0.0, 0.0, 0.0), ())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,23 +124,20 @@ def transform_message(odometry: Odometry) -> TransformStamped:
     )
 
 
-def joint_state_message(
-    estimate: OdometryEstimate, stamp: Time, settings: MessageSettings
-) -> JointState:
-    """``joint_states``: the wheels' angles, unwrapped, and rates; no rates where none are known."""
-    angles, rates = wheels(estimate, settings.wheels)
+def turned(before: Wheels, estimate: OdometryEstimate, kinematics: OmniKinematics) -> Wheels:
+    """The wheels after what was rolled since then, by the sizes that they have now."""
+    rolled, rolling, (then, angles, _) = estimate.rolled, estimate.rolling, before
+    way = BodyTwist(rolled.x_m - then.x_m, rolled.y_m - then.y_m, rolled.yaw_rad - then.yaw_rad)
+    angles = tuple(map(add, angles, kinematics.wheel_rates(way)))
+    return rolled, angles, kinematics.wheel_rates(rolling) if rolling else ()
+
+
+def joint_state_message(wheels: Wheels, stamp: Time) -> JointState:
+    """``joint_states``."""
+    _, angles, rates = wheels
     return JointState(
         header=Header(stamp=stamp), name=WHEEL_JOINTS, position=angles, velocity=rates
     )
-
-
-def wheels(
-    estimate: OdometryEstimate, kinematics: OmniKinematics
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Angles in rad and rates in rad/s of the wheels; no rates where none are known."""
-    rolled, rolling = estimate.rolled, estimate.rolling
-    angles = kinematics.wheel_rates(BodyTwist(rolled.x_m, rolled.y_m, rolled.yaw_rad))
-    return angles, kinematics.wheel_rates(rolling) if rolling else ()
 
 
 def diagnostic_message(

@@ -68,6 +68,7 @@ class Publishing:
         self._send_transform = transform_publisher(node) if values["publish_tf"] else None
         self._state = node.create_publisher(String, "~/state", LATCHED)
         self._estop_active = node.create_publisher(Bool, "~/estop_active", LATCHED)
+        self._wheels = messages.UNTURNED
         self._published: tuple[str, bool] | None = None
         self._state_lock = threading.Lock()
         self._told: set[str] = set()
@@ -170,7 +171,8 @@ class Publishing:
             stamp = messages.time_message(stamp_ns)
             odometry = messages.odometry_message(estimate, stamp, self._settings)
             self._send_transform(messages.transform_message(odometry))
-        self._joints.publish(self._make.joint_state(estimate, stamp_ns))
+        self._wheels = messages.turned(self._wheels, estimate, self._settings.wheels)
+        self._joints.publish(self._make.joint_state(self._wheels, stamp_ns))
 
     def _answer(self, done: RequestDone, _clock_offset_ns: int) -> None:
         assert isinstance(done.token, Future)

@@ -15,7 +15,7 @@ from omnibot_driver import messages, parameters
 from omnibot_driver.core.diagnosis import Level, Status
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
 from omnibot_driver.core.odometry import OdometryEstimate
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.core.uncertainty import Covariance
@@ -202,7 +202,8 @@ def test_joint_states_are_the_manuals_wheels() -> None:
     estimate = OdometryEstimate(
         0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), BodyTwist(0.1, 0.0, 0.0)
     )
-    message = messages.joint_state_message(estimate, STAMP, SETTINGS)
+    wheels = messages.turned(messages.UNTURNED, estimate, SETTINGS.wheels)
+    message = messages.joint_state_message(wheels, STAMP)
     assert message.header.stamp == STAMP
     assert list(message.name) == ["wheel_a_joint", "wheel_b_joint", "wheel_c_joint"]
     turned = 0.8660254037844386 / 0.029
@@ -214,9 +215,20 @@ def test_joint_states_are_the_manuals_wheels() -> None:
 def test_joints_whose_rate_is_not_known_have_none() -> None:
     """As sensor_msgs wants it: an empty array, not zeros."""
     estimate = OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), None)
-    message = messages.joint_state_message(estimate, STAMP, SETTINGS)
+    wheels = messages.turned(messages.UNTURNED, estimate, SETTINGS.wheels)
+    message = messages.joint_state_message(wheels, STAMP)
     assert len(message.position) == 3
     assert not message.velocity
+
+
+def test_wheels_of_another_size_go_on_from_where_they_stand() -> None:
+    """Each way is turned by the radius of its moment; without a way nothing turns."""
+    small, large = OmniKinematics(0.029, 0.143), OmniKinematics(0.058, 0.2)
+    ahead = [OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(x, 0.0, 0.0)) for x in (1, 2)]
+    before = messages.turned(messages.UNTURNED, ahead[0], small)
+    assert messages.turned(before, ahead[0], large)[1] == before[1]
+    after = messages.turned(before, ahead[1], large)
+    assert after[1] == pytest.approx([1.5 * angle for angle in before[1]])
 
 
 def test_diagnostics_are_named_as_by_diagnostic_updater() -> None:

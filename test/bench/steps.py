@@ -28,7 +28,7 @@ from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, Omni
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.core.session import Session
 from omnibot_driver.core.uncertainty import Covariance
-from omnibot_driver.messages import MessageSettings
+from omnibot_driver.messages import UNTURNED, MessageSettings, turned
 
 MPS2_PER_COUNT = 9.80665 / 16384
 AT_REST = (Pose(), BodyTwist(0.0, 0.0, 0.0), Covariance(), Pose(), BodyTwist(0.0, 0.0, 0.0))
@@ -40,7 +40,8 @@ class Relay:
 
     def __init__(self, node: Node) -> None:
         values = parameters.check_all({})
-        self._make = Serializer(MessageSettings.from_parameters(values))
+        settings = MessageSettings.from_parameters(values)
+        self._make, self._wheels, self._sizes = Serializer(settings), UNTURNED, settings.wheels
         self._imus = node.create_publisher(Imu, "imu/data_raw", 10)
         self._odometries = node.create_publisher(Odometry, "odom", 10)
         self._joints = node.create_publisher(JointState, "joint_states", 10)
@@ -60,7 +61,8 @@ class Relay:
                 self._imus.publish(self._make.imu(estimate, stamp_ns))
             else:
                 self._odometries.publish(self._make.odometry(estimate, stamp_ns))
-                self._joints.publish(self._make.joint_state(estimate, stamp_ns))
+                self._wheels = turned(self._wheels, estimate, self._sizes)
+                self._joints.publish(self._make.joint_state(self._wheels, stamp_ns))
 
     def trust(self, data: bytes) -> None:
         """The first byte begins a frame; its first word is all that is looked at."""
