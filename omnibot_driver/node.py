@@ -134,7 +134,8 @@ class OmniBotDriver(Node):
         else:
             self.create_subscription(Twist, "cmd_vel", self._obey(_twist), 1, raw=True)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._looking = self.create_timer(LOOK_EVERY_S, self._look_for_other_types, clock=steady)
+        self._looks = [self._see_other_types, self._see_namesakes, self._see_no_clock]
+        self.create_timer(LOOK_EVERY_S, self._look_around, clock=steady)
         self.create_subscription(Float32MultiArray, "wheel_cmd", self._obey(_wheels), 1)
         self.create_subscription(PoseStamped, "cmd_pose", self._obey(self._pose), 1)
         self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
@@ -158,15 +159,24 @@ class OmniBotDriver(Node):
         frame = self._publishing.settings.odom_frame
         session.command_pose(messages.goal_pose(goal, frame), now)
 
-    def _look_for_other_types(self) -> None:
-        """The middleware says nothing when two types meet on one topic. Told once."""
+    def _look_around(self) -> None:
+        """What the middleware says nothing of. Each is told once."""
+        for look in list(self._looks):
+            if warning := look():
+                self.get_logger().warning(warning)
+                self._looks.remove(look)
+
+    def _see_other_types(self) -> str:
         stamped = self._values["enable_stamped_cmd_vel"]
-        warning = messages.type_conflict(
-            self.get_publishers_info_by_topic("cmd_vel"), stamped=stamped
-        )
-        if warning:
-            self.get_logger().warning(warning)
-            self._looking.cancel()
+        publishers = self.get_publishers_info_by_topic("cmd_vel")
+        return messages.type_conflict(publishers, stamped=stamped)
+
+    def _see_namesakes(self) -> str:
+        publishers = self.get_publishers_info_by_topic("~/state")
+        return selfcheck.namesake_advice(self.get_fully_qualified_name(), publishers)
+
+    def _see_no_clock(self) -> str:
+        return selfcheck.waiting_advice(self._values["port"], self.get_clock().now().nanoseconds)
 
     def _refuse(self, text: str) -> None:
         """Counted each time, told now and then by its kind: a flood of one hides no other."""

@@ -1,18 +1,20 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What can be seen of a port's surroundings once it is open, and should be set otherwise.
+"""What can be seen of the driver's surroundings, and should be set otherwise.
 
-Reads sysfs; knows no pyserial, no ROS, no board. What stands in the way of opening a port, its
-permissions among it, ``port.py`` says.
+The adapter of an open port, the clock, nodes of the same name. Reads sysfs; knows no pyserial, no
+ROS, no board. What stands in the way of opening a port, its permissions among it, ``port.py`` says.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 SYSFS: Final = Path("/sys")
 LONGEST_LATENCY_MS: Final = 5
 """Half a tick of the board. FTDI's default is 16 ms, its least 1 ms."""
-WITHOUT_CLOCK: Final = ("sim://", "replay://")
+RECORDING: Final = "replay://"
+WITHOUT_CLOCK: Final = ("sim://", RECORDING)
 """Ports that no real robot is behind."""
 
 
@@ -40,4 +42,25 @@ def clock_advice(port: str, use_sim_time: bool) -> str:
     return (
         f"use_sim_time is set, but {port} keeps real time: stamps and the age of commands will be"
         " wrong; start the driver with use_sim_time:=false"
+    )
+
+
+def waiting_advice(port: str, now_ns: int) -> str:
+    """What to say when the node's clock has not begun; a recording's stamps are its own."""
+    if now_ns or port.startswith(RECORDING):
+        return ""
+    return (
+        "use_sim_time is set and nothing comes on /clock: imu/data_raw, odom and joint_states wait"
+        " for it; start what publishes it, or the driver with use_sim_time:=false"
+    )
+
+
+def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
+    """What to say when not all publishers of a node's own topic are the one of this full name."""
+    names = [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in publishers]
+    if names.count(name) < 2:
+        return ""
+    return (
+        f"another node is called {name} as well: both obey the same commands; end one, or start it"
+        " in a namespace of its own (--ros-args -r __ns:=/robot2)"
     )

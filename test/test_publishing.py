@@ -7,9 +7,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 
 import pytest
 import rclpy
+from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
@@ -18,12 +20,15 @@ from sensor_msgs.msg import Imu, JointState
 from omnibot_driver import parameters
 from omnibot_driver.core.inertial import ImuEstimate
 from omnibot_driver.core.odometry import OdometryEstimate
-from omnibot_driver.core.omnibot import OmniBot
+from omnibot_driver.core.omnibot import OmniBot, PausedFrame
+from omnibot_driver.core.omnibot.frames import Frame
+from omnibot_driver.core.omnibot.modes import ModeTracker
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.core.session import Session
 from omnibot_driver.core.uncertainty import Covariance
 from omnibot_driver.messages import MessageSettings
 from omnibot_driver.publishing import Publishing
+from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 
 VALUES = {**parameters.check_all({}), "publish_tf": False}
 
@@ -38,12 +43,12 @@ def node() -> Iterator[Node]:
     rclpy.try_shutdown(context=context)
 
 
-def publishing_of(node: Node) -> Publishing:
-    """With a session that hears nothing but what a test has it hear."""
+def session_with(node: Node) -> tuple[Session, Publishing]:
+    """A session that hears nothing but what a test has it hear."""
     session = Session(
         OmniBot(parameters.board_settings(VALUES)), parameters.session_settings(VALUES), run=True
     )
-    return Publishing(node, session, VALUES, MessageSettings.from_parameters(VALUES))
+    return session, Publishing(node, session, VALUES, MessageSettings.from_parameters(VALUES))
 
 
 def test_a_command_waits_for_no_events_of_publishers() -> None:
@@ -80,7 +85,7 @@ def test_stamps_follow_simulated_time_while_there_is_any(
 
     for begins_before in (True, False):
         simulate(begins_before)
-        publishing = publishing_of(node)
+        _, publishing = session_with(node)
         monkeypatch.setattr(publishing._imu, "publish", published.append)
         simulate(True)
         node.get_clock().set_ros_time_override(Time(seconds=5.0))  # type: ignore[attr-defined]
@@ -90,11 +95,52 @@ def test_stamps_follow_simulated_time_while_there_is_any(
         publishing._time_watch.unregister()  # rcl would go on calling one that is no more
 
 
+def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
+    node: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its clock goes in steps: between two of them time stands still; a jump back is followed."""
+    node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
+    session, publishing = session_with(node)
+    stamps_ns: dict[str, list[int]] = {"_imu": [], "_odometry": []}
+    for topic, kind in (("_imu", Imu), ("_odometry", Odometry)):
+
+        def publish(data: bytes, topic: str = topic, kind: type = kind) -> None:
+            stamp = deserialize_message(data, kind).header.stamp
+            stamps_ns[topic].append(stamp.sec * 10**9 + stamp.nanosec)
+
+        monkeypatch.setattr(getattr(publishing, topic), "publish", publish)
+    states: list[str] = []
+    monkeypatch.setattr(publishing._state, "publish", lambda state: states.append(state.data))
+
+    def deliver() -> None:
+        now = time.monotonic()
+        for late_s in (0.0, 0.03, 0.01):
+            imu = ImuEstimate(now - late_s, (0.0, 0.0, 9.8), (0.0, 0.0, 0.0))
+            odometry = OdometryEstimate(now - late_s, Pose(), None, Covariance())
+            publishing.deliver([imu, odometry, *session.take_events()])
+
+    session.opened(0.0)
+    deliver()
+    assert states == ["connecting"]
+    assert stamps_ns == {"_imu": [], "_odometry": []}
+    for seconds in (0.001, 5.0, 5.0, 5.02):
+        node.get_clock().set_ros_time_override(Time(seconds=seconds))  # type: ignore[attr-defined]
+        deliver()
+    for stamped in stamps_ns.values():
+        assert len(stamped) == 12
+        assert all(earlier < later for earlier, later in pairwise([0, *stamped]))
+    node.get_clock().set_ros_time_override(Time(seconds=2.0))  # type: ignore[attr-defined]
+    deliver()
+    for stamped in stamps_ns.values():
+        assert all(stamp_ns < 3 * 10**9 for stamp_ns in stamped[12:])
+        assert all(earlier < later for earlier, later in pairwise(stamped[12:]))
+
+
 def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A robot that has come far and stands does not turn them."""
-    publishing = publishing_of(node)
+    _, publishing = session_with(node)
     published: list[bytes] = []
     monkeypatch.setattr(publishing._joints, "publish", published.append)
     far = OdometryEstimate(1.0, Pose(), None, Covariance(), rolled=Pose(100.0, 20.0, 3.0))
@@ -104,3 +150,35 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
     publishing.publish([far], 0)
     before, after = (deserialize_message(data, JointState).position for data in published)
     assert before == after
+
+
+def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
+    node: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another thread may publish in the middle of it, and nothing tells of the end but the end."""
+    session, publishing = session_with(node)
+    published: list[str] = []
+    monkeypatch.setattr(publishing._state, "publish", lambda state: published.append(state.data))
+    board, now = SimulatedBoard(BoardSettings(running=True)), 0.0
+
+    def read(data: bytes) -> None:
+        nonlocal now
+        now += 0.01
+        session.receive(data, now)
+        publishing.publish(session.take_events(), 0)
+
+    session.opened(now)
+    while session.state != "nominal":
+        read(board.step())
+    hear = ModeTracker.hear
+
+    def hear_meanwhile(modes: ModeTracker, frame: Frame) -> None:
+        hear(modes, frame)
+        if isinstance(frame, PausedFrame):
+            assert session.state == "paused"
+            publishing.publish_state()
+
+    monkeypatch.setattr(ModeTracker, "hear", hear_meanwhile)
+    read(b"Paused: 1\n" + b"".join(board.step() for _ in range(8)))
+    assert session.state == "nominal"
+    assert published[-1] == "nominal"

@@ -3,6 +3,7 @@
 """What surrounds a port, by a sysfs made up in a temporary folder."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -65,3 +66,37 @@ def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
     text = selfcheck.clock_advice(port, use_sim_time)
     assert bool(text) == warned
     assert not warned or (port in text and "use_sim_time:=false" in text)
+
+
+@pytest.mark.parametrize(
+    ("port", "now_ns", "warned"),
+    [
+        ("/dev/ttyUSB0", 0, True),
+        ("sim://?imu_only", 0, True),
+        ("sim://", 1, False),
+        ("replay://bag", 0, False),
+    ],
+)
+def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, warned: bool) -> None:
+    """Where measurements wait for it; a recording has stamps of its own."""
+    assert ("nothing comes on /clock" in selfcheck.waiting_advice(port, now_ns)) == warned
+
+
+@pytest.mark.parametrize(
+    ("others", "warned"),
+    [
+        ([], False),
+        ([("/", "omnibot_driver")], True),
+        ([("/robot2", "omnibot_driver"), ("/", "rosbag2_player")], False),
+    ],
+)
+def test_a_node_of_the_same_full_name_is_told_of(
+    others: list[tuple[str, str]], warned: bool
+) -> None:
+    """Not one in another namespace, nor a bag that says what another driver said."""
+    publishers = [
+        SimpleNamespace(node_namespace=namespace, node_name=name)
+        for namespace, name in [("/", "omnibot_driver"), *others]
+    ]
+    text = selfcheck.namesake_advice("/omnibot_driver", publishers)
+    assert ("another node is called /omnibot_driver as well" in text) == warned

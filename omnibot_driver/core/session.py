@@ -97,7 +97,8 @@ class Session:
         self._tell_at = -math.inf
         self._bulletin = Bulletin()
         self._events: list[Event] = []
-        self._shown = (self.state, self.estop_active)
+        self.shown = (self.state, self.estop_active)
+        """As of the last ``take_events``: nothing that is only passed through amid an input."""
         self._beneath: tuple[Phase, Mode, bool] | None = None
         """What that is made of, which is quicker to look at."""
 
@@ -339,8 +340,8 @@ class Session:
         if beneath != self._beneath:
             self._beneath = beneath
             shown = (self.state, self.estop_active)
-            if shown != self._shown:
-                self._shown = shown
+            if shown != self.shown:
+                self.shown = shown
                 self._events.append(StateChanged())
         events, self._events = self._events, []
         return events

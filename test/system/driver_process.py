@@ -26,11 +26,13 @@ _namespaces = (f"robot{os.getpid()}_{number}" for number in itertools.count())
 class Driver:
     """``python -m omnibot_driver.driver`` as a process of its own, in a namespace of its own.
 
-    ``before``: Python to be run in that process first.
+    ``before``: Python to be run in that process first; ``namespace``: that of another one.
     """
 
-    def __init__(self, *, port: str, before: str = "", **parameters: object) -> None:
-        self.namespace = next(_namespaces)
+    def __init__(
+        self, *, port: str, before: str = "", namespace: str = "", **parameters: object
+    ) -> None:
+        self.namespace = namespace or next(_namespaces)
         arguments = ["--ros-args", "-r", f"__ns:=/{self.namespace}"]
         for name, value in {"port": port, **parameters}.items():
             arguments += ["-p", f"{name}:={value}"]

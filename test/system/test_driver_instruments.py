@@ -11,11 +11,13 @@ from typing import Any
 
 import pytest
 import yaml
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
-from driver_process import Driver
+from driver_process import PATIENCE_S, Driver
 from nav_msgs.msg import Odometry
 from probe import Probe
 from rcl_interfaces.srv import GetParameters
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float32MultiArray
 from std_srvs.srv import SetBool, Trigger
@@ -184,6 +186,25 @@ def test_who_does_not_want_transforms_hears_nothing_of_tf(
     driver = start_driver("/dev/null", publish_tf=False, use_sim_time=True)
     driver.wait_for_line("use_sim_time is set, but /dev/null keeps real time")
     assert "tf2" not in driver.output
+
+
+def test_measurements_wait_for_simulated_time_and_it_is_said(
+    start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
+) -> None:
+    """Also on a simulated board, whose time is not that of /clock."""
+    driver = start_driver("sim://", use_sim_time=True)
+    probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    imu = probe.listen(Imu, "imu/data_raw")
+    driver.wait_for_line("use_sim_time is set and nothing comes on /clock")
+    assert not imu
+    clock = probe.publisher(Clock, "/clock")
+    clock.publish(Clock(clock=Time(sec=1000)))
+    probe.wait_for(lambda: len(imu) > 20)
+    stamps_s = [
+        message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec for message in list(imu)
+    ]
+    assert stamps_s == pytest.approx([1000.0] * len(stamps_s), abs=PATIENCE_S)
 
 
 def test_the_transform_follows_odom(robot: Robot) -> None:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Three robots in one domain: each hears its own commands and speaks of its own frames."""
+"""Robots in one domain: each hears its own commands and speaks of its own frames."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -103,3 +103,12 @@ def test_each_has_an_emergency_stop_of_its_own(fleet: list[Robot]) -> None:
     first.probe.wait_for(lambda: not first.estop_active[-1].data)
     assert second.estop_active[-1].data
     assert [message.data for message in third.estop_active] == [False]
+
+
+def test_two_of_the_same_name_are_told_of_each_other() -> None:
+    """Whichever came first: both would drive."""
+    with Driver(port="sim://") as first, Driver(port="sim://", namespace=first.namespace) as second:
+        for driver in (first, second):
+            driver.wait_for_line(
+                f"another node is called /{first.namespace}/omnibot_driver as well"
+            )
