@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Final
 
-from omnibot_driver.tools.calibrate.arguments import command_line
 from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
 from omnibot_driver.tools.needs import ToolError, need
 from omnibot_driver.tools.ros_arguments import split_ros_arguments
@@ -28,8 +27,10 @@ def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) 
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)
     try:
-        arguments = command_line().parse_args(own)
         with Interruption() as interruption:
+            from omnibot_driver.tools.calibrate.arguments import command_line
+
+            arguments = command_line().parse_args(own)
             for library in LIBRARIES:
                 need(library)
             _calibrate(arguments, ros, interruption, interruption.reading(read))
