@@ -36,7 +36,7 @@ from omnibot_driver.core.omnibot.frames import (
     measure,
 )
 from omnibot_driver.core.omnibot.lattice import Piece, read
-from omnibot_driver.core.omnibot.pauses import GAP_S, IDLE_S, TICK_BYTES, TICK_S, Pauses
+from omnibot_driver.core.omnibot.pauses import BYTE_S, GAP_S, IDLE_S, TICK_BYTES, TICK_S, Pauses
 
 SPOKEN_AGAINST: Final = 3.0
 """A content of this cost waits for what follows."""
@@ -60,22 +60,23 @@ class FrameDecoder:
     """Feed it what the line brings, in any chunking; it returns the frames that were in it."""
 
     def __init__(
-        self, pose_byte_order: ByteOrder = "big", accel_counts_per_g: float = 16384.0
+        self,
+        pose_byte_order: ByteOrder = "big",
+        accel_counts_per_g: float = 16384.0,
+        byte_s: float = BYTE_S,
     ) -> None:
         self.statistics = DecoderStatistics()
         self.skipped: list[int] = []
         """For each frame of the last call, how many bytes before it were none."""
         self.at_rest = False
         """All that came was understood, and pauses stand where they should."""
-        self._dropped = 0
+        self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
         self._expectation = Expectation(accel_counts_per_g)
         self._context = NOTHING_KNOWN
         self._held = bytearray()
         self._in_step = False
-        self._pauses = Pauses()
-        self._arrived = 0
-        self._wait_for = 0
+        self._pauses = Pauses(byte_s)
         self._last_arrival_s = -math.inf
 
     def feed(self, data: bytes, now: float) -> list[Frame]:
