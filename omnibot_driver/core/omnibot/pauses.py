@@ -16,7 +16,7 @@ from omnibot_driver.core.omnibot.lattice import Gap
 
 IDLE_S: Final = 0.1
 """Longer than any adapter keeps a byte back (16 ms), and ten times the board's 10 ms tick."""
-TICK_S: Final = 0.011
+LATE_S: Final = 0.011
 """While the board runs its line is never idle for longer, unless bytes were lost; an adapter that
 collects bytes for longer shows pauses of its own."""
 GAP_S: Final = 4e-3
@@ -52,7 +52,7 @@ class Pauses:
         if pause_s - arrived * self._byte_s <= GAP_S:
             return
         sharp, between = self.sharp, self.between
-        if pause_s > TICK_S:
+        if pause_s > LATE_S:
             sharp = sharp or between  # bytes were lost here, and hardly whole frames
             self._trust(sharp=False, between=False)
         width = 1 if sharp else arrived
