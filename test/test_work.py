@@ -6,6 +6,7 @@ A bound is a little above what was counted when it was set. Whoever makes the pa
 and says in docs/performance.md what for.
 """
 
+import gc
 import struct
 import sys
 from collections.abc import Callable
@@ -41,11 +42,13 @@ def calls(work: Callable[[], object]) -> int:
         count += event == "call"
 
     before = sys.getprofile()
+    gc.disable()  # Hypothesis is called when it runs, and is no part of the work
     sys.setprofile(see)
     try:
         work()
     finally:
         sys.setprofile(before)
+        gc.enable()
     return count
 
 
