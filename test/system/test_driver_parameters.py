@@ -47,8 +47,8 @@ def test_wrong_parameters_end_the_start_with_a_sentence(
     "arguments",
     [
         ["/dev/ttyUSB0"],
-        ["--help"],
         ["--port", "x"],
+        ["--ros-args", "-r", f"__ns:=/{'a' * 230}"],
         ["--ros-args", "-r", "__node:=bad name"],
         ["--ros-args", "--log-level", "nonsense"],
     ],
@@ -60,6 +60,37 @@ def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -
     assert ended.returncode == 2
     assert "omnibot_driver cannot start: " in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["port:=sim://"], ["--ros-args", "port:=sim://"], ["--ros-args", "port:=sim://", "--", "-x"]],
+)
+def test_a_forgotten_p_is_told_with_what_to_write(arguments: list[str]) -> None:
+    """Alike on both sides of ``--ros-args``."""
+    command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+    assert ended.returncode == 2
+    assert "it does not know port:=sim://" in ended.stderr
+    assert ended.stderr.endswith("like this: --ros-args -p port:=/dev/ttyUSB0\n")
+
+
+WITHOUT_ROS = """
+import runpy, sys
+sys.modules["rclpy"] = sys.modules["serial"] = None
+runpy.run_module("omnibot_driver.driver", run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize("arguments", [["-h"], ["--help"], ["--ros-args", "-p", "x:=1", "--help"]])
+def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
+    """Before anything is loaded; it is no error."""
+    command = [sys.executable, "-c", WITHOUT_ROS, *arguments]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout.startswith("usage: ros2 run omnibot_driver driver ")
+    assert "--ros-args -p port:=/dev/ttyUSB0\n" in ended.stdout
+    assert "config/driver.yaml" in ended.stdout
 
 
 def test_integers_are_taken_for_real_numbers(start_board: Start, start_driver: Start) -> None:
