@@ -99,7 +99,7 @@ def _main(args: list[str]) -> int:
             return _refuse(f"it does not know {' '.join(unknown)}; {USAGE}")
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         rclpy.get_default_context().on_shutdown(ending.begin)
-        _run(ending)
+        _run(ending, args)
     except UnknownROSArgsError as error:  # its text is a list in brackets
         unknown = str(error).strip("[]").replace("'", "").replace(",", "")
         return _refuse(f"it does not know {unknown}; {USAGE}")
@@ -115,7 +115,7 @@ def _main(args: list[str]) -> int:
     return 0 if ending.defect is None else 1
 
 
-def _run(ending: Ending) -> None:
+def _run(ending: Ending, args: list[str]) -> None:
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
     from omnibot_driver.node import OmniBotDriver
@@ -123,6 +123,11 @@ def _run(ending: Ending) -> None:
     if ending.begun:
         return
     driver = OmniBotDriver(end=ending.begin)
+    if "--params-file" in args and not driver._parameter_overrides:
+        driver.get_logger().warning(
+            "no parameter of the --params-file is for this node, which is"
+            f" {driver.get_fully_qualified_name()}: let the file begin with /**:"
+        )
     executor = SingleThreadedExecutor()
     executor.add_node(driver)
     stopping = threading.Event()

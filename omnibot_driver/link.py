@@ -143,12 +143,17 @@ class Link:
             )
             return link, self._session.figures(time.monotonic())
 
-    def close(self, on_exit: OnExit) -> None:
-        """Stop the robot, then end the threads and close the port; harmless to repeat."""
+    def close(self, on_exit: OnExit) -> bool:
+        """Stop the robot, then end the threads and close the port; harmless to repeat.
+
+        Returns whether this told the robot to stand still and closed an open port.
+        """
+        told = False
         with self._changed:
             if not self._closing.is_set():
                 self._on_exit = on_exit
                 self._write(self._session.farewell(on_exit))
+                told = self._port is not None and self._write_error is None
                 self._interrupt()
                 self._port = None  # nobody adds to the last words
             self._closing.set()
@@ -156,6 +161,7 @@ class Link:
         for thread in self._threads:
             if thread.is_alive():
                 thread.join(JOIN_TIMEOUT_S)
+        return told and not any(thread.is_alive() for thread in self._threads)
 
     def _guard(self, work: Callable[[], None]) -> None:
         try:

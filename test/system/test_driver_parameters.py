@@ -2,9 +2,11 @@
 
 """Parameters and arguments of the running node: refused at the start, changed later."""
 
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -92,6 +94,25 @@ def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
     assert ended.stdout.startswith("usage: ros2 run omnibot_driver driver ")
     assert "--ros-args -p port:=/dev/ttyUSB0\n" in ended.stdout
     assert "config/driver.yaml" in ended.stdout
+
+
+@pytest.mark.parametrize(("first_line", "told"), [("/other/omnibot_driver", 1), ("/**", 0)])
+def test_a_parameter_file_for_another_node_is_told(
+    tmp_path: Path, first_line: str, told: int
+) -> None:
+    """ROS passes it over; a port would be opened that nobody meant."""
+    path = tmp_path / "driver.yaml"
+    path.write_text(f"{first_line}:\n  ros__parameters:\n    port: /dev/null\n")
+    command = [sys.executable, "-m", "omnibot_driver.driver", "--ros-args"]
+    command += ["--params-file", str(path), "-r", "__ns:=/misread", "--log-level", "warn"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        lines = iter(process.stderr.readline, "")
+        said = next(line for line in lines if "for this node" in line or "/dev/null is" in line)
+        process.send_signal(signal.SIGINT)
+        rest = process.stderr.read()
+    assert process.returncode == 0
+    assert (said + rest).count("which is /misread/omnibot_driver: let the file begin") == told
 
 
 def test_integers_are_taken_for_real_numbers(start_board: Start, start_driver: Start) -> None:

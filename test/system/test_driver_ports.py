@@ -89,6 +89,7 @@ def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
     driver.wait_for_line(reason)
     assert driver.process.poll() is None
     assert driver.end(signal.SIGINT) == 0
+    assert "the robot is told" not in driver.output
 
 
 def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
