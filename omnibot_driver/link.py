@@ -146,7 +146,7 @@ class Link:
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, then end the threads and close the port; harmless to repeat.
 
-        Returns whether this told the robot to stand still and closed an open port.
+        Whether it did all of that.
         """
         told = False
         with self._changed:

@@ -96,23 +96,25 @@ def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
     assert "config/driver.yaml" in ended.stdout
 
 
-@pytest.mark.parametrize(("first_line", "told"), [("/other/omnibot_driver", 1), ("/**", 0)])
+OPENS_NOTHING = "import serial; serial.serial_for_url = None"
+"""Where the file is passed over, the port is the default one: a robot may be there."""
+
+
+@pytest.mark.parametrize(
+    ("first_line", "said", "told"),
+    [("/other/omnibot_driver", "for this node", 1), ("/**", "port '/dev/null' is not", 0)],
+)
 def test_a_parameter_file_for_another_node_is_told(
-    tmp_path: Path, first_line: str, told: int
+    start_driver: Start, tmp_path: Path, first_line: str, said: str, told: int
 ) -> None:
-    """ROS passes it over; a port would be opened that nobody meant."""
+    """ROS passes it over, and a port would be opened that nobody meant."""
     path = tmp_path / "driver.yaml"
     path.write_text(f"{first_line}:\n  ros__parameters:\n    port: /dev/null\n")
-    command = [sys.executable, "-m", "omnibot_driver.driver", "--ros-args"]
-    command += ["--params-file", str(path), "-r", "__ns:=/misread", "--log-level", "warn"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        assert process.stderr is not None
-        lines = iter(process.stderr.readline, "")
-        said = next(line for line in lines if "for this node" in line or "/dev/null is" in line)
-        process.send_signal(signal.SIGINT)
-        rest = process.stderr.read()
-    assert process.returncode == 0
-    assert (said + rest).count("which is /misread/omnibot_driver: let the file begin") == told
+    driver: Driver = start_driver(None, before=OPENS_NOTHING, more=["--params-file", str(path)])
+    driver.wait_for_line(said)
+    assert driver.end(signal.SIGINT) == 0
+    sentence = f"which is /{driver.namespace}/omnibot_driver: let the file begin with /**:"
+    assert driver.output.count(sentence) == told
 
 
 def test_integers_are_taken_for_real_numbers(start_board: Start, start_driver: Start) -> None:
