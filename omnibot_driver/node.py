@@ -125,7 +125,7 @@ class OmniBotDriver(Node):
         self._board.settings = parameters.board_settings(self._values)
         self._link.reconnect_interval_s = self._values["reconnect_interval"]
         settings = parameters.session_settings(self._values)
-        self._link.call(lambda session, _now: session.configure(settings))
+        self._link.call(lambda session, now: session.configure(settings, now))
 
     # From ROS to the board
 
@@ -179,7 +179,7 @@ class OmniBotDriver(Node):
 
     def _on_estop_topic(self, message: Bool) -> None:
         if message.data:
-            self._link.call(lambda session, now: session.estop(True, now))
+            self._link.call(lambda session, now: session.estop(True, now, by="the topic estop"))
 
 
 def _twist(session: Session, data: bytes, now: float) -> None:

@@ -15,7 +15,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver import calibration
 from omnibot_driver.core.errors import RequestRefused
-from omnibot_driver.core.session import Session
+from omnibot_driver.core.session import DISCONNECTED, Session
 from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.link import Link
 from omnibot_driver.replay import Replay
@@ -39,8 +39,13 @@ class Services:
 
     def _on_estop(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         active = bool(request.data)
-        response.message = self._link.call(lambda session, now: session.estop(active, now))
-        if active and self._link.blocked:
+        state, response.message = self._link.call(
+            lambda session, now: (
+                session.state,
+                session.estop(active, now, by="the service ~/estop"),
+            )
+        )
+        if active and state != DISCONNECTED and self._link.blocked:
             response.message = (
                 "e-stop latched; the port takes nothing: the stop follows when it is open again"
             )

@@ -49,9 +49,20 @@ class Driving:
         self._watch = Watch()
         self._obeys = obeys
 
-    def configure(self, limits: SpeedLimits, commands: CommandSettings) -> None:
-        """New settings, from the next command and frame on."""
+    def configure(self, limits: SpeedLimits, commands: CommandSettings, now: float) -> list[str]:
+        """New settings, from the next command and frame on; sentences for the user.
+
+        What was commanded under looser ones ends.
+        """
+        stricter = commands.timeout_s < self.stream.settings.timeout_s or limits.stricter_than(
+            self._helm.limits
+        )
         self._helm.limits, self.stream.settings = limits, commands
+        current = self.stream.current
+        if not stricter or current is None or current.stands or isinstance(current, GoalMotion):
+            return []
+        self.stream.halt(now)
+        return ["the robot is stopped, as its limits are stricter now: command it anew"]
 
     def figures(self, now: float) -> CommandFigures:
         """Who commands, and how."""

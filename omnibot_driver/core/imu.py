@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from omnibot_driver.core.board import Vector3
+
 STANDARD_GRAVITY: Final = 9.80665
 
 ACCEL_COUNTS_PER_G: Final = {2: 16384.0, 4: 8192.0, 8: 4096.0, 16: 2048.0}
@@ -24,7 +26,6 @@ ACCEL_TOLERANCE: Final = 0.1
 """Part of gravity by which a sound sensor may be off, its initial tolerance and bias together."""
 
 Counts = tuple[int, int, int]
-Vector3 = tuple[float, float, float]
 
 
 def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:

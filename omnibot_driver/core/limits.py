@@ -29,6 +29,14 @@ class SpeedLimits:
     linear_mps2: float = 0.0
     angular_radps2: float = 0.0
 
+    def stricter_than(self, other: "SpeedLimits") -> bool:
+        """Whether anything is to go more slowly."""
+        return (
+            self.linear_mps < other.linear_mps
+            or self.angular_radps < other.angular_radps
+            or self.wheel_radps < other.wheel_radps
+        )
+
     def allow(self, twist: BodyTwist) -> bool:
         """Whether it is below them, as NaN and infinity never are."""
         return (

@@ -100,15 +100,17 @@ class Odometry:
             fastest=(settings.fastest_mps, settings.fastest_radps),
         )
 
-    def reset(self) -> None:
-        """The odometry frame begins where the robot stands."""
+    def reset(self) -> list[OdometryEstimate]:
+        """The odometry frame begins where the robot stands; the estimates that were still due."""
         self.alignments += 1
+        due = []
         if self._board is not None:
-            self._release()
+            due = self._release()
             if self._track.uncertainty.gap != NOTHING:
                 self._belief.proved = None  # what the next pose corrects was before the reset
         self._backlog = Backlog()
         self._track.begin()
+        return due
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
         """The estimates that this displacement completes: none while a pose must tell first."""

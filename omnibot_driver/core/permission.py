@@ -26,6 +26,8 @@ def why_not_calibrate(phase: Phase, mode: Mode, current: Motion | None, *, measu
     """``current``: what is commanded; ``measuring``: a calibration is under way."""
     if phase is Phase.CLOSED:
         return "the port is not open; connect the board, then call again"
+    if mode is Mode.UNKNOWN:
+        return "nothing was understood from the board: check its power and cable, then call again"
     if not mode.running:
         return f"the board is {mode.value}; call ~/start, then call again"
     if measuring:

@@ -117,11 +117,6 @@ class Session:
         return self._commands.latched
 
     @property
-    def lost(self) -> int:
-        """Displacements that were lost on the line since the driver began."""
-        return self._measuring.tally.lost_displacements
-
-    @property
     def refused(self) -> Refused:
         """What the wire said and nobody was told."""
         return self._measuring.refused
@@ -160,9 +155,9 @@ class Session:
 
     # What happens
 
-    def configure(self, settings: SessionSettings) -> None:
-        """New settings, from the next command and frame on."""
-        self._driving.configure(settings.limits, settings.commands)
+    def configure(self, settings: SessionSettings, now: float) -> None:
+        """New settings, from the next command and frame on; stricter ones end the present one."""
+        self._notify(self._driving.configure(settings.limits, settings.commands, now))
         self._measuring.configure(settings.odometry, settings.motion, settings.imu)
 
     def opened(self, now: float) -> None:
@@ -195,7 +190,7 @@ class Session:
         """``receive``, but for what can wait until these are told: ``heed`` is to follow.
 
         Whoever commands in between is as one who came before the bytes. That must not be where they
-        change the mode, so there nothing waits.
+        change the mode, so there nothing waits; nor does it where anything else is asked for.
         """
         self._came_at = now
         before = self._board.mode
@@ -277,6 +272,7 @@ class Session:
 
     def request(self, request: Request, token: object, now: float) -> None:
         """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""
+        self.heed(now)  # what came before is no answer
         self._supervisor.request(request, token, now)
         if request is not Request.START:
             self._commands.discard()
@@ -290,9 +286,11 @@ class Session:
             raise RequestRefused(reason)
         calibration.measure(token, now)
 
-    def estop(self, active: bool, now: float) -> str:
+    def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
         """Latch or release the e-stop; returns what is so now, in a sentence."""
         if active:
+            if not self.estop_active:
+                self._notify([f"e-stop latched by {by}"])
             self._commands.latch(now)
             if self._closed:
                 return "e-stop latched; the port is not open: the stop is sent as soon as it is"
@@ -302,11 +300,13 @@ class Session:
         if not self.estop_active:
             return "the e-stop was not latched"
         self._driving.release(now)
+        self._notify([f"e-stop released by {by}"])
         return "e-stop released; the robot stands still until a new command comes"
 
     def reset_odometry(self, now: float) -> None:
         """The odometry frame begins where the robot stands; a goal in the old one is dropped."""
-        self._odometry.reset()
+        self.heed(now)
+        self._events += self._odometry.reset()
         self._notify(self._driving.check_goal([], now))
 
     def farewell(self, on_exit: OnExit) -> bytes:
@@ -366,6 +366,8 @@ class Session:
                     self._commands.halt(now)
             elif isinstance(reading, PausedReading):
                 self._driving.begin()
+                if self._board.mode.running:  # again, within one read
+                    self._commands.halt(now)
                 self._supervisor.heard_paused(now, continues=reading.continues)
         if self._commands.current is not None:
             self._notify(self._driving.check_goal([], now))

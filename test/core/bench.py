@@ -3,11 +3,11 @@
 """A session and a simulated board on one workbench, wired to each other in simulated time."""
 
 from dataclasses import replace
+from typing import Any
 
 from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.helm import ControlMethod
-from omnibot_driver.core.inertial import ImuCorrection
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.core.odometry import OdometryEstimate, OdometrySettings
@@ -111,8 +111,10 @@ class Bench:
             assert self.now < end, f"no answer to {request.value} within {limit_s} s"
             self.run(TICK_S)
 
-    def configure(self, *, imu: ImuCorrection) -> None:
-        self.session.configure(replace(self._settings, imu=imu))
+    def configure(self, **changed: Any) -> None:
+        """Fields of SessionSettings; the others are as at first."""
+        self.session.configure(replace(self._settings, **changed), self.now)
+        self.settle()
 
     def written_since(self, mark: int) -> bytes:
         """What was written after the first ``mark`` writes."""

@@ -2,6 +2,8 @@
 
 """The e-stop: latched at once, repeated without end, ended by nothing but its release."""
 
+from unittest.mock import ANY
+
 import pytest
 from bench import EMERGENCY_STOP, OPENING, Bench
 from robots import drive_on, driving, estop
@@ -9,6 +11,8 @@ from robots import drive_on, driving, estop
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import StateChanged
 from omnibot_driver.core.supervisor import Request
+
+LATCHED_AND_RELEASED = ["e-stop latched by the driver", "e-stop released by the driver"]
 
 
 @pytest.fixture
@@ -93,12 +97,13 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> No
     for _ in range(8):
         drive_on(bench)
     assert bench.still()
-    assert [text for text in bench.notices if "~/reset" in text] == bench.notices
-    assert len(bench.notices) == 1
+    told = [*LATCHED_AND_RELEASED, ANY]
+    assert bench.notices == told
+    assert "~/reset" in bench.notices[-1]
     assert bench.ask(Request.RESET, 10.0).success
     drive_on(bench)
     assert not bench.still()
-    assert len(bench.notices) == 1
+    assert bench.notices == told
 
 
 def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
@@ -109,7 +114,15 @@ def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> N
         estop(bench, False)
         for _ in range(4):
             drive_on(bench)
-    assert bench.notices == []
+    assert bench.notices == 3 * LATCHED_AND_RELEASED
+
+
+def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) -> None:
+    """However often they say it."""
+    for active, by in ((True, "a topic"), (True, "a service"), (False, "Ann"), (False, "Bob")):
+        bench.session.estop(active, bench.now, by=by)
+        bench.settle()
+    assert bench.notices == ["e-stop latched by a topic", "e-stop released by Ann"]
 
 
 def test_an_estop_that_nobody_may_have_heard_says_so(bench: Bench) -> None:

@@ -11,7 +11,7 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.omnibot import OmniBot
 from omnibot_driver.core.session import Session
-from omnibot_driver.core.supervisor import Request
+from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 
 TICK_S = 0.01
@@ -51,3 +51,17 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(drives: bool
             session.tick(now)
     assert nothing_left > 1200
     assert told > 500
+
+
+def test_data_from_before_a_request_do_not_answer_it() -> None:
+    """Heard, but not yet heeded: running is only what runs afterwards."""
+    session, board = opened(), SimulatedBoard(BoardSettings(running=True))
+    for tick in range(200):
+        session.receive(board.step(), tick * TICK_S)
+    session.take_events()
+    session.hear(board.step(), 2.0)
+    session.request(Request.START, "asked", 2.0)
+    session.heed(2.0)
+    assert not any(isinstance(event, RequestDone) for event in session.take_events())
+    session.receive(board.step(), 2.01)
+    assert RequestDone("asked", True, "running (nominal)") in session.take_events()

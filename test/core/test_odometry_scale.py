@@ -23,7 +23,8 @@ def bench(odometry: OdometrySettings, **settings: object) -> Bench:
     )  # type: ignore[arg-type]
     made = Bench(board)
     made.session.configure(
-        SessionSettings(limits=SpeedLimits(), commands=CommandSettings(), odometry=odometry)
+        SessionSettings(limits=SpeedLimits(), commands=CommandSettings(), odometry=odometry),
+        made.now,
     )
     made.open()
     made.run_until_state("nominal")

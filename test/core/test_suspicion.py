@@ -6,8 +6,11 @@ import math
 
 import pytest
 from bench import Bench
+from trip import earth
 
-from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.board import PoseReading
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings, PoseFrame
+from omnibot_driver.core.omnibot.suspicion import MOST, Suspicion
 from omnibot_driver.simulator import BoardPose, BoardSettings, SimulatedBoard
 
 DRIVE = bytes.fromhex("FF FE 01 00 15 00 0E 00 C8")
@@ -65,3 +68,15 @@ def test_the_user_is_told_once_and_odom_goes_on_by_deltas() -> None:
     assert told.endswith("set the parameter `pose_byte_order` to little")
     pose, true = bench.odometry[-1].pose, bench.board.truth
     assert math.hypot(pose.x_m - true.x_m, pose.y_m - true.y_m) < 0.03
+
+
+def test_poses_that_never_make_sense_leave_nothing_behind() -> None:
+    """A robot that drove off from zero, read in the wrong byte order: deltas come for days."""
+    suspicion = Suspicion()
+    zero, absurd = PoseFrame(0.0, 0.0, 0.0, 1), PoseFrame(1e-30, 1e-30, 1e-30, 1)
+    suspicion.posed(zero, PoseReading(0.0, 0.0, 0.0), "big")
+    for _ in range(1000):
+        for _ in range(5):
+            suspicion.displaced(earth(0.01, 0.0))
+        suspicion.posed(absurd, PoseReading(0.0, 0.0, 0.0), "big")
+    assert len(suspicion._moved) <= MOST

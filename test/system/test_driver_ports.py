@@ -13,6 +13,7 @@ import pytest
 from driver_process import Driver
 from probe import Probe
 from sensor_msgs.msg import Imu
+from std_srvs.srv import SetBool
 
 from omnibot_driver.simulator import PtyBoard, SimulatedBoard
 
@@ -54,6 +55,21 @@ def test_an_unplugged_board_is_found_again(
     assert descriptors[0] == descriptors[1]
     assert driver.end(signal.SIGINT) == 0
     assert driver.output.count("lost") == 2
+
+
+def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(
+    start_driver: Start, probe_of: Start, tmp_path: Path
+) -> None:
+    """Not that the port takes nothing: there is none. The log tells who pressed it."""
+    link = tmp_path / "omnibot"
+    with PtyBoard(SimulatedBoard(), str(link)):
+        driver: Driver = start_driver(str(link), reconnect_interval=0.05)
+        probe: Probe = probe_of(driver)
+        probe.wait_for_state("nominal")
+    probe.wait_for_state("disconnected")
+    answer = probe.call(SetBool, "estop", data=True)
+    assert answer.message.endswith("the port is not open: the stop is sent as soon as it is")
+    driver.wait_for_line("e-stop latched by the service ~/estop")
 
 
 def test_a_second_driver_on_the_same_port_is_refused_and_told_why(

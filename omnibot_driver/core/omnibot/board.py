@@ -55,7 +55,9 @@ class OmniBot:
     def connect(self) -> None:
         """A new line: a new decoder, and no belief but in the board's counters."""
         self._decoder = FrameDecoder(
-            self._settings.pose_byte_order, ACCEL_COUNTS_PER_G[self._settings.imu.accel_range_g]
+            self._settings.pose_byte_order,
+            ACCEL_COUNTS_PER_G[self._settings.imu.accel_range_g],
+            10 / self._settings.baudrate,
         )
         self._decoder.statistics = self._statistics
         self._translation.connect()

@@ -36,7 +36,7 @@ from omnibot_driver.core.omnibot.frames import (
     measure,
 )
 from omnibot_driver.core.omnibot.lattice import Piece, read
-from omnibot_driver.core.omnibot.pauses import GAP_S, IDLE_S, TICK_BYTES, TICK_S, Pauses
+from omnibot_driver.core.omnibot.pauses import BYTE_S, GAP_S, IDLE_S, LATE_S, TICK_BYTES, Pauses
 
 SPOKEN_AGAINST: Final = 3.0
 """A content of this cost waits for what follows."""
@@ -60,22 +60,23 @@ class FrameDecoder:
     """Feed it what the line brings, in any chunking; it returns the frames that were in it."""
 
     def __init__(
-        self, pose_byte_order: ByteOrder = "big", accel_counts_per_g: float = 16384.0
+        self,
+        pose_byte_order: ByteOrder = "big",
+        accel_counts_per_g: float = 16384.0,
+        byte_s: float = BYTE_S,
     ) -> None:
         self.statistics = DecoderStatistics()
         self.skipped: list[int] = []
         """For each frame of the last call, how many bytes before it were none."""
         self.at_rest = False
         """All that came was understood, and pauses stand where they should."""
-        self._dropped = 0
+        self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
         self._expectation = Expectation(accel_counts_per_g)
         self._context = NOTHING_KNOWN
         self._held = bytearray()
         self._in_step = False
-        self._pauses = Pauses()
-        self._arrived = 0
-        self._wait_for = 0
+        self._pauses = Pauses(byte_s)
         self._last_arrival_s = -math.inf
 
     def feed(self, data: bytes, now: float) -> list[Frame]:
@@ -108,7 +109,7 @@ class FrameDecoder:
         None, and nothing is changed, where anything at all is to be considered.
         """
         pause_s = now - self._last_arrival_s
-        if not self.at_rest or len(data) != IMU_LENGTH or pause_s > TICK_S:
+        if not self.at_rest or len(data) != IMU_LENGTH or pause_s > LATE_S:
             return None
         taken = take_lone(data, self._context, self._expectation)
         if taken is None:
@@ -152,7 +153,7 @@ class FrameDecoder:
 
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
         """Take all that came, if frames were due and they are calm from the first to the last."""
-        if pause_s > TICK_S or len(data) > TICK_BYTES:
+        if pause_s > LATE_S or len(data) > TICK_BYTES:
             return False
         walk, order = Walk(self._context), self._pose_byte_order
         end, context = take_calm(data, 0, self._context, self._expectation, order, walk)

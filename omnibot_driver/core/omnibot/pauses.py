@@ -16,12 +16,13 @@ from omnibot_driver.core.omnibot.lattice import Gap
 
 IDLE_S: Final = 0.1
 """Longer than any adapter keeps a byte back (16 ms), and ten times the board's 10 ms tick."""
-TICK_S: Final = 0.011
+LATE_S: Final = 0.011
 """While the board runs its line is never idle for longer, unless bytes were lost; an adapter that
 collects bytes for longer shows pauses of its own."""
 GAP_S: Final = 4e-3
 """No frame is sent with such a pause in it."""
 BYTE_S: Final = 10 / 115200
+"""To send one, by the manual."""
 TICK_BYTES: Final = 14 + 9 + 15
 """All that one tick can bring. More at once after a pause means that we were late, not the line."""
 PAUSES_TO_TRUST: Final = 16
@@ -33,10 +34,11 @@ class Pauses:
 
     ``sharp``: as a rule, the first byte that comes after a pause begins a frame; ``between``: as a
     rule, a frame begins somewhere in what comes after it. ``certain``: both have held for so long
-    that once more changes nothing.
+    that once more changes nothing. ``byte_s``: how long the line takes for a byte.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, byte_s: float) -> None:
+        self._byte_s = byte_s
         self.gaps: list[Gap] = []
         self.doubt()
 
@@ -47,10 +49,10 @@ class Pauses:
 
     def add(self, pause_s: float, arrived: int, place: int) -> None:
         """Before the bytes that arrived now, and are to be held from this place on."""
-        if pause_s - arrived * BYTE_S <= GAP_S:
+        if pause_s - arrived * self._byte_s <= GAP_S:
             return
         sharp, between = self.sharp, self.between
-        if pause_s > TICK_S:
+        if pause_s > LATE_S:
             sharp = sharp or between  # bytes were lost here, and hardly whole frames
             self._trust(sharp=False, between=False)
         width = 1 if sharp else arrived
@@ -59,7 +61,7 @@ class Pauses:
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
         """What came after this pause began with a frame and ended with one."""
-        if pause_s - arrived * BYTE_S > GAP_S:
+        if pause_s - arrived * self._byte_s > GAP_S:
             self._trust(sharp=True, between=True)
 
     def compare(self, ends: Sequence[int]) -> None:
