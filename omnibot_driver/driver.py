@@ -100,9 +100,9 @@ def _main(args: list[str]) -> int:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         rclpy.get_default_context().on_shutdown(ending.begin)
         _run(ending, args)
-    except UnknownROSArgsError as error:  # its text is a list in brackets
-        unknown = str(error).strip("[]").replace("'", "").replace(",", "")
-        return _refuse(f"it does not know {unknown}; {USAGE}")
+    except UnknownROSArgsError as error:  # its text is Python's for a list
+        words = str(error)[1:-1].replace("', '", " ").strip("'")
+        return _refuse(f"it does not know {words}; {USAGE}")
     except NameValidationException as error:  # its second line is the name, which may be long
         why = str(error).partition(":\n")[0]
         return _refuse(f"{why}; give another namespace or name: --ros-args -r __ns:=/robot1")

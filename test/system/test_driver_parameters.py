@@ -66,15 +66,15 @@ def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -
 
 
 @pytest.mark.parametrize(
-    "arguments",
-    [["port:=sim://"], ["--ros-args", "port:=sim://"], ["--ros-args", "port:=sim://", "--", "-x"]],
+    "words", [["port:=sim://"], ["gyro_bias:=[0.1,0.0,0.0]", "axis_signs:=[1,-1,-1]"]]
 )
-def test_a_forgotten_p_is_told_with_what_to_write(arguments: list[str]) -> None:
+@pytest.mark.parametrize("before", [[], ["--ros-args"]])
+def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list[str]) -> None:
     """Alike on both sides of ``--ros-args``."""
-    command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
+    command = [sys.executable, "-m", "omnibot_driver.driver", *before, *words]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
     assert ended.returncode == 2
-    assert "it does not know port:=sim://" in ended.stderr
+    assert f"cannot start: it does not know {' '.join(words)}; parameters are" in ended.stderr
     assert ended.stderr.endswith("like this: --ros-args -p port:=/dev/ttyUSB0\n")
 
 
