@@ -38,7 +38,7 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "frame_prefix",
                 default_value="",
-                description="Put before every frame name, as it is: robot1/",
+                description="Text put before every frame name, without adding a slash: robot1/",
             ),
             DeclareLaunchArgument(
                 "xacro_args",

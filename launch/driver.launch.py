@@ -12,7 +12,7 @@ from launch_ros.substitutions import FindPackageShare
 OVERRIDES = {
     "port": (str, "Serial device or pyserial URL of the board"),
     "publish_tf": (bool, "Whether the driver publishes odom to base_link on /tf"),
-    "frame_prefix": (str, "Put before every frame name, as it is: robot1/"),
+    "frame_prefix": (str, "Text put before every frame name, without adding a slash: robot1/"),
 }
 
 

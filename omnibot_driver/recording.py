@@ -71,8 +71,9 @@ def _find_topic(url: str, path: Path, wanted: str) -> str:
     try:
         from rosbags.rosbag2 import Reader
     except ImportError as error:
-        raise _refusal(
-            url, "bags are read by the Python package rosbags: `pip install rosbags`"
+        raise ParameterError(
+            f"port '{url}' needs the Python library rosbags: `pip install --user"
+            " --break-system-packages rosbags` (in a virtual environment `pip install rosbags`)"
         ) from error
     if not path.exists():
         raise _refusal(url, f"there is no {path.absolute()}; give the folder of a bag")

@@ -33,5 +33,7 @@ def why_not_calibrate(phase: Phase, mode: Mode, current: Motion | None, *, measu
     if measuring:
         return "a calibration is under way; wait for its answer, then call again"
     if current is not None and not current.stands:
-        return f"the robot is commanded by {current.authority.value}; cease, then call again"
+        return (
+            f"the robot is commanded by {current.authority.value}; stop the sender, then call again"
+        )
     return ""

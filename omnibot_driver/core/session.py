@@ -399,4 +399,6 @@ class Session:
             raise CommandRefused(f"motion command refused: {reason}")
         self._commands.command(motion, now, expires_at=expires_at)
         if not motion.stands:
-            self._inertial.calibration.give_up("a motion command came in; cease, then call again")
+            self._inertial.calibration.give_up(
+                "a motion command came in; stop the sender, then call again"
+            )

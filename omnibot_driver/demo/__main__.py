@@ -2,6 +2,7 @@
 
 """Runs the demo: ``python -m omnibot_driver.demo``."""
 
+import argparse
 import io
 import json
 import math
@@ -9,7 +10,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Final
 
@@ -98,8 +99,14 @@ def run(seconds: float, asked_to_end: Callable[[], bool]) -> None:
         )
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Return 0 when the time is over or SIGINT or SIGTERM came, 1 on failure, 2 on wrong usage."""
+    argparse.ArgumentParser(
+        prog="demo",
+        description="Drives a square on a simulated board; no robot is needed.",
+        epilog="The environment variable DEMO_SECONDS says for how long; without it, until ctrl-C."
+        " Ends with 0, with 1 and a sentence on failure, with 2 on wrong usage.",
+    ).parse_args(arguments)
     given = os.environ.get("DEMO_SECONDS") or "inf"
     try:
         seconds = float(given)

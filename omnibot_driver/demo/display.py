@@ -18,7 +18,7 @@ HEADING: Final = """\
 state        imu odom lap   x m   y m yaw° x m/s y m/s rad/s x m/s y m/s rad/s"""
 
 CLOSING: Final = """
-The real robot is one parameter away:
+With the real robot: wheels off the ground first (docs/commissioning.md), then
   ros2 run omnibot_driver driver --ros-args -p port:=/dev/ttyUSB0"""
 
 
@@ -79,8 +79,9 @@ def report(drive: Drive) -> None:
     pose, true_pose = drive.pose, drive.true_pose
     error_mm = 1000 * math.dist((pose.x_m, pose.y_m), (true_pose.x_m, true_pose.y_m))
     error_deg = abs(_degrees(pose.yaw_rad - true_pose.yaw_rad))
+    laps = f"{drive.laps:g} lap{'' if drive.laps == 1.0 else 's'}"
     text = [
-        f"driven      {drive.way_m:.2f} m in {drive.seconds:.1f} s, {drive.laps:g} laps",
+        f"driven      {drive.way_m:.2f} m in {drive.seconds:.1f} s, {laps}",
         f"received    imu {drive.imu_hz:.1f} Hz, odom {drive.odom_hz:.1f} Hz",
         *(
             f"{name:<10}{p.x_m:8.3f} m {p.y_m:8.3f} m {_degrees(p.yaw_rad):7.1f}°"

@@ -36,7 +36,7 @@ class Robot:
         self.leg, self.driven_m, self.pose = 0, 0.0, Pose()
         self.points: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
         self.imu, self.odom = Rate(time.monotonic()), Rate(time.monotonic())
-        self._state, self._estop = "no driver", False
+        self._state, self._estop = "starting", False
         self._commanded = self._measured = HALT
         self._stood_for = 0
         rclpy.init(

@@ -179,7 +179,8 @@ FRAMES: Final = (
         "frame_prefix",
         "",
         "",
-        "Put before every frame name as it is, like robot_state_publisher's; for example robot1/.",
+        "Text put before every frame name, without adding a slash, like robot_state_publisher's;"
+        " for example robot1/.",
         fixed=True,
     ),
     Parameter(

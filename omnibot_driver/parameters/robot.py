@@ -67,7 +67,7 @@ ROBOT: Final = (
         "odom_linear_scale",
         1.0,
         "m/m",
-        "True way over the way that the board tells, which takes its wheels for nominal ones;"
+        "True distance divided by the distance that the board reports (it assumes nominal wheels);"
         " calibrate geometry finds it.",
         low=0.5,
         high=2.0,
@@ -163,7 +163,8 @@ IMU: Final = (
         "auto_gyro_bias",
         False,
         "",
-        "Refine the gyro's bias slowly whenever the robot stands still. Not where the floor turns.",
+        "Refine the gyro's bias slowly whenever the robot stands still. Do not use it on what turns"
+        " itself (ship, turntable).",
     ),
     Parameter(
         "calibration_file",

@@ -100,5 +100,5 @@ def _chance(text: str) -> float:
     except ValueError:
         chance = -1.0
     if not 0.0 <= chance <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no chance: give a number from 0 to 1")
+        raise argparse.ArgumentTypeError(f"{text!r} is no probability: give a number from 0 to 1")
     return chance

@@ -18,5 +18,7 @@ def need(module: str) -> ModuleType:
         if error.name != module.partition(".")[0]:
             raise
         raise ToolError(
-            f"this tool needs the Python library {error.name}: `pip install {error.name}`"
+            f"this tool needs the Python library {error.name}: `pip install --user"
+            f" --break-system-packages {error.name}` (in a virtual environment `pip install"
+            f" {error.name}`)"
         ) from error

@@ -54,7 +54,7 @@ def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
     """Refused at once, and given up when the command comes later."""
     bench = running()
     bench.session.command_twist(BodyTwist(0.3, 0.0, 0.0), bench.now)
-    with pytest.raises(RequestRefused, match="commanded by cmd_vel; cease"):
+    with pytest.raises(RequestRefused, match="commanded by cmd_vel; stop the sender"):
         bench.session.calibrate_gyro("token", bench.now)
     bench.run(2.0)
     bench.session.calibrate_gyro("token", bench.now)

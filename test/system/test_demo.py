@@ -23,6 +23,7 @@ import omnibot_driver
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.demo import display, square
+from omnibot_driver.demo.__main__ import main
 
 PATIENCE_S = 60.0
 ROOT = Path(omnibot_driver.__file__).parents[1]
@@ -149,7 +150,7 @@ def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
         assert marked(mark) == []
     error = re.search(r"^pose error +(\d+\.\d) mm, (\d+\.\d\d)°$", output, re.MULTILINE)
     rates = re.search(r"imu (\d+\.\d) Hz, odom (\d+\.\d) Hz", output)
-    driven = re.search(r"driven +(\d+\.\d+) m in .* s, ([\d.]+) laps", output)
+    driven = re.search(r"driven +(\d+\.\d+) m in .* s, ([\d.]+) laps?", output)
     assert error, output
     assert rates, output
     assert driven, output
@@ -157,7 +158,29 @@ def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
     assert float(error[2]) < 2.0
     assert float(rates[1]) / float(rates[2]) == pytest.approx(4.0, rel=0.1)
     assert float(driven[2]) == pytest.approx(float(driven[1]) / 4, abs=0.5)
-    assert "/dev/ttyUSB0" in output
+    assert "no driver" not in output
+    closing = output[output.index("pose error") :]
+    assert closing.index("wheels off the ground first") < closing.index("/dev/ttyUSB0")
+
+
+@pytest.mark.parametrize(("laps", "told"), [(0.0, "0 laps"), (1.0, "1 lap"), (1.25, "1.25 laps")])
+def test_laps_are_told_in_english(
+    laps: float, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One is no plural."""
+    display.report(
+        display.Drive(
+            seconds=20.0,
+            way_m=4.0 * laps,
+            laps=laps,
+            imu_hz=100.0,
+            odom_hz=25.0,
+            pose=Pose(),
+            true_pose=Pose(),
+            points=[],
+        )
+    )
+    assert f" s, {told}\n" in capsys.readouterr().out
 
 
 def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -231,6 +254,16 @@ def test_wrong_seconds_are_refused_in_one_sentence(value: str) -> None:
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 2
     assert output == f"DEMO_SECONDS must be a number above 0, not {value!r}\n"
+
+
+def test_an_argument_that_it_does_not_know_drives_nothing(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """It is refused with exit code 2, and named."""
+    with pytest.raises(SystemExit) as ended:
+        main(["port:=/dev/ttyUSB0"])
+    assert ended.value.code == 2
+    assert "unrecognized arguments: port:=/dev/ttyUSB0" in capsys.readouterr().err
 
 
 def test_without_ros_it_says_so_in_one_sentence() -> None:

@@ -83,8 +83,8 @@ def test_without_a_driver_one_sentence_says_how_to_start_one(
 def test_in_a_wrong_namespace_the_drivers_that_are_there_are_named(
     fake: Probe, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With the option that leads to the first of them."""
-    said = sentence(capsys, "--once", "--namespace", "elsewhere", *QUICKLY)
+    """With the option that leads to the first of them; a slash at its end is no matter."""
+    said = sentence(capsys, "--once", "--namespace", "/elsewhere/", *QUICKLY)
     assert "no driver /elsewhere/omnibot_driver here, but /fake/omnibot_driver" in said
     assert said.endswith("try --namespace /fake")
 

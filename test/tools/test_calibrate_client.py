@@ -23,9 +23,9 @@ from omnibot_driver.tools.needs import ToolError
 def test_a_wrong_namespace_names_the_drivers_there_are(
     rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With exit code 1."""
+    """With exit code 1; a slash at its end is no matter."""
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
-    assert main(["imu", "--yes", "--namespace", "nowhere"]) == 1
+    assert main(["imu", "--yes", "--namespace", "/nowhere/"]) == 1
     said = capsys.readouterr().err
     assert "no driver is running in the namespace /nowhere, but" in said
     assert f"/{rigged.driver.namespace}/omnibot_driver" in said

@@ -20,6 +20,7 @@ from surveyor import Surveyor
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.tools.calibrate import geometry
+from omnibot_driver.tools.calibrate.arguments import command_line
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.geometry_fit import Reading, fit, rims_of, rolled
 from omnibot_driver.tools.calibrate.log import Column
@@ -33,9 +34,7 @@ SIGMA = np.array([0.002, 0.002, math.radians(1.0)])
 
 
 def arguments(*words: str) -> argparse.Namespace:
-    parser = argparse.ArgumentParser()
-    geometry.add_arguments(parser)
-    return parser.parse_args(words)
+    return command_line().parse_args(["geometry", *words])
 
 
 def paths() -> list[tuple[str, Column, bool]]:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.tools.calibrate.allan import allan, noise
-from omnibot_driver.tools.calibrate.files import write
+from omnibot_driver.tools.calibrate.files import draw
 from omnibot_driver.tools.calibrate.imu import result
 from omnibot_driver.tools.calibrate.log import Imu, Log
 from omnibot_driver.tools.calibrate.rest import rest, still
@@ -103,7 +103,7 @@ def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
     imu = sensor(120.0)
     picture = tmp_path / "imu.png"
     now = {name: parameter.default for name, parameter in BY_NAME.items()}
-    write(result(rest(imu), imu, now, 9.80665), tmp_path / "robot.yaml", picture)
+    draw(result(rest(imu), imu, now, 9.80665), tmp_path / "robot.yaml", picture)
     assert picture.stat().st_size < 170_000
 
 

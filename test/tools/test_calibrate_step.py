@@ -2,7 +2,6 @@
 
 """``calibrate step`` with a real driver: a planted motor, found, told, drawn and written."""
 
-import argparse
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +12,7 @@ from omnibot_driver import calibration
 from omnibot_driver.parameters import PARAMETERS
 from omnibot_driver.simulator.motors import MotorConstants
 from omnibot_driver.tools.calibrate import step
+from omnibot_driver.tools.calibrate.arguments import command_line
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.needs import ToolError
 
@@ -53,11 +53,10 @@ def test_a_planted_motor_is_found(
 
 def still(answer: str, *words: str) -> None:
     """Run with a robot that can do nothing but say its parameters."""
-    parser = argparse.ArgumentParser()
-    step.add_arguments(parser)
     parameters = {parameter.name: parameter.default for parameter in PARAMETERS}
     robot = SimpleNamespace(parameters=parameters)
-    step.run(robot, Console(read=lambda _question: answer), parser.parse_args(words))
+    arguments = command_line().parse_args(["step", *words])
+    step.run(robot, Console(read=lambda _question: answer), arguments)
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a tool says when a library is missing."""
+"""What a tool says, and still does, when a library is missing."""
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
+import omnibot_driver
 from omnibot_driver.tools.needs import ToolError, need
+
+ROOT = Path(omnibot_driver.__file__).parents[1]
 
 
 def test_a_library_that_is_there_is_imported() -> None:
@@ -16,5 +22,28 @@ def test_a_library_that_is_there_is_imported() -> None:
 
 def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
     """Its own name, not the submodule's."""
-    with pytest.raises(ToolError, match="library no_such_library: `pip install no_such_library`"):
+    with pytest.raises(ToolError) as refusal:
         need("no_such_library.part")
+    assert str(refusal.value) == (
+        "this tool needs the Python library no_such_library: `pip install --user"
+        " --break-system-packages no_such_library` (in a virtual environment `pip install"
+        " no_such_library`)"
+    )
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["tools.calibrate", "tools.calibrate step", "tools.report", "tools.monitor", "demo"],
+)
+def test_help_needs_no_library(words: str) -> None:
+    """Nor ROS: a Python without site-packages has neither."""
+    module, *subcommand = words.split()
+    done = subprocess.run(
+        [sys.executable, "-ES", "-m", f"omnibot_driver.{module}", *subcommand, "--help"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("usage: ")

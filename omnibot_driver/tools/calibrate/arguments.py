@@ -1,12 +1,153 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Numbers on a command line."""
+"""The command line. Must not import what the calibrations need: ``--help`` works without it."""
 
 import argparse
 import math
+from typing import Final
+
+from omnibot_driver.core.imu import STANDARD_GRAVITY
+from omnibot_driver.tools.calibrate.seen import WHEELS
+
+PARTS: Final = ("board", "wheels", "imu")
 
 
-def positive(text: str) -> float:
+def command_line() -> argparse.ArgumentParser:
+    """Of all subcommands; ends with 2 and a sentence on wrong usage."""
+    parser = argparse.ArgumentParser(
+        prog="calibrate",
+        description="Finds what the driver's parameters ought to be, with uncertainties.",
+    )
+    parser.epilog = (
+        "WHAT --help lists the options. ROS's own arguments follow --ros-args. Ends with 0, with 1"
+        " and a sentence when nothing was found, with 2 on wrong usage, with 130 when interrupted."
+        " See docs/calibrate.md."
+    )
+    subparsers = parser.add_subparsers(dest="subcommand", required=True, metavar="WHAT")
+    for name, (summary, add_arguments) in SUBCOMMANDS.items():
+        subparser = subparsers.add_parser(name, help=summary, description=summary)
+        add_arguments(subparser)
+        subparser.add_argument("--yes", action="store_true", help="yes to every question")
+        subparser.add_argument(
+            "--output",
+            metavar="FILE",
+            help="YAML file to write into (default: the driver's calibration_file, else"
+            " omnibot_calibration.yaml here)",
+        )
+        subparser.add_argument(
+            "--plot",
+            metavar="FILE",
+            help=f"picture, or a folder for it (default: calibrate_{name}.png here)",
+        )
+        subparser.add_argument(
+            "--apply",
+            action="store_true",
+            help="also set what was found in the running driver, as far as it may change there",
+        )
+        subparser.add_argument(
+            "--namespace", default="", metavar="NAME", help="the driver's, such as /robot1"
+        )
+    return parser
+
+
+def _commission(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        choices=PARTS,
+        default=PARTS,
+        metavar="PART",
+        help=f"some of {', '.join(PARTS)} (default: all)",
+    )
+
+
+def _imu(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--minutes",
+        type=_positive,
+        default=1.0,
+        help="to rest (default 1; for a wandering bias ten and more)",
+    )
+    parser.add_argument(
+        "--gravity",
+        type=_positive,
+        default=STANDARD_GRAVITY,
+        metavar="M/S²",
+        help="where you are (default %(default)s)",
+    )
+
+
+def _scale(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--speed", type=_positive, default=0.25, help="fastest, m/s (default %(default)s)"
+    )
+    parser.add_argument(
+        "--turning", type=_positive, default=0.5, help="fastest, rad/s (default %(default)s)"
+    )
+    parser.add_argument(
+        "--levels", type=_whole, default=3, help="speeds along each axis (default %(default)s)"
+    )
+    parser.add_argument(
+        "--seconds", type=_positive, default=2.0, help="at each speed (default %(default)s)"
+    )
+
+
+def _geometry(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--side", type=_positive, default=1.0, help="of lines and squares, m (default %(default)s)"
+    )
+    parser.add_argument(
+        "--turns", type=_whole, default=3, help="on the spot, each way (default %(default)s)"
+    )
+    parser.add_argument(
+        "--speed", type=_positive, default=0.2, help="fastest, m/s (default %(default)s)"
+    )
+    parser.add_argument(
+        "--turning", type=_positive, default=0.5, help="fastest, rad/s (default %(default)s)"
+    )
+    parser.add_argument(
+        "--tape",
+        type=_positive,
+        default=2.0,
+        help="how exact your tape is, mm (default %(default)s)",
+    )
+    parser.add_argument(
+        "--angle",
+        type=_positive,
+        default=1.0,
+        help="how exactly you read a heading, degrees (default %(default)s)",
+    )
+    parser.add_argument(
+        "--without-squares", action="store_true", help="lines and turns only: faster, less certain"
+    )
+
+
+def _step(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--wheels", default=WHEELS, help=f"some of {WHEELS} (default: all)")
+    parser.add_argument(
+        "--speeds",
+        type=float,
+        nargs=2,
+        default=(4.0, 12.0),
+        metavar=("SLOW", "FAST"),
+        help="of a wheel, in rad/s (default 4 12)",
+    )
+    parser.add_argument(
+        "--hold", type=_positive, default=1.5, help="seconds at each speed (default 1.5)"
+    )
+    parser.add_argument(
+        "--steps", type=_whole, default=8, help="up and down together, each direction (default 8)"
+    )
+    parser.add_argument(
+        "--gains",
+        type=_positive,
+        nargs=3,
+        metavar=("K_FF", "K_VP", "K_VI"),
+        help="what the firmware was built with (default: the manual's 40 10 1.5)",
+    )
+
+
+def _positive(text: str) -> float:
     """A number above 0."""
     try:
         value = float(text)
@@ -17,8 +158,32 @@ def positive(text: str) -> float:
     return value
 
 
-def whole(text: str) -> int:
+def _whole(text: str) -> int:
     """A whole number from 1."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1")
     return int(text)
+
+
+SUBCOMMANDS: Final = {
+    "commission": (
+        "which way round everything is: a guided walk, wheels off the ground",
+        _commission,
+    ),
+    "imu": (
+        "gyro bias and noise, accelerometer level, Allan deviation: the robot rests",
+        _imu,
+    ),
+    "scale": (
+        "linear_scale and angular_scale from commanded and measured speeds: the robot drives",
+        _scale,
+    ),
+    "geometry": (
+        "wheel and base radius by your tape measure: the robot drives lines and squares",
+        _geometry,
+    ),
+    "step": (
+        "how each wheel follows a step, its motor, better gains: wheels off the ground",
+        _step,
+    ),
+}

@@ -43,7 +43,6 @@ from omnibot_driver.tools.calibrate.seen import (
 )
 from omnibot_driver.tools.needs import ToolError
 
-PARTS: Final = ("board", "wheels", "imu")
 TRIES: Final = 3
 JOG_S: Final = 2.0
 WHEEL_RADPS: Final = 2.0
@@ -58,18 +57,6 @@ TURN_BY_HAND_S: Final = 5.0
 SETTLING_S: Final = 0.5
 
 T = TypeVar("T")
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to leave out."""
-    parser.add_argument(
-        "--only",
-        nargs="+",
-        choices=PARTS,
-        default=PARTS,
-        metavar="PART",
-        help=f"some of {', '.join(PARTS)} (default: all)",
-    )
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:

@@ -56,7 +56,7 @@ def result_of(found: Found) -> Result:
         words = " ".join(f"{angle:.4f}" for angle in angles)
         notes.append(
             "The driver does not turn the IMU's axes, the robot's description does: start"
-            f" description.launch.py with xacro_args:=\"imu_rpy:='{words}'\""
+            f" description.launch.py with\n  xacro_args:=\"imu_rpy:='{words}'\""
         )
     return Result(
         findings=findings,

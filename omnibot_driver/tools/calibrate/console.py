@@ -43,6 +43,10 @@ class Console:
         """A paragraph."""
         self.rich.print(text, markup=False)
 
+    def line(self, text: str) -> None:
+        """One line that is meant to be copied, however long it is."""
+        self.rich.print(text, markup=False, soft_wrap=True)
+
     def confirm(self, question: str) -> None:
         """Raises ToolError unless the answer is yes."""
         if not self.asks(question):

@@ -52,23 +52,31 @@ def picture_file(given: str | None, subcommand: str) -> Path:
     return path
 
 
-def write(result: Result, output: Path, picture: Path) -> None:
-    """Both files; raises ToolError."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9, 6), layout="constrained")
-    FigureCanvasAgg(figure)
-    result.draw(figure)
+def save(result: Result, output: Path) -> None:
+    """What was found; raises ToolError, and then the file is as it was."""
     try:
         for name, value in result.parameters.items():
             BY_NAME[name].check(value)
         if result.parameters or result.record:
             calibration.save(output, {**result.record, **result.parameters})
-        picture.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(picture, dpi=110)
     except (OSError, ParameterError) as error:
         raise ToolError(f"the result cannot be written: {error}") from error
+
+
+def draw(result: Result, output: Path, picture: Path) -> None:
+    """The picture; raises ToolError, which says that the result is saved all the same."""
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(9, 6), layout="constrained")
+        FigureCanvasAgg(figure)
+        result.draw(figure)
+        picture.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(picture, dpi=110)
+    except Exception as error:  # whatever it is, it costs the picture alone
+        saved = f"saved to {output}, but " if result.parameters or result.record else ""
+        raise ToolError(f"{saved}{picture} is not drawn: {error}") from error
 
 
 def _values(content: Any) -> list[Any]:

@@ -12,7 +12,6 @@ import numpy as np
 
 from omnibot_driver.core.se2 import Pose
 from omnibot_driver.parameters import BY_NAME
-from omnibot_driver.tools.calibrate.arguments import positive, whole
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.geometry_figure import draw
 from omnibot_driver.tools.calibrate.geometry_fit import Geometry, Reading, fit, rolled
@@ -39,37 +38,6 @@ class Drive:
     name: str
     places: list[Pose]
     heading: bool
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Of this subcommand alone."""
-    parser.add_argument(
-        "--side", type=positive, default=1.0, help="of lines and squares, m (default %(default)s)"
-    )
-    parser.add_argument(
-        "--turns", type=whole, default=3, help="on the spot, each way (default %(default)s)"
-    )
-    parser.add_argument(
-        "--speed", type=positive, default=0.2, help="fastest, m/s (default %(default)s)"
-    )
-    parser.add_argument(
-        "--turning", type=positive, default=0.5, help="fastest, rad/s (default %(default)s)"
-    )
-    parser.add_argument(
-        "--tape",
-        type=positive,
-        default=2.0,
-        help="how exact your tape is, mm (default %(default)s)",
-    )
-    parser.add_argument(
-        "--angle",
-        type=positive,
-        default=1.0,
-        help="how exactly you read a heading, degrees (default %(default)s)",
-    )
-    parser.add_argument(
-        "--without-squares", action="store_true", help="lines and turns only: faster, less certain"
-    )
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:

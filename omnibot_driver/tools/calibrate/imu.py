@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from omnibot_driver.core.imu import STANDARD_GRAVITY
-from omnibot_driver.tools.calibrate.arguments import positive
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.log import Imu
 from omnibot_driver.tools.calibrate.rest import Rest, rest, still
@@ -25,23 +23,6 @@ DRAWN: Final = 1000
 """Readings at the most; of more the picture is larger, not clearer."""
 GRAVITY_SIGMA: Final = 0.01
 """m/s²: how well a user knows the local value."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Of this subcommand alone."""
-    parser.add_argument(
-        "--minutes",
-        type=positive,
-        default=1.0,
-        help="to rest (default 1; for a wandering bias ten and more)",
-    )
-    parser.add_argument(
-        "--gravity",
-        type=positive,
-        default=STANDARD_GRAVITY,
-        metavar="M/S²",
-        help="where you are (default %(default)s)",
-    )
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:

@@ -56,7 +56,7 @@ def connect(
         raise ToolError(f"ROS does not understand its arguments: {error}") from error
     try:
         try:
-            node = Node("calibrate", namespace=namespace, context=context)
+            node = Node("calibrate", namespace=namespace.rstrip("/"), context=context)
         except InvalidNamespaceException as error:
             raise ToolError(f"'{namespace}' is no namespace: {error}") from error
         try:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from omnibot_driver.tools.calibrate.arguments import positive, whole
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.motion import Bounds, stairs
 from omnibot_driver.tools.calibrate.rest import rest, still
@@ -27,22 +26,6 @@ GYRO_TOLERANCE: Final = 0.03
 """MPU-6050 product specification, section 6.1: sensitivity scale factor tolerance."""
 UNLIKE: Final = 4.0
 """Standard deviations by which two scales differ that are not the same."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Of this subcommand alone."""
-    parser.add_argument(
-        "--speed", type=positive, default=0.25, help="fastest, m/s (default %(default)s)"
-    )
-    parser.add_argument(
-        "--turning", type=positive, default=0.5, help="fastest, rad/s (default %(default)s)"
-    )
-    parser.add_argument(
-        "--levels", type=whole, default=3, help="speeds along each axis (default %(default)s)"
-    )
-    parser.add_argument(
-        "--seconds", type=positive, default=2.0, help="at each speed (default %(default)s)"
-    )
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:

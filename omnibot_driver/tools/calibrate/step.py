@@ -11,45 +11,17 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from omnibot_driver.core.board import Vector3
-from omnibot_driver.tools.calibrate.arguments import positive, whole
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.motion import Bounds, Law, stairs
 from omnibot_driver.tools.calibrate.result import Result
+from omnibot_driver.tools.calibrate.seen import WHEELS
 from omnibot_driver.tools.calibrate.step_fit import Step, fit_wheel, steps_of
 from omnibot_driver.tools.calibrate.step_result import result_of
 from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, TICK_S, Gains
 from omnibot_driver.tools.needs import ToolError
 
-WHEELS: Final = "ABC"
 RUN_UP_S: Final = 2.0
 """The first of two speeds is reached from rest, against friction; that is not what is looked at."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which wheels, how fast, how often; and the gains that the firmware was built with."""
-    parser.add_argument("--wheels", default=WHEELS, help=f"some of {WHEELS} (default: all)")
-    parser.add_argument(
-        "--speeds",
-        type=float,
-        nargs=2,
-        default=(4.0, 12.0),
-        metavar=("SLOW", "FAST"),
-        help="of a wheel, in rad/s (default 4 12)",
-    )
-    parser.add_argument(
-        "--hold", type=positive, default=1.5, help="seconds at each speed (default 1.5)"
-    )
-    parser.add_argument(
-        "--steps", type=whole, default=8, help="up and down together, each direction (default 8)"
-    )
-    parser.add_argument(
-        "--gains",
-        type=positive,
-        nargs=3,
-        default=(MANUAL.feed_forward, MANUAL.proportional, MANUAL.integral),
-        metavar=("K_FF", "K_VP", "K_VI"),
-        help="what the firmware was built with (default: the manual's 40 10 1.5)",
-    )
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
@@ -61,7 +33,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
         f"Each wheel will turn alone, at up to {levels[1]:.1f} rad/s, {2 * seconds:.0f} s for each."
         " Is the robot on a box, all wheels off the ground, nothing near them?"
     )
-    now = Gains(*arguments.gains)
+    now = Gains(*arguments.gains) if arguments.gains else MANUAL
     found = []
     for wheel in wheels:
         steps: list[Step] = []

@@ -71,7 +71,7 @@ class Feed:
             )
             self._node = Node(
                 f"monitor_{os.getpid()}",
-                namespace=namespace,
+                namespace=namespace.rstrip("/"),
                 context=self._context,
                 enable_rosout=False,
                 start_parameter_services=False,

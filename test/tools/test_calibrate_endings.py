@@ -1,0 +1,111 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What minutes of measurement leave, whatever fails after them."""
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from omnibot_driver import calibration
+from omnibot_driver.tools.calibrate import imu, robot
+from omnibot_driver.tools.calibrate.__main__ import main
+from omnibot_driver.tools.calibrate.result import Finding, Result
+
+FOUND = {"linear_scale": 71.3}
+
+Ending = Callable[..., int]
+
+
+def fine(figure: Any) -> None:
+    figure.subplots().plot([1, 2])
+
+
+def failing(_figure: Any) -> None:
+    raise ValueError("a picture that cannot be drawn")
+
+
+def failing_late(figure: Any) -> None:
+    """The library reads formulas when it saves."""
+    figure.subplots().set_title("$\\frac{$")
+
+
+@pytest.fixture
+def ending(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Ending:
+    """Run ``calibrate``, which has measured already: its exit code."""
+
+    @contextmanager
+    def connect(*_arguments: object) -> Iterator[SimpleNamespace]:
+        yield SimpleNamespace(parameters={"calibration_file": ""}, driver="/omnibot_driver")
+
+    def end(
+        *words: str,
+        draw: Callable[[Any], None] = fine,
+        found: dict[str, float] = FOUND,
+        folder: Path = tmp_path,
+    ) -> int:
+        findings = [Finding(name=name, value=value) for name, value in found.items()]
+        result = Result(findings=findings, parameters=found, draw=draw)
+        monkeypatch.setattr(imu, "run", lambda *_: result)
+        files = ["--output", str(folder / "robot.yaml"), "--plot", str(tmp_path / "imu.svg")]
+        return main(["imu", *files, *words])
+
+    monkeypatch.setattr(robot, "connect", connect)
+    return end
+
+
+def test_all_is_well(ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What was found is told, saved and drawn."""
+    assert ending() == 0
+    assert calibration.load(tmp_path / "robot.yaml") == FOUND
+    assert "<svg" in (tmp_path / "imu.svg").read_text()
+    assert "71.3" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("draw", [failing, failing_late])
+def test_a_picture_that_cannot_be_drawn_costs_the_picture_alone(
+    draw: Callable[[Any], None], ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The result is saved, and the sentence says so."""
+    assert ending(draw=draw) == 1
+    assert calibration.load(tmp_path / "robot.yaml") == FOUND
+    said = capsys.readouterr()
+    assert f"saved to {tmp_path}/robot.yaml, but {tmp_path}/imu.svg is not drawn: " in said.err
+    assert "71.3" in said.out
+
+
+def test_a_file_that_cannot_be_written_costs_the_file_alone(
+    ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The table is shown, so that the figures can be copied."""
+    assert ending(found={"linear_scale": 1e9}) == 1
+    assert not (tmp_path / "robot.yaml").exists()
+    said = capsys.readouterr()
+    assert "parameter 'linear_scale' must be" in said.err
+    assert "1e+09" in said.out
+
+
+def test_a_broken_pipe_loses_nothing(
+    ending: Ending, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever read along has gone before the table comes."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w") as gone:
+        monkeypatch.setattr(sys, "stdout", gone)
+        assert ending() == 1
+    assert calibration.load(tmp_path / "robot.yaml") == FOUND
+
+
+def test_what_is_to_be_copied_stands_on_one_line(
+    ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """However long the path is: a shell would take two halves for two words."""
+    folder = tmp_path / ("a_long_name_" * 12)
+    assert ending(folder=folder) == 0
+    assert f"  -p calibration_file:={folder}/robot.yaml" in capsys.readouterr().out.splitlines()
