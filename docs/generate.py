@@ -25,6 +25,11 @@ Give them one by one (`--ros-args -p max_linear_speed:=0.3`) or in a file:
 runs (`ros2 param set /omnibot_driver max_linear_speed 0.3`) and count at once; *fixed* ones are
 given at the start. An unknown name, a wrong type or a value out of its range is refused with a
 sentence that says what would be right.
+
+In an array of doubles every element has a decimal point, `[0.1, 0.0, 0.0]`: ROS itself refuses a
+mixed one, `[0.1, 0, 0]`. A word such as `on` or `no` that is meant as a string is put in quotes.
+A parameter file begins with `/**:`; if its first line names another node or namespace, ROS passes
+it over without a word.
 """
 TYPES: Final = {bool: "bool", int: "int", float: "double", str: "string"}
 

@@ -3,7 +3,7 @@
 """The calibration file: what was measured of this robot, in YAML, read at the start, written whole
 or not at all.
 
-It may hold other names as well, which are left as they are.
+It may hold other names as well, which are left as they are; comments in it do not survive a save.
 """
 
 import contextlib
@@ -34,6 +34,19 @@ NAMES: Final = (
     "control_method",
 )
 """What is taken from the file; each is a parameter."""
+RECORDED: Final = ("imu_rpy", "step")
+"""What the tool calibrate writes beside them, for people."""
+
+
+def locate(file: str) -> Path:
+    """Where this file is, ``~`` resolved. Raises ParameterError for a home that nobody has."""
+    try:
+        return Path(file).expanduser()
+    except RuntimeError as error:
+        raise ParameterError(
+            f"the calibration_file {file} cannot be found: there is no such home folder;"
+            " give the whole path"
+        ) from error
 
 
 def load(path: Path) -> dict[str, Value]:
@@ -48,12 +61,19 @@ def load(path: Path) -> dict[str, Value]:
         raise _bad(path, f"is wrong ({error})") from error
 
 
+def names(path: Path) -> list[str]:
+    """All that is in the file, read from it or not; nothing where there is no file yet."""
+    return [str(name) for name in _read(path)]
+
+
 def save(path: Path, values: Mapping[str, Any]) -> None:
     """Put these values into the file and leave the others. Raises ParameterError or OSError.
 
-    Whoever reads it meanwhile, or loses power, has the old file or the new one.
+    Whoever reads it meanwhile, or loses power, has the old file or the new one. Comments in it do
+    not survive; a symbolic link does.
     """
     content = {**_read(path), **values}
+    path = path.resolve()
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, name = tempfile.mkstemp(prefix=path.name, dir=path.parent)
     try:

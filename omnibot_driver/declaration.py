@@ -33,7 +33,7 @@ def declare(node: Node) -> dict[str, Any]:
     }
     values = parameters.check_all(given)
     if file := values["calibration_file"]:
-        found = calibration.load(Path(str(file)).expanduser())
+        found = _calibration(node, calibration.locate(str(file)))
         values = parameters.check_all({**given, **found})
     for parameter in parameters.PARAMETERS:
         node.declare_parameter(
@@ -46,6 +46,28 @@ def declare(node: Node) -> dict[str, Any]:
 def ours(changed: list[rclpy.Parameter]) -> dict[str, Any]:
     """The values among these that are the driver's own."""
     return {item.name: item.value for item in changed if item.name in parameters.BY_NAME}
+
+
+def _calibration(node: Node, path: Path) -> dict[str, parameters.Value]:
+    """What the file gives, and a word on it: a file that is not the one meant looks like none."""
+    found, names = calibration.load(path), calibration.names(path)
+    unread = [name for name in names if name not in calibration.NAMES + calibration.RECORDED]
+    if not names:
+        node.get_logger().warning(
+            f"there is no calibration_file {path} yet: nothing of it is applied; check the path,"
+            " or call ~/calibrate_gyro, which writes it"
+        )
+    if unread:
+        nearest = [
+            f"{name} (the nearest that is: {parameters.nearest(name, calibration.NAMES)})"
+            for name in unread
+        ]
+        node.get_logger().warning(
+            f"the calibration_file {path} holds what is not read from it: {', '.join(nearest)}"
+        )
+    if found:
+        node.get_logger().info(f"the calibration_file {path} gives {', '.join(found)}")
+    return found
 
 
 def _check(changed: list[rclpy.Parameter]) -> SetParametersResult:

@@ -16,6 +16,15 @@ from omnibot_driver.output import UnblockedOutput
 STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 LONGEST_END_S: Final = 4.0
 USAGE: Final = "parameters are given like this: --ros-args -p port:=/dev/ttyUSB0"
+HELP: Final = f"""\
+usage: ros2 run omnibot_driver driver [--ros-args -p NAME:=VALUE ... --params-file FILE]
+
+The driver of an OmniBot: publishes what its board measures, and drives it as it is commanded.
+
+{USAGE[0].upper()}{USAGE[1:]}
+Without a robot: --ros-args -p port:=sim://
+config/driver.yaml has every parameter, with its default and what it may be; so does
+docs/parameters.md. README.md has the topics and services."""
 SETUP: Final = (
     "ROS 2 is not set up in this shell, or a library is not installed: `source"
     " /opt/ros/jazzy/setup.bash`, then `rosdep install --from-paths src`"
@@ -56,16 +65,24 @@ class Ending:
 def main(args: list[str] | None = None) -> int:
     """Run the driver until SIGINT, SIGTERM, a shutdown of its context or a defect.
 
-    Returns the exit code: 0 when asked to end, 1 after a defect, 2 if it cannot start. The main
-    thread only waits, so a signal is heard however busy the executor is, and a second one cannot
-    break into the shutdown.
+    Returns the exit code: 0 when asked to end, or for help; 1 after a defect, 2 if it cannot start.
+    The main thread only waits, so a signal is heard however busy the executor is, and a second one
+    cannot break into the shutdown.
     """
+    args = sys.argv if args is None else args
+    if {"-h", "--help"}.intersection(args[1:]):
+        print(HELP)
+        return 0
     with UnblockedOutput():
         try:
-            return _main(sys.argv if args is None else args)
+            return _main(args)
         except ModuleNotFoundError as error:
-            print(f"omnibot_driver cannot start: {error}; {SETUP}", file=sys.stderr)
-            return 2
+            return _refuse(f"{error}; {SETUP}")
+
+
+def _refuse(why: str) -> int:
+    print(f"omnibot_driver cannot start: {why}", file=sys.stderr)
+    return 2
 
 
 def _main(args: list[str]) -> int:
@@ -73,19 +90,24 @@ def _main(args: list[str]) -> int:
     # Only now, as it takes half a second: a signal meanwhile ends the driver as any other does.
     import rclpy
     from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
-    from rclpy.exceptions import ParameterException
+    from rclpy.exceptions import NameValidationException, ParameterException
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import remove_ros_args
 
     try:
         if unknown := remove_ros_args(args)[1:]:
-            raise ParameterError(f"it does not know {' '.join(unknown)}; {USAGE}")
+            return _refuse(f"it does not know {' '.join(unknown)}; {USAGE}")
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         rclpy.get_default_context().on_shutdown(ending.begin)
-        _run(ending)
-    except (ParameterError, ParameterException, RCLError, UnknownROSArgsError) as error:
-        print(f"omnibot_driver cannot start: {error}", file=sys.stderr)
-        return 2
+        _run(ending, args)
+    except UnknownROSArgsError as error:  # its text is Python's for a list
+        words = str(error)[1:-1].replace("', '", " ").strip("'")
+        return _refuse(f"it does not know {words}; {USAGE}")
+    except NameValidationException as error:  # its second line is the name, which may be long
+        why = str(error).partition(":\n")[0]
+        return _refuse(f"{why}; give another namespace or name: --ros-args -r __ns:=/robot1")
+    except (ParameterError, ParameterException, RCLError) as error:
+        return _refuse(str(error))
     finally:
         rclpy.try_shutdown()
         for number in STOPPED_BY:  # while Python ends, a late ctrl-C would kill it
@@ -93,7 +115,7 @@ def _main(args: list[str]) -> int:
     return 0 if ending.defect is None else 1
 
 
-def _run(ending: Ending) -> None:
+def _run(ending: Ending, args: list[str]) -> None:
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
     from omnibot_driver.node import OmniBotDriver
@@ -101,6 +123,11 @@ def _run(ending: Ending) -> None:
     if ending.begun:
         return
     driver = OmniBotDriver(end=ending.begin)
+    if "--params-file" in args and not driver._parameter_overrides:
+        driver.get_logger().warning(
+            "no parameter of the --params-file is for this node, which is"
+            f" {driver.get_fully_qualified_name()}: let the file begin with /**:"
+        )
     executor = SingleThreadedExecutor()
     executor.add_node(driver)
     stopping = threading.Event()

@@ -65,9 +65,7 @@ class Link:
         self._open = partial(Port, url, baudrate)
         self._last_words = last_words
         self.reconnect_interval_s = self._wait_s = reconnect_interval_s
-        self._deliver = deliver
-        self._report = report
-        self._failed = failed
+        self._deliver, self._report, self._failed = deliver, report, failed
         self._on_read, self._on_write = on_read, on_write
         self._lock = threading.Lock()
         self._changed = threading.Condition(self._lock)
@@ -143,13 +141,15 @@ class Link:
             )
             return link, self._session.figures(time.monotonic())
 
-    def close(self, on_exit: OnExit) -> None:
-        """Stop the robot, then end the threads and close the port; harmless to repeat."""
+    def close(self, on_exit: OnExit) -> bool:
+        """Stop the robot, end the threads, close the port: whether it did. Harmless to repeat."""
+        told = False
         with self._changed:
             if not self._closing.is_set():
                 self._on_exit = on_exit
                 self._write(self._session.farewell(on_exit))
                 if self._port is not None:
+                    told = self._write_error is None
                     self._port.interrupt()
                     self._port = None  # nobody adds to the last words
             self._closing.set()
@@ -157,6 +157,7 @@ class Link:
         for thread in self._threads:
             if thread.is_alive():
                 thread.join(JOIN_TIMEOUT_S)
+        return told and not any(thread.is_alive() for thread in self._threads)
 
     def _guard(self, work: Callable[[], None]) -> None:
         try:
@@ -237,8 +238,7 @@ class Link:
                 self._write(self._session.farewell(self._on_exit))
             else:  # Stop, right behind whatever is out of the kernel's reach
                 port.write_if_room(self._session.broken_off())
-            comes_back &= not self._closing.is_set()
-            stopped = self._write_error is None or comes_back
+            stopped = self._write_error is None or (comes_back and not self._closing.is_set())
             keeper, self._port, self._keeper = self._keeper, None, None
             self._session.closed(time.monotonic())
             events = self._settle()

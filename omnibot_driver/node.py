@@ -105,7 +105,8 @@ class OmniBotDriver(Node):
 
     def close(self) -> None:
         """Stop the robot and give the port back; ROS entities live on until ``destroy_node``."""
-        self._link.close(self._values["on_exit"])
+        if self._link.close(self._values["on_exit"]):
+            self.get_logger().info("the robot is told to stand still, and the port is closed")
 
     def report_defect(self, error: BaseException) -> None:
         """Something that must not happen has; say so and have the driver end."""

@@ -195,7 +195,8 @@ def _explain(url: str, error: Exception) -> str:
             f"port '{url}' is not understood: give a device like /dev/ttyUSB0"
             " or a pyserial URL like socket://host:port, or sim:// for a simulated board"
         )
-    if isinstance(error, termios.error) or isinstance(error.__context__, termios.error):
+    no_terminal = isinstance(error, termios.error) or isinstance(error.__context__, termios.error)
+    if no_terminal or code == errno.EISDIR:
         return f"{url} is no serial port: `ls /dev/serial/by-id/` shows what is; set `port`"
     if code == errno.ENOENT:
         return (
@@ -212,7 +213,12 @@ def _explain(url: str, error: Exception) -> str:
             f"{url} is in use by another program{_owner(url)}, perhaps a second driver:"
             f" end it first (`fuser {url}` names it; the guard of a killed driver leaves by itself)"
         )
-    return f"cannot open {url}: {error}; check the parameter `port`"
+    # Those of its texts that are made of another error name the port twice.
+    source = error.__context__ if isinstance(error.__context__, OSError) else error
+    reason = getattr(source, "strerror", None) or source
+    if isinstance(source, ConnectionRefusedError):
+        return f"cannot open {url}: {reason}: is the server running, and is that its port?"
+    return f"cannot open {url}: {reason}; check the parameter `port`"
 
 
 def _owner(path: str) -> str:

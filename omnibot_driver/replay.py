@@ -80,11 +80,12 @@ class Replay:
         """``call``; nobody is moved by it."""
         self.call(lambda session, now: action(session, wish, now))
 
-    def close(self, _on_exit: OnExit) -> None:
-        """End the thread; harmless to repeat."""
+    def close(self, _on_exit: OnExit) -> bool:
+        """End the thread; harmless to repeat. There is no robot to be told anything."""
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join(JOIN_TIMEOUT_S)
+        return False
 
     def _guard(self) -> None:
         try:

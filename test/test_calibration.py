@@ -89,3 +89,20 @@ def test_others_may_read_the_file(tmp_path: Path) -> None:
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": BIAS})
     assert stat.S_IMODE(path.stat().st_mode) == 0o644
+
+
+def test_a_symbolic_link_stays_one(tmp_path: Path) -> None:
+    """What it leads to is written, where that is."""
+    path, link = tmp_path / "far" / "robot.yaml", tmp_path / "robot.yaml"
+    link.symlink_to(path)
+    calibration.save(link, {"gyro_bias": BIAS})
+    assert link.is_symlink()
+    assert calibration.load(path) == {"gyro_bias": BIAS}
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_home_that_nobody_has_is_refused() -> None:
+    """Any other is filled in."""
+    assert calibration.locate("~/robot.yaml") == Path.home() / "robot.yaml"
+    with pytest.raises(ParameterError, match="no such home folder; give the whole path"):
+        calibration.locate("~nosuchuser/robot.yaml")

@@ -100,8 +100,8 @@ def test_closing_writes_stop_and_ends_the_threads(board: PtyBoard) -> None:
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
     link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
-    link.close("stop")
-    link.close("stop")
+    assert link.close("stop")
+    assert not link.close("stop")
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
     assert ours.state == "disconnected"
 

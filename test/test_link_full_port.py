@@ -56,7 +56,7 @@ def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) 
     """Closing does not hang; the robot is stopped as soon as the board listens again."""
     link, _ours = at_rest(terminal)
     terminal.fill()
-    link.close("stop")
+    assert not link.close("stop")
     terminal.read_until(LAST_WORDS)
     wait_for_the_end_of("omnibot-reader", "omnibot-pacer")
 

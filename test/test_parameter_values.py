@@ -91,6 +91,28 @@ def test_a_value_of_another_type_is_refused(parameter: Parameter, wrong: object)
         parameter.check(wrong)
 
 
+@pytest.mark.parametrize(
+    ("name", "wrong", "words"),
+    [
+        ("port", 5, "must be a string, not 5"),
+        ("on_exit", True, "must be a string, not True (YAML reads on, off, yes and no as bool:"),
+        ("baudrate", "fast", "must be an integer, not 'fast'"),
+        ("guard", 1, "must be a bool, not 1"),
+        ("command_rate", True, "must be a double, not True"),
+        ("gyro_bias", 0.1, "must be an array of doubles, not 0.1"),
+        ("axis_signs", "111", "must be an array of integers, not '111'"),
+        ("port", "", "must be a device or a URL, not ''"),
+    ],
+)
+def test_types_are_told_in_the_words_of_ros(name: str, wrong: object, words: str) -> None:
+    """Those of ``ros2 param describe``; who wrote no for a word is told what became of it."""
+    with pytest.raises(ParameterError) as caught:
+        BY_NAME[name].check(wrong)
+    message = str(caught.value)
+    assert message.startswith(f"parameter '{name}' {words}")
+    assert message.endswith(")") == (name == "on_exit")
+
+
 json_like = st.recursive(
     st.one_of(
         st.none(), st.booleans(), st.integers(-(2**63), 2**63 - 1), st.floats(), st.text(),

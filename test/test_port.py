@@ -25,7 +25,9 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
         (BlockingIOError(11, "Resource temporarily unavailable"), "fuser"),
         (OSError(16, "Device or resource busy"), "fuser"),
         (ValueError("invalid URL"), "socket://"),
-        (OSError(5, "Input/output error"), "check the parameter"),
+        (IsADirectoryError(21, "Is a directory"), "no serial port"),
+        (OSError(5, "Input/output error"), "USB0: Input/output error; check the parameter"),
+        (OSError("it said so"), "USB0: it said so; check the parameter"),
     ],
 )
 def test_every_way_a_port_can_refuse_says_what_to_do(

@@ -10,7 +10,7 @@ may be.
 
 from omnibot_driver.parameters.parameter import Parameter, Value
 from omnibot_driver.parameters.settings import board_settings, session_settings
-from omnibot_driver.parameters.table import BY_NAME, PARAMETERS, SECTIONS, check_all
+from omnibot_driver.parameters.table import BY_NAME, PARAMETERS, SECTIONS, check_all, nearest
 
 __all__ = [
     "BY_NAME",
@@ -20,5 +20,6 @@ __all__ = [
     "Value",
     "board_settings",
     "check_all",
+    "nearest",
     "session_settings",
 ]

@@ -4,10 +4,13 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from omnibot_driver.core.errors import ParameterError
 
+TYPES: Final = {bool: "a bool", int: "an integer", float: "a double", str: "a string"}
+"""In the words of ROS."""
+QUOTE: Final = "YAML reads on, off, yes and no as bool: put it in quotes"
 Value = bool | int | float | str | list[int] | list[float]
 
 
@@ -47,7 +50,7 @@ class Parameter:
         elif isinstance(self.default, list) and not isinstance(value, str | bytes):
             value = list(value) if isinstance(value, Iterable) else value
         if type(value) is not type(self.default):
-            raise self._refusal(value, f"a value of type {type(self.default).__name__}")
+            raise self._refusal(value, self._kind)
         if isinstance(value, list):
             return self._check_three(value)
         assert isinstance(value, bool | int | float | str)
@@ -57,6 +60,8 @@ class Parameter:
             raise self._refusal(value, self.allowed)
         if self.name.endswith("_frame") and (not value or str(value).startswith("/")):
             raise self._refusal(value, "a frame name without a leading slash")
+        if self.name == "port" and not value:
+            raise self._refusal(value, "a device or a URL")
         if self.name == "frame_prefix" and str(value).startswith("/"):
             raise self._refusal(value, "a prefix without a leading slash, such as robot1/")
         return value
@@ -77,5 +82,12 @@ class Parameter:
             return True
         return self.low <= value <= self.high
 
+    @property
+    def _kind(self) -> str:
+        if isinstance(self.default, list):
+            return f"an array of {TYPES[type(self.default[0])].split()[1]}s"
+        return TYPES[type(self.default)]
+
     def _refusal(self, value: object, wanted: str) -> ParameterError:
-        return ParameterError(f"parameter '{self.name}' must be {wanted}, not {value!r}")
+        remark = f" ({QUOTE})" if isinstance(self.default, str) and isinstance(value, bool) else ""
+        return ParameterError(f"parameter '{self.name}' must be {wanted}, not {value!r}{remark}")

@@ -3,7 +3,7 @@
 """Every parameter of the driver, and the check of all values together. Knows no ROS."""
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from omnibot_driver.core.errors import ParameterError
@@ -22,13 +22,17 @@ PARAMETERS: Final = tuple(parameter for rows in SECTIONS.values() for parameter 
 BY_NAME: Final = {parameter.name: parameter for parameter in PARAMETERS}
 
 
+def nearest(name: str, names: Iterable[str]) -> str:
+    """The one of these names that is most like it, however little."""
+    return difflib.get_close_matches(name, list(names), n=1, cutoff=0.0)[0]
+
+
 def check_all(given: Mapping[str, object]) -> dict[str, Value]:
     """Every parameter's value, from those given and the defaults. Raises ParameterError."""
     for name in given:
         if name not in BY_NAME:
-            nearest = difflib.get_close_matches(name, BY_NAME, n=1, cutoff=0.0)[0]
             raise ParameterError(
-                f"there is no parameter '{name}'; the nearest is '{nearest}'"
+                f"there is no parameter '{name}'; the nearest is '{nearest(name, BY_NAME)}'"
                 " (config/driver.yaml has them all)"
             )
     values = {

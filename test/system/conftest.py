@@ -40,7 +40,7 @@ def start_board(stack: ExitStack) -> Callable[..., PtyBoard]:
 
 @pytest.fixture
 def start_driver(stack: ExitStack) -> Callable[..., Driver]:
-    def start(port: str, **parameters: object) -> Driver:
+    def start(port: str | None, **parameters: Any) -> Driver:
         return stack.enter_context(Driver(port=port, **parameters))
 
     return start

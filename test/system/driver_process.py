@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
 
@@ -26,15 +27,23 @@ _namespaces = (f"robot{os.getpid()}_{number}" for number in itertools.count())
 class Driver:
     """``python -m omnibot_driver.driver`` as a process of its own, in a namespace of its own.
 
-    ``before``: Python to be run in that process first; ``namespace``: that of another one.
+    ``before``: Python to be run in that process first; ``namespace``: that of another one;
+    ``more``: further arguments of ROS.
     """
 
     def __init__(
-        self, *, port: str, before: str = "", namespace: str = "", **parameters: object
+        self,
+        *,
+        port: str | None,
+        before: str = "",
+        namespace: str = "",
+        more: Sequence[str] = (),
+        **parameters: object,
     ) -> None:
         self.namespace = namespace or next(_namespaces)
-        arguments = ["--ros-args", "-r", f"__ns:=/{self.namespace}"]
-        for name, value in {"port": port, **parameters}.items():
+        arguments = ["--ros-args", "-r", f"__ns:=/{self.namespace}", *more]
+        given = parameters if port is None else {"port": port, **parameters}
+        for name, value in given.items():
             arguments += ["-p", f"{name}:={value}"]
         program = ["-m", "omnibot_driver.driver"]
         if before:

@@ -2,9 +2,11 @@
 
 """Parameters and arguments of the running node: refused at the start, changed later."""
 
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -27,7 +29,8 @@ Start = Callable[..., Any]
         ({"cmd_vel_timeout": float("nan")}, "'cmd_vel_timeout' must be"),
         ({"on_exit": "explode"}, "'on_exit' must be one of stop, pause, reset"),
         ({"axis_signs": "[1, 2, 1]"}, "'axis_signs' must be three numbers"),
-        ({"baudrate": "fast"}, "'baudrate' must be a value of type int"),
+        ({"baudrate": "fast"}, "'baudrate' must be an integer, not 'fast'"),
+        ({"on_exit": "off"}, "'on_exit' must be a string, not False .*put it in quotes"),
         ({"odom_frame": "/odom"}, "leading slash"),
         ({"use_sim_times": True}, "no parameter 'use_sim_times'"),
         ({"use_sim_time": 5}, "cannot start.*use_sim_time"),
@@ -47,8 +50,8 @@ def test_wrong_parameters_end_the_start_with_a_sentence(
     "arguments",
     [
         ["/dev/ttyUSB0"],
-        ["--help"],
         ["--port", "x"],
+        ["--ros-args", "-r", f"__ns:=/{'a' * 230}"],
         ["--ros-args", "-r", "__node:=bad name"],
         ["--ros-args", "--log-level", "nonsense"],
     ],
@@ -60,6 +63,58 @@ def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -
     assert ended.returncode == 2
     assert "omnibot_driver cannot start: " in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize(
+    "words", [["port:=sim://"], ["gyro_bias:=[0.1,0.0,0.0]", "axis_signs:=[1,-1,-1]"]]
+)
+@pytest.mark.parametrize("before", [[], ["--ros-args"]])
+def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list[str]) -> None:
+    """Alike on both sides of ``--ros-args``."""
+    command = [sys.executable, "-m", "omnibot_driver.driver", *before, *words]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+    assert ended.returncode == 2
+    assert f"cannot start: it does not know {' '.join(words)}; parameters are" in ended.stderr
+    assert ended.stderr.endswith("like this: --ros-args -p port:=/dev/ttyUSB0\n")
+
+
+WITHOUT_ROS = """
+import runpy, sys
+sys.modules["rclpy"] = sys.modules["serial"] = None
+runpy.run_module("omnibot_driver.driver", run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize("arguments", [["-h"], ["--help"], ["--ros-args", "-p", "x:=1", "--help"]])
+def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
+    """Before anything is loaded; it is no error."""
+    command = [sys.executable, "-c", WITHOUT_ROS, *arguments]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout.startswith("usage: ros2 run omnibot_driver driver ")
+    assert "--ros-args -p port:=/dev/ttyUSB0\n" in ended.stdout
+    assert "config/driver.yaml" in ended.stdout
+
+
+OPENS_NOTHING = "import serial; serial.serial_for_url = None"
+"""Where the file is passed over, the port is the default one: a robot may be there."""
+
+
+@pytest.mark.parametrize(
+    ("first_line", "said", "told"),
+    [("/other/omnibot_driver", "for this node", 1), ("/**", "port '/dev/null' is not", 0)],
+)
+def test_a_parameter_file_for_another_node_is_told(
+    start_driver: Start, tmp_path: Path, first_line: str, said: str, told: int
+) -> None:
+    """ROS passes it over, and a port would be opened that nobody meant."""
+    path = tmp_path / "driver.yaml"
+    path.write_text(f"{first_line}:\n  ros__parameters:\n    port: /dev/null\n")
+    driver: Driver = start_driver(None, before=OPENS_NOTHING, more=["--params-file", str(path)])
+    driver.wait_for_line(said)
+    assert driver.end(signal.SIGINT) == 0
+    sentence = f"which is /{driver.namespace}/omnibot_driver: let the file begin with /**:"
+    assert driver.output.count(sentence) == told
 
 
 def test_integers_are_taken_for_real_numbers(start_board: Start, start_driver: Start) -> None:

@@ -87,11 +87,14 @@ def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
     ("port", "reason"),
     [
         ("nonsense://board", "not understood.*socket://"),
-        ("/", "check the parameter"),
+        ("/", ": / is no serial port.*by-id"),
         ("/dev/null", "no serial port.*by-id"),
         ("socket://nohost", "not understood.*socket://"),
         ("socket://localhost:99999", "not understood.*socket://"),
-        ("socket://localhost:1", "cannot open.*refused"),
+        (
+            "socket://localhost:1",
+            "cannot open socket://localhost:1: Connection refused: is the server running",
+        ),
     ],
 )
 def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
@@ -102,6 +105,7 @@ def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
     driver.wait_for_line(reason)
     assert driver.process.poll() is None
     assert driver.end(signal.SIGINT) == 0
+    assert "the robot is told" not in driver.output
 
 
 def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(

@@ -10,6 +10,7 @@ import pytest
 from calibrate_rig import parameters_of, rig
 from seeing_user import User
 
+from omnibot_driver import calibration
 from omnibot_driver.parameters import PARAMETERS
 from omnibot_driver.tools.calibrate import commission
 from omnibot_driver.tools.calibrate.commission_result import Found, result_of
@@ -56,6 +57,7 @@ def test_the_whole_walk_finds_what_was_planted(
             "axis_signs": [1, -1, -1],
             "imu_rpy": [3.1416, 0.0, 1.5708],
         }
+        assert set(robot.written()) <= {*calibration.NAMES, *calibration.RECORDED}
         assert "xacro_args" in said
         assert (tmp_path / "calibrate_commission.png").stat().st_size > 10_000
     with rig(tmp_path, {"calibration_file": str(robot.output)}) as again:

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 from calibrate_rig import rig, row
 
+from omnibot_driver import calibration
 from omnibot_driver.parameters import PARAMETERS
 from omnibot_driver.simulator.motors import MotorConstants
 from omnibot_driver.tools.calibrate import step
@@ -42,6 +43,7 @@ def test_a_planted_motor_is_found(
     assert 0 < sigma < 0.004
     assert "wheels off the ground" in robot.questions[0]
     assert "No message sets them" in table
+    assert set(robot.written()) <= set(calibration.RECORDED)
     written = robot.written()["step"]
     found, _ = written["wheels"]["B"]["motor in the manual's loop"]["PWM per count"]
     assert found == pytest.approx(35.0, abs=1.75)

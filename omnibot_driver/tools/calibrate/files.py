@@ -23,8 +23,8 @@ def output_file(given: str | None, drivers: str) -> Path:
 
     Raises ToolError where it cannot be written or holds something else.
     """
-    path = Path(given or drivers or DEFAULT).expanduser()
     try:
+        path = calibration.locate(given or drivers or DEFAULT)
         calibration.load(path)
         content: Any = yaml.safe_load(path.read_text(encoding="utf-8")) if path.exists() else {}
     except ParameterError as error:

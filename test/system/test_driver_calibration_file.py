@@ -1,0 +1,65 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the driver says of its calibration file as it starts: nothing is passed over in silence."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from driver_process import Driver
+
+Start = Callable[..., Driver]
+WARNED = "there is no calibration_file {} yet: nothing of it is applied; check the path"
+
+
+@pytest.mark.parametrize("is_there", [False, True])
+def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
+    start_driver: Start, tmp_path: Path, is_there: bool
+) -> None:
+    """Its path may be mistyped, and the signs of the axes may be in the file that was meant."""
+    path = tmp_path / "robt.yaml"
+    if is_there:
+        path.write_text("# nothing yet\n")
+    driver = start_driver("/dev/null", calibration_file=path)
+    driver.wait_for_line("no serial port")
+    (line,) = [line for line in driver.lines if "calibration_file" in line]
+    assert "WARN" in line
+    assert WARNED.format(path) in line
+    assert "call ~/calibrate_gyro, which writes it" in line
+
+
+def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) -> None:
+    """What the tools note beside it is no news; comments and order are the user's."""
+    path = tmp_path / "robot.yaml"
+    path.write_text("axis_signs: [1, -1, -1]\nimu_rpy: [0, 0, 0]\nstep: {}\nlinear_scale: 80\n")
+    driver = start_driver("/dev/null", calibration_file=path)
+    driver.wait_for_line("no serial port")
+    (line,) = [line for line in driver.lines if "calibration_file" in line]
+    assert "INFO" in line
+    assert line.endswith(f"the calibration_file {path} gives linear_scale, axis_signs\n")
+
+
+def test_names_that_are_not_read_are_told_with_the_nearest(
+    start_driver: Start, tmp_path: Path
+) -> None:
+    """Misspelt, or a parameter that is no calibration: in one warning."""
+    path = tmp_path / "robot.yaml"
+    path.write_text("axis_sings: [1, -1, -1]\nmax_linear_speed: 0.2\n7: 1\n")
+    driver = start_driver("/dev/null", calibration_file=path)
+    driver.wait_for_line("no serial port")
+    (line,) = [line for line in driver.lines if "calibration_file" in line]
+    assert "WARN" in line
+    assert (
+        f"{path} holds what is not read from it: axis_sings (the nearest that is: axis_signs)"
+        in line
+    )
+    assert ", max_linear_speed (" in line
+    assert ", 7 (" in line
+
+
+def test_a_home_that_nobody_has_ends_the_start(start_driver: Start) -> None:
+    """With a sentence."""
+    driver = start_driver("/dev/null", calibration_file="~nosuchuser/c.yaml")
+    driver.wait_for_line("the calibration_file ~nosuchuser/c.yaml cannot be found: .*whole path")
+    assert driver.end() == 2
+    assert "Traceback" not in driver.output
