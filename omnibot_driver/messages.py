@@ -113,14 +113,18 @@ def odometry_message(
     return message
 
 
-def transform_message(odometry: Odometry) -> TransformStamped:
-    """``/tf``: where this odometry says that the base is, at its own stamp."""
-    pose = odometry.pose.pose
-    at = pose.position
+def transform_message(
+    estimate: OdometryEstimate, stamp: Time, settings: MessageSettings
+) -> TransformStamped:
+    """``/tf``: the pose of the ``odom`` with this stamp."""
+    pose = estimate.pose
     return TransformStamped(
-        header=odometry.header,
-        child_frame_id=odometry.child_frame_id,
-        transform=Transform(translation=Vector3(x=at.x, y=at.y, z=at.z), rotation=pose.orientation),
+        header=Header(stamp=stamp, frame_id=settings.odom_frame),
+        child_frame_id=settings.base_frame,
+        transform=Transform(
+            translation=Vector3(x=pose.x_m, y=pose.y_m, z=0.0),
+            rotation=yaw_quaternion(pose.yaw_rad),
+        ),
     )
 
 

@@ -191,8 +191,7 @@ class Publishing:
         self._odometry.publish(self._make.odometry(estimate, stamp_ns))
         if self._send_transform is not None:
             stamp = messages.time_message(stamp_ns)
-            odometry = messages.odometry_message(estimate, stamp, self._settings)
-            self._send_transform(messages.transform_message(odometry))
+            self._send_transform(messages.transform_message(estimate, stamp, self._settings))
         self._wheels = messages.turned(self._wheels, estimate, self._settings.wheels)
         self._joints.publish(self._make.joint_state(self._wheels, stamp_ns))
 

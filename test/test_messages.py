@@ -176,10 +176,9 @@ poses = st.builds(Pose, *[st.floats(-1e4, 1e4)] * 3)
 @given(poses)
 def test_the_transform_is_the_odometrys_pose_between_the_same_frames(pose: Pose) -> None:
     """At the same time; tf has no covariance."""
-    odometry = messages.odometry_message(
-        OdometryEstimate(0.0, pose, None, Covariance()), STAMP, PREFIXED
-    )
-    transform = messages.transform_message(odometry)
+    estimate = OdometryEstimate(0.0, pose, None, Covariance())
+    odometry = messages.odometry_message(estimate, STAMP, PREFIXED)
+    transform = messages.transform_message(estimate, STAMP, PREFIXED)
     assert transform.header == odometry.header
     assert transform.header.frame_id == "robot1/odom"
     assert transform.child_frame_id == odometry.child_frame_id == "robot1/base_link"
