@@ -10,7 +10,7 @@ from trip import earth
 
 from omnibot_driver.core.board import PoseReading
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings, PoseFrame
-from omnibot_driver.core.omnibot.suspicion import MOST, Suspicion
+from omnibot_driver.core.omnibot.suspicion import MOST_DELTAS, Suspicion
 from omnibot_driver.simulator import BoardPose, BoardSettings, SimulatedBoard
 
 DRIVE = bytes.fromhex("FF FE 01 00 15 00 0E 00 C8")
@@ -79,4 +79,4 @@ def test_poses_that_never_make_sense_leave_nothing_behind() -> None:
         for _ in range(5):
             suspicion.displaced(earth(0.01, 0.0))
         suspicion.posed(absurd, PoseReading(0.0, 0.0, 0.0), "big")
-    assert len(suspicion._moved) <= MOST
+    assert len(suspicion._moved) <= MOST_DELTAS

@@ -12,6 +12,14 @@ Start = Callable[..., Driver]
 WARNED = "there is no calibration_file {} yet: nothing of it is applied; check the path"
 
 
+def said_of(path: Path, start_driver: Start) -> str:
+    """By a driver that has read it: one line, no more."""
+    driver = start_driver("/dev/null", calibration_file=path)
+    driver.wait_for_line("no serial port")
+    (line,) = [line for line in driver.lines if "calibration_file" in line]
+    return line
+
+
 @pytest.mark.parametrize("is_there", [False, True])
 def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
     start_driver: Start, tmp_path: Path, is_there: bool
@@ -20,9 +28,7 @@ def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
     path = tmp_path / "robt.yaml"
     if is_there:
         path.write_text("# nothing yet\n")
-    driver = start_driver("/dev/null", calibration_file=path)
-    driver.wait_for_line("no serial port")
-    (line,) = [line for line in driver.lines if "calibration_file" in line]
+    line = said_of(path, start_driver)
     assert "WARN" in line
     assert WARNED.format(path) in line
     assert "call ~/calibrate_gyro, which writes it" in line
@@ -32,9 +38,7 @@ def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) ->
     """What the tools note beside it is no news; comments and order are the user's."""
     path = tmp_path / "robot.yaml"
     path.write_text("axis_signs: [1, -1, -1]\nimu_rpy: [0, 0, 0]\nstep: {}\nlinear_scale: 80\n")
-    driver = start_driver("/dev/null", calibration_file=path)
-    driver.wait_for_line("no serial port")
-    (line,) = [line for line in driver.lines if "calibration_file" in line]
+    line = said_of(path, start_driver)
     assert "INFO" in line
     assert line.endswith(f"the calibration_file {path} gives linear_scale, axis_signs\n")
 
@@ -45,9 +49,7 @@ def test_names_that_are_not_read_are_told_with_the_nearest(
     """Misspelt, or a parameter that is no calibration: in one warning."""
     path = tmp_path / "robot.yaml"
     path.write_text("axis_sings: [1, -1, -1]\nmax_linear_speed: 0.2\n7: 1\n")
-    driver = start_driver("/dev/null", calibration_file=path)
-    driver.wait_for_line("no serial port")
-    (line,) = [line for line in driver.lines if "calibration_file" in line]
+    line = said_of(path, start_driver)
     assert "WARN" in line
     assert (
         f"{path} holds what is not read from it: axis_sings (the nearest that is: axis_signs)"

@@ -20,7 +20,7 @@ SURE: Final = 10
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
 """Of a coordinate in mm or mrad that is not 0: beyond, it is other bytes misread."""
-MOST: Final = 10
+MOST_DELTAS: Final = 10
 """So many deltas from one pose to the next, one of which was lost; more belong to no two poses."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
@@ -43,7 +43,7 @@ class Suspicion:
         """A delta, as the settings read it."""
         self._moved.append(reading)
         unbroken = not (reading.lost or reading.restarted or reading.duration_s is None)
-        if not unbroken or len(self._moved) > MOST:
+        if not unbroken or len(self._moved) > MOST_DELTAS:
             self._from = None
         if self._from is None:
             self._moved.clear()
