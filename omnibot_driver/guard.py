@@ -3,9 +3,10 @@
 """The guard: a process of its own that stops the robot when the driver no longer can.
 
 It shares the driver's open port, and hears a heartbeat on its standard input. When the heartbeat
-ceases, or the driver is gone, it says the last words that it was given, for a second or until the
-driver is heard again. It knows no board, and imports next to nothing, so that it is small and soon
-there: `keeper.py` starts it as ``python guard.py PORT_DESCRIPTOR LAST_WORDS_IN_HEX``.
+ceases, or the driver is gone, it repeats the stop that it was given, for a second or until the
+driver is heard again: the emergency stop if the last heartbeat said that it is latched. It knows no
+board, and imports next to nothing, so that it is small and soon there: `keeper.py` starts it as
+``python guard.py PORT_DESCRIPTOR STOP_IN_HEX EMERGENCY_STOP_IN_HEX``.
 """
 
 import contextlib
@@ -16,6 +17,8 @@ import sys
 import termios
 
 BEAT = b"."
+LATCHED_BEAT = b"e"
+"""The driver is alive and its e-stop is latched."""
 BYE = b"!"
 """The driver has stopped the robot itself; the guard may leave."""
 LIMIT_S = 0.5
@@ -26,10 +29,11 @@ PACE_S = 0.05
 DRIVER = 0
 
 
-def watch(port: int, last_words: bytes) -> None:
+def watch(port: int, stop: bytes, emergency_stop: bytes) -> None:
     """Until the driver is gone, and then a second longer unless it said that it goes."""
     os.set_blocking(port, False)
     patience_s: float | None = LIMIT_S
+    last_words = stop
     while True:
         if not select.select([DRIVER], [], [], patience_s)[0]:
             speak(port, last_words, until=[DRIVER])
@@ -41,6 +45,7 @@ def watch(port: int, last_words: bytes) -> None:
             return
         else:
             patience_s = LIMIT_S
+            last_words = emergency_stop if heard.endswith(LATCHED_BEAT) else stop
 
 
 def speak(port: int, last_words: bytes, until: list[int]) -> None:
@@ -66,4 +71,4 @@ def drop_what_waits(port: int) -> None:
 if __name__ == "__main__":
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)  # whoever ends the driver so need not ask its guard
-    watch(int(sys.argv[1]), bytes.fromhex(sys.argv[2]))
+    watch(int(sys.argv[1]), bytes.fromhex(sys.argv[2]), bytes.fromhex(sys.argv[3]))

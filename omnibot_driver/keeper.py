@@ -32,24 +32,26 @@ SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + LEAVES_WITHIN_S
 class Keeper:
     """A guard for one open port, from now until ``end``.
 
-    ``last_words``: what the guard is to say.
+    ``stop``, ``emergency_stop``: what the guard is to say, by whether the e-stop is latched.
     """
 
-    def __init__(self, descriptor: int, last_words: bytes) -> None:
+    def __init__(self, descriptor: int, stop: bytes, emergency_stop: bytes) -> None:
         self._trouble = ""
         self._descriptor = descriptor
-        self._last_words = last_words
+        self._words = stop.hex(), emergency_stop.hex()
         self._process: subprocess.Popen[bytes] | None = None
         self._restart_at = -math.inf
         self._told = False
         self._start()
 
-    def beat(self, now: float) -> str:
+    def beat(self, now: float, *, latched: bool = False) -> str:
         """The driver is alive; call it every ``BEAT_S``, neither more nor less often.
 
         Returns a sentence, once, when the guard is not as it should be.
         """
-        if self._process is not None and (trouble := self._beat(self._process)):
+        if self._process is not None and (
+            trouble := self._beat(self._process, guard.LATCHED_BEAT if latched else guard.BEAT)
+        ):
             self._tell(f"{trouble}; another one is started")
         if self._process is None and now >= self._restart_at:
             self._restart_at = now + RESTART_S
@@ -68,14 +70,14 @@ class Keeper:
         else:
             self._dismiss(b"", SPEAKS_WITHIN_S)
 
-    def _beat(self, process: subprocess.Popen[bytes]) -> str:
+    def _beat(self, process: subprocess.Popen[bytes], word: bytes) -> str:
         """Returns what is wrong with it, and then it is gone."""
         assert process.stdin is not None
         pipe = process.stdin.fileno()
         try:
             (unread,) = struct.unpack("i", fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)))
-            if unread < HANGS_AFTER * len(guard.BEAT):
-                os.write(pipe, guard.BEAT)
+            if unread < HANGS_AFTER * len(word):
+                os.write(pipe, word)
                 return ""
         except OSError:
             return f"the guard process died (exit code {self._dismiss(guard.BYE, LEAVES_WITHIN_S)})"
@@ -89,7 +91,7 @@ class Keeper:
         command = [sys.executable, "-I", "-S", name]
         try:
             self._process = subprocess.Popen(
-                [*command, str(self._descriptor), self._last_words.hex()],
+                [*command, str(self._descriptor), *self._words],
                 bufsize=0,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,

@@ -26,7 +26,12 @@ from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
 from omnibot_driver.port import Port
 from omnibot_driver.standstill import Standstill
 
-JOIN_TIMEOUT_S: Final = 1.0
+JOIN_TIMEOUT_S: Final = 2.0
+"""Longer than a guard takes to repeat Stop."""
+STANDS_WITHIN_S: Final = 0.5
+"""So long an end waits until the robot is seen to stand; then the guard repeats Stop."""
+UNGUARDED_S: Final = 1.5
+"""So long where no guard does."""
 BACK_OFF: Final = 1.5
 LONGEST_WAIT_S: Final = 2.0
 WAITED: Final = "motion command refused: it waited while the driver stood still; send it again"
@@ -37,7 +42,8 @@ T = TypeVar("T")
 class Link:
     """One session on one port, which is opened again whenever it is lost.
 
-    ``last_words`` are what stops the board when this process cannot; None: no guard is wanted.
+    ``last_words``: Stop, and the emergency stop, for a guard to say when this process cannot; None:
+    no guard is wanted.
     ``deliver`` gets the session's events on whichever thread they came up; ``report`` gets a
     sentence about the port whenever it cannot be had or is lost, and None when it is open;
     ``failed`` gets the exception that ended a thread, which nothing but a defect can do;
@@ -50,7 +56,7 @@ class Link:
         url: str,
         baudrate: int,
         *,
-        last_words: bytes | None,
+        last_words: tuple[bytes, bytes] | None,
         reconnect_interval_s: float,
         deliver: Callable[[Sequence[Event]], None],
         report: Callable[[str | None], None],
@@ -70,6 +76,7 @@ class Link:
         self._lock = threading.Lock()
         self._changed = threading.Condition(self._lock)
         self._closing = threading.Event()
+        self._leaving = self._stands = False
         self._on_exit: OnExit = "stop"
         self._port: Port | None = None
         self._write_error: LinkError | None = None
@@ -142,22 +149,47 @@ class Link:
             return link, self._session.figures(time.monotonic())
 
     def close(self, on_exit: OnExit) -> bool:
-        """Stop the robot, end the threads, close the port: whether it did. Harmless to repeat."""
+        """Stop the robot, end the threads, close the port. Harmless to repeat.
+
+        Whether the robot was told to stand still; ``stands``: whether it was seen to.
+        """
         told = False
+        events: Sequence[Event] = ()
         with self._changed:
-            if not self._closing.is_set():
+            if not self._leaving:
+                self._leaving = True
                 self._on_exit = on_exit
+                events = self._stop_for_good()
                 self._write(self._session.farewell(on_exit))
                 if self._port is not None:
                     told = self._write_error is None
+                    self._stands = told and self._session.stands
                     self._port.interrupt()
                     self._port = None  # nobody adds to the last words
             self._closing.set()
             self._changed.notify_all()
+        self._deliver(events)
         for thread in self._threads:
             if thread.is_alive():
                 thread.join(JOIN_TIMEOUT_S)
         return told and not any(thread.is_alive() for thread in self._threads)
+
+    @property
+    def stands(self) -> bool:
+        """After ``close``: the board has shown that the robot stands."""
+        return self._stands
+
+    def _stop_for_good(self) -> Sequence[Event]:
+        """With the lock held: wait, while the pacer repeats Stop, until the robot stands."""
+        self._session.leave(now := time.monotonic())
+        events = self._settle()
+        alone = self._port is not None and self._keeper is None and not self._port.ends_with_us
+        end = now + (UNGUARDED_S if alone else STANDS_WITHIN_S)
+        while self._port is not None and self._write_error is None and not self._session.stands:
+            if (left_s := end - time.monotonic()) <= 0.0:
+                break
+            self._changed.wait(left_s)
+        return events
 
     def _guard(self, work: Callable[[], None]) -> None:
         try:
@@ -204,7 +236,7 @@ class Link:
         if self._last_words is None or port.ends_with_us:
             return None, []
         if port.descriptor is not None:
-            return Keeper(port.descriptor, self._last_words), []
+            return Keeper(port.descriptor, *self._last_words), []
         told, self._unguarded_told = self._unguarded_told, True
         text = f"this kind of port cannot be shared with a guard process: {WITHOUT_GUARD}"
         return None, [] if told else [Notice(text)]
@@ -238,7 +270,7 @@ class Link:
                 self._write(self._session.farewell(self._on_exit))
             else:  # Stop, right behind whatever is out of the kernel's reach
                 port.write_if_room(self._session.broken_off())
-            stopped = self._write_error is None or (comes_back and not self._closing.is_set())
+            stopped = self._stands if self._closing.is_set() else comes_back
             keeper, self._port, self._keeper = self._keeper, None, None
             self._session.closed(time.monotonic())
             events = self._settle()
@@ -269,7 +301,9 @@ class Link:
         if now < self._beat_at:
             return []
         self._beat_at = now + BEAT_S
-        trouble = self._keeper.beat(now) if self._keeper is not None else ""
+        if self._keeper is None:
+            return []
+        trouble = self._keeper.beat(now, latched=self._session.estop_active)
         return [Notice(trouble)] if trouble else []
 
     def _heed_standstill(self, now: float) -> bool:
@@ -283,7 +317,7 @@ class Link:
         """With the lock held: write what is due, wake the pacer if it sleeps for too long."""
         if data := self._session.take_output(time.monotonic()):
             self._write(data)
-        if self._session.wake_at < self._pacing_until:
+        if self._session.wake_at < self._pacing_until or self._leaving:
             self._changed.notify_all()
         return self._session.take_events()
 

@@ -89,11 +89,12 @@ class OmniBotDriver(Node):
                 failed=self.report_defect,
             )
         taps = self._publishing.taps() if self._values["publish_raw"] else {}
+        stop = self._board.stop()
         return Link(
             self._session,
             port,
             self._values["baudrate"],
-            last_words=(self._board.wake() + self._board.emergency_stop())
+            last_words=(stop, self._board.emergency_stop() + stop)
             if self._values["guard"]
             else None,
             reconnect_interval_s=self._values["reconnect_interval"],
@@ -105,8 +106,15 @@ class OmniBotDriver(Node):
 
     def close(self) -> None:
         """Stop the robot and give the port back; ROS entities live on until ``destroy_node``."""
-        if self._link.close(self._values["on_exit"]):
-            self.get_logger().info("the robot is told to stand still, and the port is closed")
+        if not self._link.close(self._values["on_exit"]):
+            return
+        if self._link.stands:
+            self.get_logger().info("the robot stands still, and the port is closed")
+        else:
+            self.get_logger().warning(
+                "stop sent but unconfirmed, and the port is closed: the board did not show in time"
+                " that the robot stands; check by eye"
+            )
 
     def report_defect(self, error: BaseException) -> None:
         """Something that must not happen has; say so and have the driver end."""

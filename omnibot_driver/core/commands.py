@@ -2,9 +2,9 @@
 
 """Which frame goes out when: pacing, repeating, timing out, one authority, the e-stop latch.
 
-Nothing acknowledges a command and the board never stops by itself, so the current command is
-repeated, and when it grows old Stop is, for a while. This module does not know what is in a frame;
-time is an argument.
+Nothing acknowledges a command and the board never stops by itself. So the current command is
+repeated, and when it expires Stop is repeated until the robot is seen to stand. This module does
+not know what is in a frame; time is an argument.
 """
 
 import math
@@ -12,16 +12,21 @@ from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.motion import Motion
+from omnibot_driver.core.stop_proof import StopProof
 
 PACE_S: Final = 0.01
-"""The board's control tick: commands closer together than this would only fill its buffer."""
+"""The board's control tick: new commands closer together than this would only fill its buffer."""
 STOPPING_S: Final = 1.0
-"""How long Stop is repeated before the line goes quiet."""
+"""Stop is repeated for at least so long..."""
+UNPROVED_S: Final = 5.0
+"""... and for so long at most while nothing shows that the robot stands."""
+STOP_RATE_HZ: Final = 20.0
+"""Stop and the emergency stop are repeated at least so often."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandSettings:
-    """``timeout_s``: age at which a command is worth nothing; ``rate_hz``: how often it repeats."""
+    """``timeout_s``: age at which a command expires; ``rate_hz``: how often it is repeated."""
 
     timeout_s: float = 0.5
     rate_hz: float = 20.0
@@ -33,46 +38,47 @@ class CommandStream:
     def __init__(self, settings: CommandSettings, *, stop: bytes, emergency_stop: bytes) -> None:
         self.settings = settings
         self.latched = False
-        self._stop, self._emergency_stop = stop, emergency_stop
+        self.proof = StopProof()
         self.current: Motion | None = None
         """The command that is being carried out."""
         self.commanded_at = -math.inf
+        self.unconfirmed = False
+        """Stop was repeated for ``UNPROVED_S`` and nothing showed that the robot stands."""
+        self._stop, self._emergency_stop = stop, emergency_stop
         self._expires_at = -math.inf
-        self._stopping_until = -math.inf
-        self._written_at = self._said_at = -math.inf
-        self._last_written = b""
-        self._urgent = False
-        self._fresh = self._switching = False
-        self._quiet = True
-        """Nothing is to be written until something happens."""
+        self._stopping_since: float | None = None
+        self._urgent = self._fresh = self._switching = False
+        self._said_at = self._fresh_at = self._stop_at = -math.inf
 
     def command(self, motion: Motion, now: float, *, expires_at: float) -> None:
-        """The newest command replaces whatever was current; another's is stopped in between."""
+        """The newest command replaces the current one; another authority's is stopped first."""
         before, self.current = self.current, motion
         self.commanded_at, self._expires_at = now, expires_at
-        self._fresh, self._quiet = True, False
+        self._stopping_since = None
+        self._fresh = True
         self._switching |= before is not None and before.authority is not motion.authority
         self._urgent = self._switching or motion.stands
-        if self._urgent and self._just_written(self._stop, now):
+        if self._urgent and now - self._stop_at < PACE_S:
             self._switching = self._urgent = False
+            self._fresh_at = self._stop_at
 
     def discard(self) -> None:
-        """No command is current and the line goes quiet; an e-stop stays."""
-        self.current = None
-        self._stopping_until = -math.inf
+        """No command is current and the line goes quiet; a latched e-stop stays."""
+        self.current = self._stopping_since = None
         self._fresh = self._urgent = self._switching = False
 
     def halt(self, now: float) -> None:
-        """Discard the command, Stop at once, and repeat it for ``STOPPING_S``."""
+        """Discard the command, Stop at once, and repeat it until the robot is seen to stand."""
         self.discard()
-        self._stopping_until, self._quiet = now + STOPPING_S, False
-        self._urgent = not self._just_written(self._stop, now)
+        self._stopping_since = now
+        self._urgent = now - self._stop_at >= PACE_S
 
     def latch(self, now: float) -> None:
-        """E-stop: nothing but emergency-stop frames from now on, the first at once."""
+        """Emergency stop and Stop at once, twice; then both in turn until the release."""
+        again = self.latched and now - self._said_at < 1.0 / STOP_RATE_HZ
         self.discard()
-        self.latched, self._quiet = True, False
-        self._urgent = not self._just_written(self._emergency_stop, now)
+        self.latched = True
+        self._urgent = not again
 
     def release(self, now: float) -> None:
         """End the e-stop; the robot stands until a new command comes."""
@@ -81,53 +87,65 @@ class CommandStream:
             self.halt(now)
 
     def wrote(self, data: bytes, now: float) -> None:
-        """Anything was written to the line, by whomever."""
-        self._last_written, self._written_at = data, now
+        """A request went out. What it left of a motion frame is completed: say that again."""
+        if data.startswith(self._stop):
+            self._note_stop(now)
+            if not self.latched:
+                self._urgent = False
+        elif self.current is not None:
+            self._said_at = -math.inf
 
     def due(self, now: float) -> bytes:
         """The bytes to write now, possibly none. They count as written."""
-        if self._quiet:
-            return b""
         if self.current is not None and now >= self._expires_at:
             self.halt(now)
-        next_write = self._next_write()
-        if now < next_write:
+        if now < self._next_write():
             return b""
-        frame = self._frame(next_write, now)
-        self._fresh, self._urgent, self._switching = self._switching, False, False
-        if frame:
+        data = self._next(now)
+        if data:
             self._said_at = now
-            self.wrote(frame, now)
-        else:
-            self._quiet = True
-        return frame
+            if self._fresh or self._urgent:
+                self._fresh_at = now
+        self._fresh, self._urgent, self._switching = self._switching, False, False
+        return data
 
     @property
     def wake_at(self) -> float:
         """When ``due`` has to be asked again; infinity while the line is quiet."""
-        if self._quiet:
-            return math.inf
         next_write = self._next_write()
-        if self.current is not None:
-            return min(next_write, self._expires_at)
-        return next_write if self._frame(next_write, next_write) else math.inf
-
-    def _just_written(self, frame: bytes, now: float) -> bool:
-        return self._last_written == frame and now - self._written_at < PACE_S
+        return next_write if self.current is None else min(next_write, self._expires_at)
 
     def _next_write(self) -> float:
         if self._urgent:
             return -math.inf
-        paced_at = self._written_at + PACE_S
-        if self._fresh or (self.current is not None and not self.current.settled):
-            return paced_at
-        return max(paced_at, self._said_at + 1.0 / self.settings.rate_hz)
+        current = self.current
+        if current is not None and self._fresh:
+            return self._fresh_at + PACE_S
+        if self.latched or self._stopping_since is not None or (current and current.stands):
+            return self._said_at + 1.0 / max(self.settings.rate_hz, STOP_RATE_HZ)
+        if current is None:
+            return math.inf
+        return self._said_at + (1.0 / self.settings.rate_hz if current.settled else PACE_S)
 
-    def _frame(self, due_at: float, now: float) -> bytes:
+    def _next(self, now: float) -> bytes:
         if self.latched:
-            return self._emergency_stop
-        if self._switching:
-            return self._stop
-        if self.current is not None:
+            self._note_stop(now)
+            return (self._emergency_stop + self._stop) * (2 if self._urgent else 1)
+        if self.current is not None and not self._switching:
+            if self.current.stands:
+                self._note_stop(now)
+            else:
+                self.proof.moved()
             return self.current.frame(now)
-        return self._stop if due_at < self._stopping_until else b""
+        if self._stopping_since is not None:
+            passed_s = now - self._stopping_since
+            if passed_s >= (STOPPING_S if self.proof.proved else UNPROVED_S):
+                self._stopping_since = None
+                self.unconfirmed = not self.proof.proved
+                return b""
+        self._note_stop(now)
+        return self._stop
+
+    def _note_stop(self, now: float) -> None:
+        self._stop_at = now
+        self.proof.stopped(now)

@@ -77,6 +77,7 @@ class Driving:
     def begin(self) -> None:
         """What was commanded and seen has nothing to do with what comes."""
         self.stream.discard()
+        self.stream.proof.begin()
         self._watch.begin()
 
     def release(self, now: float) -> None:
@@ -106,6 +107,7 @@ class Driving:
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> list[str]:
         """Hold what the robot did against what it was told; sentences for the user."""
+        self.stream.proof.look(reading, now)
         news = []
         finding = self._watch.look(reading, self.stream.current) if self._obeys else None
         if finding is not None:

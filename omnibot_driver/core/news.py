@@ -8,12 +8,25 @@ Knows counts, times and words; not where they come from.
 import math
 from typing import Final
 
+from omnibot_driver.core.board import Mode
 from omnibot_driver.core.plausibility import Refused
 
 NEWS_S: Final = 10.0
 """What is counted is told no more often than this."""
 HEADING_ASSUMED: Final = (
     "the board sends no pose that makes sense: its heading is assumed to have been 0 at first"
+)
+
+STOP_UNSEEN: Final = (
+    "stop unconfirmed: in IMU-only mode the board does not report motion, so Stop is repeated for"
+    " 5 s each time; check by eye that the robot stands"
+)
+STOP_UNANSWERED: Final = (
+    "stop unconfirmed: the board is not responding; check its power and the cable"
+)
+STOP_UNHEEDED: Final = (
+    "stop unconfirmed: Stop was sent for 5 s and the robot still moves; if it is not being pushed,"
+    " the board is not receiving: switch the motors off by hand and check the cable"
 )
 
 
@@ -60,6 +73,12 @@ class Bulletin:
             return []
         self._told.add(sentence)
         return [sentence]
+
+    def unconfirmed(self, mode: Mode) -> list[str]:
+        """Stop was repeated for its whole time, and nothing showed that the robot stands."""
+        if mode is Mode.IMU_ONLY:
+            return self.once(STOP_UNSEEN)
+        return [STOP_UNANSWERED if mode is Mode.UNKNOWN else STOP_UNHEEDED]
 
     def standing(self, sentence: str) -> list[str]:
         """What holds now, empty for nothing; told when it begins to hold."""

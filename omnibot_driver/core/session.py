@@ -92,7 +92,7 @@ class Session:
         )
         self._commands = self._driving.stream
         self._heard_at = self._came_at = -math.inf
-        self._silent = False
+        self._silent = self._leaving = False
         self._last: Reading | None = None
         self._tell_at = -math.inf
         self._bulletin = Bulletin()
@@ -203,6 +203,7 @@ class Session:
         self._tell_at = now
         self.heed(now)
         if after.running and not before.running:
+            self._commands.proof.begin()
             self._commands.halt(now)
         return []
 
@@ -237,6 +238,7 @@ class Session:
             if self._board.mode is not Mode.UNKNOWN:
                 self._board.silence()
                 self._measuring.restart()
+                self._commands.proof.begin()
                 self._commands.halt(now)
                 self._supervisor.heard_nothing(now)
         self._supervisor.tick(now)
@@ -273,10 +275,12 @@ class Session:
 
     def request(self, request: Request, token: object, now: float) -> None:
         """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""
+        if self._leaving:
+            raise RequestRefused("the driver is shutting down")
         self.heed(now)  # what came before is no answer
         self._supervisor.request(request, token, now)
         if request is not Request.START:
-            self._commands.discard()
+            self._commands.halt(now)
 
     def calibrate_gyro(self, token: object, now: float) -> None:
         """Find the gyro's bias; answered by a RequestDone. Raises RequestRefused at once."""
@@ -310,6 +314,16 @@ class Session:
         self._events += self._odometry.reset()
         self._notify(self._driving.check_goal([], now))
 
+    def leave(self, now: float) -> None:
+        """The driver ends: nothing is obeyed any more, and Stop is repeated."""
+        self._leaving = True
+        self._commands.halt(now)
+
+    @property
+    def stands(self) -> bool:
+        """The board has shown that the robot stands, and no motion was commanded since."""
+        return self._commands.proof.proved
+
     def farewell(self, on_exit: OnExit) -> bytes:
         """The last bytes to write before the port is closed."""
         data = self._supervisor.farewell(on_exit)
@@ -328,7 +342,11 @@ class Session:
             return b""
         if data := self._supervisor.take_output():
             self._commands.wrote(data, now)
-        return data + self._commands.due(now)
+        data += self._commands.due(now)
+        if self._commands.unconfirmed:
+            self._commands.unconfirmed = False
+            self._notify(self._bulletin.unconfirmed(self._board.mode))
+        return data
 
     def take_events(self) -> list[Event]:
         """What happened since the last call, in order."""
@@ -367,6 +385,7 @@ class Session:
                     self._commands.halt(now)
             elif isinstance(reading, PausedReading):
                 self._driving.begin()
+                self._commands.proof.paused()
                 if self._board.mode.running:  # again, within one read
                     self._commands.halt(now)
                 self._supervisor.heard_paused(now, continues=reading.continues)
@@ -389,6 +408,8 @@ class Session:
             self._events += map(Notice, sentences)
 
     def _command(self, wish: Wish, now: float) -> None:
+        if self._leaving:
+            raise CommandRefused("motion command refused: the driver is shutting down")
         motion, expires_at = wish
         unheard = now - self._heard_at >= UNHEARD_S and not motion.stands
         if reason := why_not_drive(

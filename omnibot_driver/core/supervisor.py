@@ -25,6 +25,8 @@ FLOWING_S: Final = 0.1
 IN_FLIGHT_S: Final = 0.1
 """A notice that comes sooner than this after a letter may have been sent before it was obeyed; and
 one that is followed by data within this time does not show that the board is paused."""
+LAST_STOPS: Final = 3
+"""So many at once when the port is about to be closed: one may be lost."""
 ANSWER_WITHIN_S: Final = 4.5
 RESET_WITHIN_S: Final = 9.5
 
@@ -136,7 +138,6 @@ class Supervisor:
         elif request is Request.PAUSE:
             self._wanted = Wanted.PAUSED
             self._begin_pausing(now, with_p=False)
-            self._output += self._board.stop()
         else:
             self._was_running = self._board.mode.running
             if self._wanted is Wanted.ANY and self._was_running:
@@ -203,6 +204,9 @@ class Supervisor:
 
     def farewell(self, on_exit: OnExit) -> bytes:
         """The last bytes to the board: it is stopped in any case, and left so."""
+        return LAST_STOPS * self._board.stop() + self._last_request(on_exit)
+
+    def _last_request(self, on_exit: OnExit) -> bytes:
         settled = self.phase is Phase.SETTLED
         if on_exit == "reset":
             return self._board.reset()
@@ -210,7 +214,7 @@ class Supervisor:
             return self._board.pause()
         if on_exit == "pause" and not (settled and self._board.mode is Mode.PAUSED):
             return self._board.force_pause()
-        return self._board.stop()
+        return b""
 
     def _begin(self, now: float) -> None:
         """The opening sequence; a board that is not wanted running gets no S."""

@@ -18,6 +18,7 @@ from omnibot_driver.core.limits import MAX_WORD, slow, to_nearest
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
 from omnibot_driver.core.omnibot.modes import Happening
+from omnibot_driver.core.omnibot.outbound import begins_with_a_letter, harmless, transmission
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.se2 import Pose
@@ -25,10 +26,9 @@ from omnibot_driver.core.se2 import Pose
 TICK_S: Final = 0.01
 RATES_HZ: Final = (100.0, 25.0, 5.0)
 
-STOP: Final = frames.encode(frames.STOP)
-EMERGENCY_STOP: Final = frames.encode(frames.EMERGENCY_STOP)
-WAKE: Final = bytes(8)
-"""More than the three bytes a booting board swallows, and enough to end any half command."""
+_STOP: Final = frames.encode(frames.STOP)
+STOP: Final = transmission(_STOP)
+EMERGENCY_STOP: Final = transmission(frames.encode(frames.EMERGENCY_STOP))
 
 
 class OmniBot:
@@ -127,28 +127,27 @@ class OmniBot:
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def wake(self) -> bytes:
-        """Eight zero bytes and Stop."""
-        return WAKE + STOP
+        """Stop; the zeros before it wake the board."""
+        return STOP
 
     def start(self) -> bytes:
         """S."""
         self._translation.apply(Happening.SENT_START)
-        return frames.FORCE_START
+        return transmission(frames.FORCE_START)
 
     def pause(self) -> bytes:
         """Stop, then P: a toggle, so refused unless the board is known to run."""
         self._translation.apply(Happening.SENT_PAUSE)
-        return STOP + frames.TOGGLE_PAUSE
+        return transmission(_STOP, frames.TOGGLE_PAUSE)
 
     def force_pause(self) -> bytes:
         """Stop, S, P: S makes it run in any case, so that the toggle has one outcome."""
-        return STOP + frames.FORCE_START + frames.TOGGLE_PAUSE
+        return transmission(_STOP, frames.FORCE_START, frames.TOGGLE_PAUSE)
 
     def reset(self) -> bytes:
-        """Stop, then R; zeros first where the board may not be listening yet."""
-        wake = b"" if self.mode.running else WAKE
+        """Stop, then R."""
         self._translation.apply(Happening.SENT_RESET)
-        return wake + STOP + frames.RESET
+        return transmission(_STOP, frames.RESET)
 
     def stop(self) -> bytes:
         """The manual's Stop, which stands still whatever the board's control switch says."""
@@ -182,13 +181,19 @@ class OmniBot:
                 f" {MAX_WORD / position:.2f} m and {MAX_WORD / heading:.2f} rad can be said:"
                 " ~/reset begins a new frame where the robot stands"
             )
-        x, y, yaw = map(to_nearest, counts)
-        return frames.command(frames.VELOCITY_MODE, x, y, yaw)
+        if any(begins_with_a_letter(to_nearest(count)) for count in counts):
+            raise CommandRefused(
+                f"cmd_pose refused: in the board's own frame it is x {pose.x_m:.2f} m,"
+                f" y {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad, and a damaged line could turn"
+                " one of these numbers into a command to start, pause or reset the board: choose"
+                " a goal half a metre or half a radian away from it"
+            )
+        return transmission(frames.command(frames.VELOCITY_MODE, *harmless(counts)))
 
     def _drive(self, mode: int, counts: Vector3) -> bytes:
         a, b, c = counts
         if abs(a) > MAX_WORD or abs(b) > MAX_WORD or abs(c) > MAX_WORD:
             self._saturated += 1
             a, b, c = slow(counts, MAX_WORD)
-        x, y, z = to_nearest(a), to_nearest(b), to_nearest(c)
-        return frames.command(mode, x, y, z) if x or y or z else STOP
+        words = harmless((a, b, c))
+        return transmission(frames.command(mode, *words)) if any(words) else STOP

@@ -1,0 +1,86 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How frames and letters are put on a line that loses bytes, to a receiver that nobody knows.
+
+The frames are the manual's; this module decides what stands before them, and which of two
+neighbouring values a word takes. It knows bytes, not what is commanded, nor when.
+
+The argument. A control frame has no checksum, and the board's parser is unknown. The worst one
+counts seven bytes after ``FF FE``, however long they take. If a frame lost a byte, that parser
+takes the missing one from whatever comes next.
+
+1. *Zeros stand before everything.* A zero is no letter and no header, and seven of them end any
+   frame that was begun. So a Stop, an emergency stop or a letter that was cut is completed by
+   zeros: it stays a Stop, or becomes a frame in mode 0, which is none. A letter is never
+   swallowed by a frame that was begun, and a header never stands behind an ``FF``. The eighth zero
+   makes up for one that is lost.
+2. *Nothing stands behind.* A motion frame that was cut stays without effect until the next
+   transmission. There the zeros complete it, and the frame behind them replaces it 16 bytes
+   (1.4 ms at 115200 baud) later. Zeros right behind a motion frame would complete it at once, for
+   a whole repetition, and on a parser that gives a cut frame up after a pause for the first time.
+3. *A payload is harmless by itself.* Where its own header is lost, a parser looks for letters and
+   headers in it. So no byte of a payload is ``S``, ``P`` or ``R``, and ``FE`` never follows ``FF``:
+   the word takes the nearest value without. It is one LSB away, but where the high byte is the
+   letter.
+4. *What is lost is said again*: everything here is repeated, or answered by what the board shows.
+
+What remains: an added or changed byte within a frame can make it another valid frame, until the
+next repetition.
+"""
+
+import re
+import struct
+from typing import Final
+
+from omnibot_driver.core.limits import MAX_WORD, to_nearest
+from omnibot_driver.core.omnibot.frames import (
+    COMMAND_HEADER,
+    FORCE_START,
+    RESET,
+    TOGGLE_PAUSE,
+    Words,
+)
+
+ZEROS: Final = bytes(8)
+"""Seven end any frame that was begun; one may be lost. Three wake a board that has booted."""
+
+_LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET
+_HARMFUL: Final = re.compile(b"[%s]|%s" % (_LETTERS, re.escape(COMMAND_HEADER))).search
+_WORDS: Final = struct.Struct(">3h").pack
+_WORD_FOLLOWED: Final = struct.Struct(">hB").pack
+
+
+def transmission(*parts: bytes) -> bytes:
+    """Frames and letters as they go out, in this order."""
+    return b"".join([ZEROS + part for part in parts])
+
+
+def harmless(counts: tuple[float, float, float]) -> Words:
+    """The nearest words, within ``MAX_WORD``, whose bytes are no letter and make no header."""
+    a, b, c = counts
+    words = to_nearest(a), to_nearest(b), to_nearest(c)
+    if not _HARMFUL(_WORDS(*words)):
+        return words
+    last = _nearest(c, 0)
+    middle = _nearest(b, last >> 8 & 0xFF)
+    return _nearest(a, middle >> 8 & 0xFF), middle, last
+
+
+def begins_with_a_letter(word: int) -> bool:
+    """Whether the high byte is a letter, which no neighbouring value avoids."""
+    return word >> 8 & 0xFF in _LETTERS
+
+
+def _nearest(count: float, follows: int) -> int:
+    """``follows``: the byte behind the word."""
+    word = to_nearest(count)
+    reach = 0
+    while True:
+        near = [
+            other
+            for other in (word - reach, word + reach)
+            if abs(other) <= MAX_WORD and not _HARMFUL(_WORD_FOLLOWED(other, follows))
+        ]
+        if near:
+            return min(near, key=lambda other: (abs(other - count), abs(other)))
+        reach += 1

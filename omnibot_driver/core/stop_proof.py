@@ -1,0 +1,55 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Whether the robot is known to stand still since it was last told to.
+
+A stop is not acknowledged, but displacements show it. Knows displacements and when Stop and motion
+went out; not what is done while the proof is missing. Time is an argument.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.board import DisplacementReading
+
+STILL_MPS: Final = 0.01
+STILL_RADPS: Final = 0.03
+"""Above two encoder counts of a wheel in 40 ms, below the slowest linear command (0.014 m/s)."""
+STILL_S: Final = 0.1
+"""Three displacements of 40 ms: one alone may be damaged, or be from before the wheels turned."""
+UNDER_WAY_S: Final = 0.05
+"""A displacement that arrives so soon after Stop went out may have ended before Stop arrived."""
+
+
+class StopProof:
+    """``proved``: Stop went out, no motion since, and the robot has stood for ``STILL_S``."""
+
+    def __init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Nothing is known of the robot."""
+        self.proved = False
+        self._stopped_at = math.inf
+        self._still_s = 0.0
+
+    moved = begin
+    """A command to move went out."""
+
+    def stopped(self, now: float) -> None:
+        """Stop went out."""
+        self._stopped_at = min(self._stopped_at, now)
+
+    def paused(self) -> None:
+        """The board says that it is paused: its motors are off."""
+        self.proved = True
+
+    def look(self, reading: DisplacementReading, now: float) -> None:
+        """A displacement arrived."""
+        if not reading.duration_s or now < self._stopped_at + UNDER_WAY_S:
+            return
+        moves = (
+            math.hypot(reading.dx_m, reading.dy_m) > STILL_MPS * reading.duration_s
+            or abs(reading.dyaw_rad) > STILL_RADPS * reading.duration_s
+        )
+        self._still_s = 0.0 if moves else self._still_s + reading.duration_s
+        self.proved = self._still_s >= STILL_S
