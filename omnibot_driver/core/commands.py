@@ -43,7 +43,7 @@ class CommandStream:
         """The command that is being carried out."""
         self.commanded_at = -math.inf
         self.unconfirmed = False
-        """Stop was repeated for ``UNPROVED_S`` and nothing showed that the robot stands."""
+        """Stop was repeated for ``UNPROVED_S`` and a robot that was driven is not seen to stand."""
         self._stop, self._emergency_stop = stop, emergency_stop
         self._expires_at = -math.inf
         self._stopping_since: float | None = None
@@ -67,18 +67,24 @@ class CommandStream:
         self.current = self._stopping_since = None
         self._fresh = self._urgent = self._switching = False
 
+    def connect(self) -> None:
+        """The line is new, and the board has heard nothing of it; a latched e-stop is said."""
+        self.discard()
+        self.proof.begin()
+        self._said_at = self._fresh_at = self._stop_at = -math.inf
+        self._urgent = self.latched
+
     def halt(self, now: float) -> None:
         """Discard the command, Stop at once, and repeat it until the robot is seen to stand."""
         self.discard()
         self._stopping_since = now
         self._urgent = now - self._stop_at >= PACE_S
 
-    def latch(self, now: float) -> None:
+    def latch(self) -> None:
         """Emergency stop and Stop at once, twice; then both in turn until the release."""
-        again = self.latched and now - self._said_at < 1.0 / STOP_RATE_HZ
-        self.discard()
-        self.latched = True
-        self._urgent = not again
+        if not self.latched:
+            self.discard()
+            self.latched = self._urgent = True
 
     def release(self, now: float) -> None:
         """End the e-stop; the robot stands until a new command comes."""
@@ -101,10 +107,11 @@ class CommandStream:
             self.halt(now)
         if now < self._next_write():
             return b""
+        new = self._fresh or self._urgent or not (self.current is None or self.current.settled)
         data = self._next(now)
         if data:
             self._said_at = now
-            if self._fresh or self._urgent:
+            if new:
                 self._fresh_at = now
         self._fresh, self._urgent, self._switching = self._switching, False, False
         return data
@@ -136,12 +143,13 @@ class CommandStream:
                 self._note_stop(now)
             else:
                 self.proof.moved()
+                self._stop_at = -math.inf
             return self.current.frame(now)
         if self._stopping_since is not None:
             passed_s = now - self._stopping_since
             if passed_s >= (STOPPING_S if self.proof.proved else UNPROVED_S):
                 self._stopping_since = None
-                self.unconfirmed = not self.proof.proved
+                self.unconfirmed = self.proof.owed
                 return b""
         self._note_stop(now)
         return self._stop

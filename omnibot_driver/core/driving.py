@@ -77,7 +77,6 @@ class Driving:
     def begin(self) -> None:
         """What was commanded and seen has nothing to do with what comes."""
         self.stream.discard()
-        self.stream.proof.begin()
         self._watch.begin()
 
     def release(self, now: float) -> None:

@@ -21,9 +21,7 @@ STOP_UNSEEN: Final = (
     "stop unconfirmed: in IMU-only mode the board does not report motion, so Stop is repeated for"
     " 5 s each time; check by eye that the robot stands"
 )
-STOP_UNANSWERED: Final = (
-    "stop unconfirmed: the board is not responding; check its power and the cable"
-)
+STOP_UNANSWERED: Final = "stop unconfirmed: the board is not responding"
 STOP_UNHEEDED: Final = (
     "stop unconfirmed: Stop was sent for 5 s and the robot still moves; if it is not being pushed,"
     " the board is not receiving: switch the motors off by hand and check the cable"

@@ -165,11 +165,10 @@ class Session:
         """The port is open."""
         self._board.connect()
         self._driving.begin()
+        self._commands.connect()
         self._measuring.restart()
         self._silent, self._heard_at, self._came_at = False, now, -math.inf
         self._supervisor.opened(now)
-        if self.estop_active:
-            self._commands.latch(now)
 
     def closed(self, now: float) -> None:
         """The port is gone."""
@@ -296,7 +295,7 @@ class Session:
         if active:
             if not self.estop_active:
                 self._notify([f"e-stop latched by {by}"])
-            self._commands.latch(now)
+            self._commands.latch()
             if self._closed:
                 return "e-stop latched; the port is not open: the stop is sent as soon as it is"
             if self._board.mode is Mode.UNKNOWN:

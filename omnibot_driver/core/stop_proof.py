@@ -21,9 +21,13 @@ UNDER_WAY_S: Final = 0.05
 
 
 class StopProof:
-    """``proved``: Stop went out, no motion since, and the robot has stood for ``STILL_S``."""
+    """``proved``: Stop went out, no motion since, and the robot has stood for ``STILL_S``.
+
+    ``owed``: motion went out, and since then nothing has proved that the robot stands.
+    """
 
     def __init__(self) -> None:
+        self.owed = False
         self.begin()
 
     def begin(self) -> None:
@@ -32,8 +36,10 @@ class StopProof:
         self._stopped_at = math.inf
         self._still_s = 0.0
 
-    moved = begin
-    """A command to move went out."""
+    def moved(self) -> None:
+        """A command to move went out."""
+        self.begin()
+        self.owed = True
 
     def stopped(self, now: float) -> None:
         """Stop went out."""
@@ -41,7 +47,7 @@ class StopProof:
 
     def paused(self) -> None:
         """The board says that it is paused: its motors are off."""
-        self.proved = True
+        self.proved, self.owed = True, False
 
     def look(self, reading: DisplacementReading, now: float) -> None:
         """A displacement arrived."""
@@ -53,3 +59,4 @@ class StopProof:
         )
         self._still_s = 0.0 if moves else self._still_s + reading.duration_s
         self.proved = self._still_s >= STILL_S
+        self.owed = self.owed and not self.proved

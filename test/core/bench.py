@@ -18,9 +18,16 @@ from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 
 TICK_S = 0.01
-STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
-EMERGENCY_STOP = bytes.fromhex("FF FE 10 00 00 00 00 00 00")
-OPENING = bytes(8) + STOP
+ZEROS = bytes(8)
+STOP = ZEROS + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+EMERGENCY_STOP = ZEROS + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+START, PAUSE, RESET = ZEROS + b"S", ZEROS + b"P", ZEROS + b"R"
+OPENING = STOP
+
+
+def bare(data: bytes) -> bytes:
+    """A transmission without the zeros before it."""
+    return data.lstrip(b"\0")
 
 
 class Bench:

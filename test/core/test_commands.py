@@ -8,10 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.core.commands import PACE_S, STOPPING_S, CommandSettings, CommandStream
+from omnibot_driver.core.commands import (
+    PACE_S,
+    STOPPING_S,
+    UNPROVED_S,
+    CommandSettings,
+    CommandStream,
+)
 from omnibot_driver.core.motion import Authority, SteadyMotion
 
 STOP, ESTOP, GO, TURN = b"stop", b"estop", b"go", b"turn"
+BOTH = ESTOP + STOP
 TIMEOUT_S = 0.5
 
 
@@ -87,17 +94,23 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: CommandStre
     assert written[1][0] - written[0][0] == pytest.approx(0.05)
 
 
-def test_after_the_timeout_stop_is_repeated_for_a_second_and_then_the_line_is_quiet(
-    stream: CommandStream,
+@pytest.mark.parametrize(("stands", "for_s"), [(True, STOPPING_S), (False, UNPROVED_S)])
+@pytest.mark.parametrize("rate_hz", [1.0, 20.0])
+def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
+    stream: CommandStream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """The board never stops by itself."""
+    """For a second at least, for five at most, 20 times a second; then the line is quiet."""
+    stream.settings = CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz)
     order(stream, GO, 1.0)
-    written = run(stream, 1.0, 10.0)
-    stops = [at for at, frame in written if frame == STOP]
+    stops = [at for at, frame in run(stream, 1.0, 1.6) if frame == STOP]
+    if stands:
+        stream.proof.paused()
+    stops += [at for at, frame in run(stream, 1.61, 10.0) if frame == STOP]
     assert stops[0] == pytest.approx(1.5)
-    assert stops[-1] - stops[0] == pytest.approx(STOPPING_S, abs=0.051)
-    assert len(stops) == pytest.approx(20, abs=1)
+    assert stops[-1] - stops[0] == pytest.approx(for_s, abs=0.051)
+    assert len(stops) == pytest.approx(20 * for_s, abs=1)
     assert stream.wake_at == math.inf
+    assert stream.unconfirmed is not stands
 
 
 def test_stop_never_waits(stream: CommandStream) -> None:
@@ -106,6 +119,40 @@ def test_stop_never_waits(stream: CommandStream) -> None:
     stream.due(1.0)
     order(stream, STOP, 1.001)
     assert stream.due(1.001) == STOP
+
+
+def test_a_repetition_does_not_make_a_new_command_wait(stream: CommandStream) -> None:
+    """Only new commands are thinned."""
+    order(stream, GO, 1.0)
+    stream.due(1.0)
+    assert stream.due(1.05) == GO
+    order(stream, TURN, 1.051)
+    assert stream.due(1.051) == TURN
+
+
+def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
+    """At a command rate of 1 Hz too: one Stop may be lost."""
+    stream = CommandStream(CommandSettings(rate_hz=1.0), stop=STOP, emergency_stop=ESTOP)
+    order(stream, STOP, 1.0)
+    assert len(run(stream, 1.0, 1.49)) == pytest.approx(10, abs=1)
+
+
+def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
+    stream: CommandStream,
+) -> None:
+    """The zeros before the letter may have completed a frame that was cut."""
+    order(stream, GO, 1.0)
+    stream.due(1.0)
+    stream.wrote(b"S", 1.02)
+    assert stream.due(1.02) == GO
+
+
+def test_a_new_line_hears_a_latched_estop_at_once(stream: CommandStream) -> None:
+    """Twice, whenever it was said last."""
+    stream.latch()
+    stream.due(1.0)
+    stream.connect()
+    assert stream.due(1.001) == 2 * BOTH
 
 
 def test_a_flood_of_stops_keeps_the_pace(stream: CommandStream) -> None:
@@ -184,19 +231,19 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: CommandSt
     order(stream, GO, 1.0)
     stream.due(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
-    stream.latch(1.001)
+    stream.latch()
     assert stream.current is None
-    assert {frame for _, frame in run(stream, 1.001, 1.2)} == {ESTOP}
+    assert {frame for _, frame in run(stream, 1.001, 1.2)} == {2 * BOTH, BOTH}
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: CommandStream) -> None:
-    """A latched stop is said for as long as it is latched."""
+    """Stop with it: firmware that ignores mode 10 has to stand as well. At first both twice."""
     order(stream, GO, 1.0)
     stream.due(1.0)
-    stream.latch(1.001)
-    assert stream.due(1.001) == ESTOP
+    stream.latch()
+    assert stream.due(1.001) == 2 * BOTH
     written = run(stream, 1.001, 101.0)
-    assert {frame for _, frame in written} == {ESTOP}
+    assert {frame for _, frame in written} == {BOTH}
     assert len(written) == pytest.approx(2000, abs=2)
 
 
@@ -204,14 +251,14 @@ def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
     stream: CommandStream,
 ) -> None:
     """Letters at 50 Hz, and the stop still goes out at 20 Hz."""
-    stream.latch(1.0)
+    stream.latch()
     written = 0
     for step in range(1000):
         now = 1.0 + step * 0.001
         if step % 20 == 7:
             stream.wrote(b"S", now)
-        written += stream.due(now) == ESTOP
-    assert written >= 15
+        written += stream.due(now) in (BOTH, 2 * BOTH)
+    assert written >= 20
 
 
 def test_a_flood_of_emergency_stops_keeps_the_pace(stream: CommandStream) -> None:
@@ -219,16 +266,17 @@ def test_a_flood_of_emergency_stops_keeps_the_pace(stream: CommandStream) -> Non
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001
-        stream.latch(now)
+        stream.latch()
         written.append(stream.due(now))
-    assert 90 <= written.count(ESTOP) <= 101
+    assert written.count(2 * BOTH) == 1
+    assert written.count(BOTH) == pytest.approx(19, abs=1)
 
 
 def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: CommandStream) -> None:
     """The robot moves again only on a command that is newer than the release."""
     order(stream, GO, 1.0)
     stream.due(1.0)
-    stream.latch(1.1)
+    stream.latch()
     stream.due(1.1)
     stream.release(1.2)
     assert {frame for _, frame in run(stream, 1.2, 5.0)} == {STOP}
@@ -263,18 +311,18 @@ def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
 ) -> None:
     """The invariants of the outbound line under any sequence of events."""
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
-    written_at, driven = -math.inf, b""
+    fresh_at, fresh, driven = -math.inf, False, b""
     for step, pause in steps:
         if step == "command":
             order(stream, GO, now)
-            commanded_at = now
+            commanded_at, fresh = now, True
         elif step == "wheels":
             order(stream, TURN, now, Authority.WHEELS)
-            commanded_at = now
+            commanded_at, fresh = now, True
         elif step == "stop":
             order(stream, STOP, now)
         elif step == "latch":
-            stream.latch(now)
+            stream.latch()
         elif step == "release":
             stream.release(now)
         elif step == "discard":
@@ -287,11 +335,12 @@ def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
                 assert driven in (b"", frame), "no stop between two authorities"
                 assert not stream.latched
                 assert now - commanded_at < 0.5
-                assert now - written_at >= PACE_S - 1e-9
+                assert not fresh or now - fresh_at >= PACE_S - 1e-9
+                fresh_at, fresh = (now, False) if fresh else (fresh_at, fresh)
             if stream.latched:
-                assert frame in (b"", ESTOP)
+                assert frame in (b"", BOTH, 2 * BOTH)
             if frame:
-                written_at, driven = now, frame if frame in (GO, TURN) else b""
+                driven = frame if frame in (GO, TURN) else b""
             assert stream.wake_at > now
             if stream.wake_at > end:
                 break

@@ -5,7 +5,7 @@
 from unittest.mock import ANY
 
 import pytest
-from bench import EMERGENCY_STOP, OPENING, Bench
+from bench import EMERGENCY_STOP, OPENING, START, STOP, Bench
 from robots import drive_on, driving, estop
 
 from omnibot_driver.core.errors import CommandRefused
@@ -27,11 +27,12 @@ def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
     start = len(bench.written)
     assert "latched" in bench.session.estop(True, bench.now)
     bench.settle()
-    assert bench.written_since(start) == EMERGENCY_STOP
+    assert bench.written_since(start) == 2 * (EMERGENCY_STOP + STOP)
     with pytest.raises(CommandRefused, match="~/estop"):
         bench.drive(0.5)
+    start += 1
     bench.run(5.0)
-    assert {data for _, data in bench.written[start:]} == {EMERGENCY_STOP}
+    assert {data for _, data in bench.written[start:]} == {EMERGENCY_STOP + STOP}
     assert bench.still()
     assert StateChanged() in bench.events
 
@@ -49,7 +50,7 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
     bench.ask(Request.RESET, 10.0)
     assert bench.session.estop_active
     bench.run(1.0)
-    assert bench.written[-1][1] == EMERGENCY_STOP
+    assert bench.written[-1][1] == EMERGENCY_STOP + STOP
     assert "released" in bench.session.estop(False, bench.now)
     bench.settle()
     bench.run(2.0)
@@ -67,7 +68,7 @@ def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_op
     assert "port is not open" in estop(bench, True)
     start = len(bench.written)
     bench.open()
-    assert bench.written_since(start) == OPENING + b"S" + EMERGENCY_STOP
+    assert bench.written_since(start) == OPENING + START + 2 * (EMERGENCY_STOP + STOP)
     bench.run(2.0)
     assert bench.still()
 

@@ -3,7 +3,7 @@
 """The last bytes before the port is closed: the robot is stopped, and left as it was asked for."""
 
 import pytest
-from bench import EMERGENCY_STOP, STOP, Bench
+from bench import EMERGENCY_STOP, PAUSE, RESET, STOP, Bench
 from robots import paused, standing
 
 from omnibot_driver.core.supervisor import Request
@@ -16,19 +16,19 @@ def bench() -> Bench:
 
 
 @pytest.mark.parametrize(
-    ("on_exit", "expected"), [("stop", STOP), ("pause", STOP + b"P"), ("reset", STOP + b"R")]
+    ("on_exit", "expected"), [("stop", b""), ("pause", STOP + PAUSE), ("reset", STOP + RESET)]
 )
 def test_the_farewell_stops_the_robot_whatever_else_it_does(
     bench: Bench, on_exit: str, expected: bytes
 ) -> None:
     """Stop comes first."""
-    assert bench.session.farewell(on_exit) == expected
+    assert bench.session.farewell(on_exit) == 3 * STOP + expected
 
 
 def test_a_farewell_to_a_paused_board_does_not_unpause_it() -> None:
     """P is a toggle."""
     bench = paused()
-    assert bench.session.farewell("pause") == STOP
+    assert bench.session.farewell("pause") == 3 * STOP
 
 
 def test_a_farewell_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
@@ -60,4 +60,4 @@ def test_a_farewell_while_a_start_is_in_flight_ends_paused() -> None:
 def test_a_farewell_under_estop_repeats_the_estop(bench: Bench) -> None:
     """The last thing the board hears is that it must not move."""
     bench.session.estop(True, bench.now)
-    assert bench.session.farewell("stop") == STOP + EMERGENCY_STOP
+    assert bench.session.farewell("stop") == 3 * STOP + EMERGENCY_STOP

@@ -29,7 +29,8 @@ from omnibot_driver.core.omnibot import (
 )
 from omnibot_driver.core.omnibot.frames import Frame
 
-STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+ZEROS = bytes(8)
+STOP = ZEROS + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 REST = ImuFrame((120, -80, -16384), (131, 0, -131))
 TEXT = b"Paused: 1 \n"
 
@@ -196,19 +197,19 @@ def test_faults_are_counted_over_all_connections() -> None:
 def test_stop_and_emergency_stop_are_the_manuals() -> None:
     """From the appendix."""
     assert bot().stop() == STOP
-    assert bot().emergency_stop() == bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+    assert bot().emergency_stop() == ZEROS + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
 
 
 def test_waking_is_eight_zeros_and_stop() -> None:
     """Zeros end any half command and are no letters."""
-    assert bot().wake() == bytes(8) + STOP
+    assert bot().wake() == STOP
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_start_is_s_in_every_mode(mode: Mode) -> None:
     """It is harmless, and does not change the belief."""
     board = in_mode(mode)
-    assert board.start() == b"\x53"
+    assert board.start() == ZEROS + b"\x53"
     assert board.mode is mode
 
 
@@ -217,7 +218,7 @@ def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -
     """A toggle is for boards whose state is known; a refusal changes nothing."""
     board = in_mode(mode)
     if mode.running:
-        assert board.pause() == STOP + b"\x50"
+        assert board.pause() == STOP + ZEROS + b"\x50"
     else:
         with pytest.raises(RequestRefused):
             board.pause()
@@ -225,11 +226,10 @@ def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -
 
 
 @pytest.mark.parametrize("mode", Mode)
-def test_reset_is_stop_and_r_with_zeros_first_where_the_board_may_not_listen(mode: Mode) -> None:
+def test_reset_is_stop_and_r(mode: Mode) -> None:
     """Afterwards the mode is unknown."""
     board = in_mode(mode)
-    prefix = b"" if mode.running else bytes(8)
-    assert board.reset() == prefix + STOP + b"\x52"
+    assert board.reset() == STOP + ZEROS + b"\x52"
     assert board.mode is Mode.UNKNOWN
 
 

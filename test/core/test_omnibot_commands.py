@@ -3,9 +3,12 @@
 """Wishes in SI units as the board's bytes."""
 
 import math
+import re
+import struct
 
 import pytest
-from hypothesis import given
+from bench import bare
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from strategies import twists, words
 
@@ -14,7 +17,10 @@ from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.se2 import Pose
 
-STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+STOP = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+
+HARMFUL = re.compile(rb"[SPR]|\xff\xfe")
+"""What acts by itself where the header before it is lost."""
 
 
 def bot(**settings: object) -> OmniBot:
@@ -34,36 +40,38 @@ def test_a_velocity_is_70_lsb_for_a_metre_and_500_for_a_radian(
     twist: tuple[float, float, float], typed: str
 ) -> None:
     """The vendor's scales, in mode 1."""
-    assert bot().velocity(BodyTwist(*twist)) == bytes.fromhex(typed)
+    assert bare(bot().velocity(BodyTwist(*twist))) == bytes.fromhex(typed)
 
 
 def test_the_scales_are_those_of_the_settings() -> None:
     """100 LSB per m/s, 200 per rad/s."""
     board = bot(linear_scale=100.0, angular_scale=200.0)
     typed = bytes.fromhex("FF FE 01 00 64 FF 38 00 C8")
-    assert board.velocity(BodyTwist(1.0, -2.0, 1.0)) == typed
+    assert bare(board.velocity(BodyTwist(1.0, -2.0, 1.0))) == typed
 
 
 def test_wheel_rates_are_rim_speeds_in_the_linear_unit() -> None:
     """10 rad/s at 29 mm is 0.29 m/s: 20.3 LSB; mode 2."""
-    assert bot().wheels((10.0, -10.0, 1.0)) == bytes.fromhex("FF FE 02 00 14 FF EC 00 02")
+    assert bare(bot().wheels((10.0, -10.0, 1.0))) == bytes.fromhex("FF FE 02 00 14 FF EC 00 02")
     wide = bot(wheel_radius_m=0.058)
-    assert wide.wheels((10.0, 0.0, 0.0)) == bytes.fromhex("FF FE 02 00 29 00 00 00 00")
+    assert bare(wide.wheels((10.0, 0.0, 0.0))) == bytes.fromhex("FF FE 02 00 29 00 00 00 00")
 
 
 def test_commands_are_rounded_to_the_nearest() -> None:
     """0.0493 m/s is 3.451 LSB, 0.0508 m/s is 3.556."""
-    assert bot().velocity(BodyTwist(0.0493, -0.0508, 0.0))[3:7] == bytes.fromhex("00 03 FF FC")
+    assert bare(bot().velocity(BodyTwist(0.0493, -0.0508, 0.0)))[3:7] == bytes.fromhex(
+        "00 03 FF FC"
+    )
 
 
 @given(twists)
 def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -> None:
     """Zeros in mode 1 would mean: drive to the origin, with the switch on position."""
-    command = bot().velocity(twist)
+    command = bare(bot().velocity(twist))
     assert command != bytes.fromhex("FF FE 01 00 00 00 00 00 00")
     counts = (70 * twist.vx_mps, 70 * twist.vy_mps, 500 * twist.yaw_rate_radps)
     if max(map(abs, counts)) < 0.5:
-        assert command == STOP
+        assert command == bare(STOP)
     else:
         assert command[2] == 1 or max(map(abs, counts)) == 0.5
 
@@ -80,19 +88,22 @@ def test_a_command_too_large_for_the_wire_keeps_its_direction(
     values: tuple[float, float, float],
 ) -> None:
     """Scaled down as a whole; never an exception, never a word that wraps round."""
-    command = bot().velocity(BodyTwist(*values))
+    command = bare(bot().velocity(BodyTwist(*values)))
     counts = (70 * values[0], 70 * values[1], 500 * values[2])
     largest = max(1.0, max(map(abs, counts)) / 32767)
     sent = [int.from_bytes(command[n : n + 2], "big", signed=True) for n in (3, 5, 7)]
-    for word, count in zip(sent, counts, strict=True):
-        assert word == pytest.approx(count / largest, abs=0.500001)
+    fitting = [count / largest for count in counts]
+    off = 512.5 if HARMFUL.search(struct.pack(">3h", *map(round, fitting))) else 0.500001
+    for word, count in zip(sent, fitting, strict=True):
+        assert word == pytest.approx(count, abs=off)
 
 
 @given(words, words, words)
 def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int) -> None:
-    """Whole counts survive scaling, rounding and the wire."""
+    """Whole counts survive scaling, rounding and the wire, but for what could act by itself."""
     x, y, omega = (max(-32767, word) for word in (x, y, omega))
-    command = bot().velocity(BodyTwist(x / 70, y / 70, omega / 500))
+    assume(not HARMFUL.search(struct.pack(">3h", x, y, omega)))
+    command = bare(bot().velocity(BodyTwist(x / 70, y / 70, omega / 500)))
     sent = tuple(int.from_bytes(command[n : n + 2], "big", signed=True) for n in (3, 5, 7))
     assert sent == (x, y, omega)
 
@@ -110,7 +121,7 @@ def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
     pose: tuple[float, float, float], typed: str
 ) -> None:
     """In mode 1; the origin is a place like any other."""
-    assert bot().drive_to(Pose(*pose)) == bytes.fromhex(typed)
+    assert bare(bot().drive_to(Pose(*pose))) == bytes.fromhex(typed)
 
 
 @pytest.mark.parametrize("far", [33.0, -33.0, 1e300, math.inf, math.nan])
@@ -132,7 +143,7 @@ def test_commands_that_do_not_fit_the_wire_are_counted() -> None:
     assert board.figures.saturated == 0
     board.velocity(BodyTwist(3.3, 0.0, 0.0))
     assert board.figures.saturated == 1
-    sent = board.velocity(BodyTwist(6.5534, 2.0, 0.0))
+    sent = bare(board.velocity(BodyTwist(6.5534, 2.0, 0.0)))
     assert sent == bytes.fromhex("FF FE 01 7F FF 27 10 00 00")  # twice too fast: slowed as a whole
 
 
@@ -140,4 +151,4 @@ def test_settings_may_be_replaced_while_it_runs() -> None:
     """Scales hold from the next command on."""
     board = bot()
     board.settings = OmniBotSettings(linear_scale=100.0)
-    assert board.velocity(BodyTwist(1.0, 0.0, 0.0))[3:5] == b"\x00\x64"
+    assert bare(board.velocity(BodyTwist(1.0, 0.0, 0.0)))[3:5] == b"\x00\x64"

@@ -3,7 +3,7 @@
 """A line that is opened, and a board that is found on it: zeros, Stop, S, and the state by name."""
 
 import pytest
-from bench import OPENING, Bench
+from bench import OPENING, START, Bench
 from robots import standing
 
 from omnibot_driver.core.inertial import ImuEstimate
@@ -21,7 +21,7 @@ def test_the_opening_sequence_is_zeros_stop_and_s_until_data_flows() -> None:
     bench = Bench(BoardSettings(boot_time_s=2.0))
     bench.open()
     bench.run(1.25)
-    assert bench.written_since(0) == OPENING + b"S" + b"S" + b"S"
+    assert bench.written_since(0) == OPENING + START + START + START
     bench.run_until_state("nominal")
     assert [command.kind for command in bench.board.commands][:1] == ["start"]
 
@@ -94,7 +94,7 @@ def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -
     bench.run_until_state("nominal")
     bench.run(1.0)
     assert bench.still()
-    assert bench.written_since(noticed).startswith(OPENING + b"S")
+    assert bench.written_since(noticed).startswith(OPENING + START)
     assert b"\xff\xfe\x01" not in bench.written_since(noticed)
     bench.drive(0.3)
     bench.run(0.3)

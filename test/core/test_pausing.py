@@ -3,7 +3,7 @@
 """Pausing a board whose P is a toggle: never the wrong way, and believed only when it is shown."""
 
 import pytest
-from bench import STOP, Bench
+from bench import PAUSE, STOP, Bench
 from robots import drive_on, paused, standing
 
 from omnibot_driver.core.errors import CommandRefused
@@ -25,7 +25,7 @@ def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Ben
     assert answer.success
     assert bench.board.mode is BoardMode.PAUSED
     assert bench.session.state == "paused"
-    assert bench.written_since(start) == STOP + STOP + b"P"
+    assert bench.written_since(start) == STOP + STOP + PAUSE
 
 
 def test_pausing_twice_does_not_toggle(bench: Bench) -> None:

@@ -7,7 +7,7 @@ from collections import deque
 from dataclasses import dataclass
 from random import Random
 
-from bench import EMERGENCY_STOP, STOP, TICK_S, Bench
+from bench import EMERGENCY_STOP, PAUSE, STOP, TICK_S, ZEROS, Bench
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -145,7 +145,7 @@ class Walk(Bench):
         self.settle()
         assert self.session.state == "disconnected" or (
             self.written_since(start) or self.written[-1][1]
-        ).endswith(EMERGENCY_STOP)
+        ).endswith(EMERGENCY_STOP + STOP)
 
     def act_release(self) -> None:
         self.session.estop(False, self.now)
@@ -193,7 +193,8 @@ class Walk(Bench):
         if EMERGENCY_STOP in data:
             self.estop_written_at = self.now
         head = data.rfind(b"\xff\xfe")
-        motion = head >= 0 and data[head:] not in (STOP, EMERGENCY_STOP) and len(data) - head == 9
+        stops = (STOP[len(ZEROS) :], EMERGENCY_STOP[len(ZEROS) :])
+        motion = head >= 0 and data[head:] not in stops and len(data) - head == 9
         if motion:
             assert self.session.state in RUNNING, "motion for a board that is not known to run"
             assert not self.session.estop_active, "motion under the e-stop"
@@ -201,7 +202,7 @@ class Walk(Bench):
             assert self.now - self.commanded_at < TIMEOUT_S, "motion that nobody wants any more"
             assert not any(asked.request is not Request.START for asked in self.asked.values())
         if data.endswith(b"P"):
-            assert data.endswith(STOP + b"P")
+            assert data.endswith(STOP + PAUSE)
             assert self.session.state in RUNNING, "a toggle for a board that is not known to run"
 
     def judge_answer(self, done: RequestDone) -> None:

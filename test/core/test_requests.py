@@ -5,7 +5,7 @@
 import itertools
 
 import pytest
-from bench import OPENING, STOP, Bench
+from bench import OPENING, RESET, START, STOP, Bench
 from robots import drive_on, driving, paused, standing
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
@@ -73,7 +73,7 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
     bench.session.closed(bench.now)
     start = len(bench.written)
     bench.open()
-    assert bench.written_since(start) == OPENING + b"S"
+    assert bench.written_since(start) == OPENING + START
 
 
 @pytest.mark.parametrize("speaks", [True, False])
@@ -94,7 +94,7 @@ def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench)
     bench.drive(0.3)
     start = len(bench.written)
     assert bench.ask(Request.START, 1.0).message == "running (nominal)"
-    assert bench.written_since(start).startswith(b"S")
+    assert bench.written_since(start).startswith(START)
     bench.run(0.1)
     assert not bench.still()
 
@@ -108,7 +108,7 @@ def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Ben
     before, start = bench.odometry[-1].pose, len(bench.written)
     answer = bench.ask(Request.RESET, 10.0)
     assert answer.success
-    assert bench.written_since(start).startswith(STOP + b"R")
+    assert bench.written_since(start).startswith(STOP + RESET)
     assert bench.board.odometry.x_mm == pytest.approx(0.0, abs=0.5)
     bench.run(1.0)
     after = bench.odometry[-1].pose

@@ -186,7 +186,7 @@ class OmniBot:
                 f"cmd_pose refused: in the board's own frame it is x {pose.x_m:.2f} m,"
                 f" y {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad, and a damaged line could turn"
                 " one of these numbers into a command to start, pause or reset the board: choose"
-                " a goal half a metre or half a radian away from it"
+                " another goal, or call ~/reset, which begins a new frame where the robot stands"
             )
         return transmission(frames.command(frames.VELOCITY_MODE, *harmless(counts)))
 
