@@ -16,9 +16,10 @@ from omnibot_driver.link import Link
 from omnibot_driver.simulator import SimulatedBoard
 
 PATIENCE_S = 20.0
-STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
-EMERGENCY_STOP = bytes.fromhex("FF FE 10 00 00 00 00 00 00")
-LAST_WORDS = bytes(8) + STOP + EMERGENCY_STOP
+STOP = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+EMERGENCY_STOP = bytes(8) + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+START = bytes(8) + b"S"
+LAST_WORDS = (STOP, EMERGENCY_STOP + STOP)
 
 
 class Listener:

@@ -21,6 +21,7 @@ from omnibot_driver.keeper import HANGS_AFTER, Keeper
 
 PATIENCE_S = 20.0
 LAST_WORDS = b"these are my last words"
+LATCHED_WORDS = b"and these under the e-stop"
 
 
 class Line:
@@ -117,7 +118,7 @@ def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
 
 def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
     """It has stopped the robot itself; not a byte is added."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     alive(keeper, 0.2)
     keeper.end(stopped=True)
     keeper.end(stopped=True)
@@ -127,14 +128,14 @@ def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
 
 def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None:
     """For a second, since the board may be deaf just now; then it leaves."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     keeper.end(stopped=False)
     assert line.hear(guard.TIMES * LAST_WORDS) == guard.TIMES * LAST_WORDS
 
 
 def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line: Line) -> None:
     """And it goes on guarding: the next time as well."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     longest_s = alive(keeper, 2 * guard.LIMIT_S)
     os.write(line.near, b"so far: ")
     assert line.hear(b"so far: ") == b"so far: " or longest_s > 0.9 * guard.LIMIT_S
@@ -148,7 +149,7 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
     """What waits there is old commands; nobody reads until the guard has gone."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     line.fill()
     keeper.end(stopped=False)
     line.hear(LAST_WORDS)
@@ -156,7 +157,7 @@ def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
 
 def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
     """It leaves, and so does the driver."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     process = keeper._process
     assert process is not None
     started(process.pid)
@@ -167,7 +168,7 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
     """And the new one guards."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     (first,) = line.children()
     os.kill(first, signal.SIGKILL)
     told = beat_until(keeper, lambda: line.children() not in ([first], []))
@@ -186,7 +187,7 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
     """The driver drives on without."""
     with monkeypatch.context() as without:
         without.setattr("sys.executable", "/no/python")
-        keeper = Keeper(line.near, LAST_WORDS)
+        keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
         assert "no guard process can be started" in keeper.beat(1000.0)
     assert keeper.beat(1000.5) == ""
     assert line.children() == []
@@ -197,7 +198,7 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
 
 def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
     """Stopped, it would not stop the robot; nobody waits until its pipe is full."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     (first,) = line.children()
     started(first)
     os.kill(first, signal.SIGSTOP)
@@ -212,7 +213,7 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
 
 def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
     """It does not hear the good-bye."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)
     keeper.end(stopped=True)
@@ -223,7 +224,7 @@ def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As in an uninterruptible sleep, which a stopped process stands for that no signal reaches."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)
     monkeypatch.setattr("subprocess.Popen.kill", lambda _process: None)
@@ -240,7 +241,7 @@ def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
     """Ctrl-C does not reach its session; SIGTERM to a whole group does, and is not for it."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     (pid,) = line.children()
     assert os.getsid(pid) == pid
     started(pid)
@@ -252,7 +253,7 @@ def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
 
 def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(line: Line) -> None:
     """``pkill -9 -f omnibot_driver``, in a hurry, while the robot drives."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     (pid,) = line.children()
     started(pid)
     _interpreter, *arguments = Path(f"/proc/{pid}/cmdline").read_text().split("\0")
@@ -264,7 +265,7 @@ def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(line: Line) -> Non
 
 def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
     """None of the driver's sockets and files; no module but a few of Python's own."""
-    keeper = Keeper(line.near, LAST_WORDS)
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
     (pid,) = line.children()
     started(pid)
     opened = [os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir()]

@@ -10,6 +10,7 @@ from listener import (
     EMERGENCY_STOP,
     LAST_WORDS,
     PATIENCE_S,
+    START,
     STOP,
     Listener,
     link_to,
@@ -35,11 +36,11 @@ def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     listener = Listener()
     link = link_to(terminal.path, listener, session())
     link.start()
-    terminal.read_until(STOP + b"S")
+    terminal.read_until(STOP + START)
     terminal.fill()
     listener.wait_for(lambda: any("while writing" in str(text) for text in listener.reports))
-    heard = terminal.read_until(STOP + b"S")
-    assert heard.lstrip(b"x").startswith(2 * (bytes(8) + STOP) + b"S")
+    heard = terminal.read_until(STOP + START)
+    assert heard.lstrip(b"x").startswith(2 * STOP + START)
     link.close("stop")
 
 
@@ -57,7 +58,7 @@ def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) 
     link, _ours = at_rest(terminal)
     terminal.fill()
     assert not link.close("stop")
-    terminal.read_until(LAST_WORDS)
+    terminal.read_until(5 * LAST_WORDS[0])
     wait_for_the_end_of("omnibot-reader", "omnibot-pacer")
 
 
@@ -88,6 +89,6 @@ def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: 
     ours.hear, ours.closed = defective, tell_and_close  # type: ignore[method-assign]
     os.write(terminal.far, b"x")
     assert farewell_over.wait(PATIENCE_S)
-    terminal.read_until(LAST_WORDS)
+    terminal.read_until(5 * LAST_WORDS[0])
     link.close("stop")
     wait_for_the_end_of("omnibot-reader", "omnibot-pacer")

@@ -19,8 +19,6 @@ from std_srvs.srv import Trigger
 from stuck import OLD_COMMAND
 
 STOP: Final = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
-EMERGENCY_STOP: Final = bytes.fromhex("FF FE 10 00 00 00 00 00 00")
-LAST_WORDS: Final = bytes(8) + STOP + EMERGENCY_STOP
 
 IN_A_CALLBACK: Final = """
 import ctypes, os, sys, time, rclpy
@@ -57,14 +55,13 @@ os.close(terminal)
 
 @dataclass(frozen=True)
 class Ending:
-    """``exit_codes``, ``words``: what is right; the words are the last that the board heard.
+    """``exit_codes``: what is right. Whatever happens, Stop is the last that the board heard.
 
     ``allowed_s``, ``late_s``: how long the robot may drive on, and the process live on.
     """
 
     end: Callable[[Rig], object]
     exit_codes: tuple[int, ...] = (0,)
-    words: bytes | tuple[bytes, ...] = STOP
     before: str = ""
     allowed_s: float = 0.0
     late_s: float = 0.0
@@ -78,7 +75,7 @@ class Ending:
         rig.expect_still(since, "the driver ends", self.allowed_s)
         rig.hand.leave()
         heard = bytes(rig.line.board.received)
-        rig.findings.expect(heard.endswith(self.words), f"last it heard {heard[-26:].hex(' ')}")
+        rig.findings.expect(heard.endswith(STOP), f"last it heard {heard[-26:].hex(' ')}")
 
 
 def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
@@ -145,7 +142,6 @@ ENDINGS: Final[dict[str, Ending]] = {
     "SIGINT, SIGTERM, SIGKILL to its process group": Ending(
         by_signals_to_its_group(signal.SIGINT, signal.SIGTERM, signal.SIGKILL),
         (0, -signal.SIGKILL),
-        (STOP, LAST_WORDS),
         GROUP,
     ),
     "a shutdown of ROS": Ending(by_topic, before=IN_A_CALLBACK.format("rclpy.shutdown()")),
@@ -156,26 +152,23 @@ ENDINGS: Final[dict[str, Ending]] = {
         before=IN_A_CALLBACK.format("time.sleep(60.0)"),
     ),
     "a farewell that hangs, and ctrl-C": Ending(
-        by_signals(signal.SIGINT), (1,), LAST_WORDS, HANGS, allowed_s=0.5, late_s=4.0
+        by_signals(signal.SIGINT), (1,), HANGS, allowed_s=0.5, late_s=4.0
     ),
     "an exception in the reader": Ending(by_topic, (1,), before=IN_THE_READER),
-    "SIGINT, the port full": Ending(
-        partial(while_full, by_signals(signal.SIGINT)), words=(STOP, LAST_WORDS)
-    ),
+    "SIGINT, the port full": Ending(partial(while_full, by_signals(signal.SIGINT))),
     "an exception, the port full": Ending(
         partial(while_full, by_topic),
         (1,),
-        (STOP, LAST_WORDS),
         IN_A_CALLBACK.format("1 / 0"),
     ),
-    "SIGKILL": Ending(by_signals(signal.SIGKILL), (-signal.SIGKILL,), LAST_WORDS),
+    "SIGKILL": Ending(by_signals(signal.SIGKILL), (-signal.SIGKILL,)),
     "SIGKILL, the port full": Ending(
-        partial(while_full, by_signals(signal.SIGKILL)), (-signal.SIGKILL,), (STOP, LAST_WORDS)
+        partial(while_full, by_signals(signal.SIGKILL)), (-signal.SIGKILL,)
     ),
     "a segmentation fault": Ending(
-        by_topic, (-signal.SIGSEGV,), LAST_WORDS, IN_A_CALLBACK.format("ctypes.string_at(0)")
+        by_topic, (-signal.SIGSEGV,), IN_A_CALLBACK.format("ctypes.string_at(0)")
     ),
-    "a library that exits": Ending(by_topic, (3,), LAST_WORDS, IN_A_CALLBACK.format("os._exit(3)")),
+    "a library that exits": Ending(by_topic, (3,), IN_A_CALLBACK.format("os._exit(3)")),
 }
 
 

@@ -22,7 +22,8 @@ from std_srvs.srv import SetBool
 
 MEASURED = {"imu/data_raw": "sensor_msgs/msg/Imu", "odom": "nav_msgs/msg/Odometry"}
 RAW = ("omnibot_driver/raw_rx", "omnibot_driver/raw_tx")
-STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+ZEROS = bytes(8)
+STOP = ZEROS + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 
 
 @dataclass
@@ -112,8 +113,8 @@ def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
     assert b"\xff\xfa" in b"".join(received)
     assert b"Paused: 0 \n" in b"".join(received)
     assert STOP in sent
-    assert b"P" in sent[-3:] or STOP + b"P" in sent[-3:]
-    assert any(data.startswith(b"\xff\xfe\x01") and len(data) == 9 for data in sent)
+    assert STOP + ZEROS + b"P" in sent
+    assert any(data.startswith(ZEROS + b"\xff\xfe\x01") and len(data) == 17 for data in sent)
 
 
 def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:

@@ -23,7 +23,7 @@ from omnibot_driver.simulator import BoardMode, PtyBoard
 
 Start = Callable[..., Any]
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
-LAST_WORDS = bytes(8) + STOP + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+LAST_WORDS = 10 * (bytes(8) + STOP)
 
 
 def driving(probe: Probe, board: PtyBoard) -> None:
@@ -59,7 +59,7 @@ def test_a_signal_while_driving_ends_with_the_stop_frame_and_exit_code_zero(
     driving(probe, board)
     assert driver.end(*signals) == 0
     assert "Traceback" not in driver.output
-    assert driver.lines[-1].endswith("the robot is told to stand still, and the port is closed\n")
+    assert driver.lines[-1].endswith("the robot stands still, and the port is closed\n")
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), 20.0)
 
 
@@ -103,7 +103,7 @@ def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
     assert os.read(far, 100).endswith(STOP)
     fill_terminal(path)
     assert driver.end(signal.SIGINT) == 0
-    assert "the robot is told" not in driver.output
+    assert "the robot stands" not in driver.output
     heard = b""
     while LAST_WORDS not in heard:
         assert select.select([far], [], [], 20.0)[0], heard

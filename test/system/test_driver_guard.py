@@ -14,6 +14,7 @@ import pytest
 from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import Twist, TwistStamped
 from probe import Probe
+from std_srvs.srv import SetBool
 
 from omnibot_driver.simulator import PtyBoard, SimulatedBoard
 
@@ -21,7 +22,8 @@ Start = Callable[..., Any]
 ZEROS = bytes(8)
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 EMERGENCY_STOP = bytes.fromhex("FF FE 10 00 00 00 00 00 00")
-LAST_WORDS = ZEROS + STOP + EMERGENCY_STOP
+LATCHED_WORDS = ZEROS + EMERGENCY_STOP + ZEROS + STOP
+LAST_WORDS = 3 * (ZEROS + STOP)
 
 
 def twist(vx_mps: float) -> Twist:
@@ -62,8 +64,22 @@ def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
     assert driver.end(number) == -number
     assert board.wait_for(still, PATIENCE_S)
     with board.lock:
-        assert board.board.estopped
+        assert not board.board.estopped, "an emergency stop that was not asked for"
         assert bytes(board.board.received).endswith(LAST_WORDS)
+
+
+def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
+    board: PtyBoard, driver: Driver, probe: Probe
+) -> None:
+    """Emergency stop and Stop in turn, as before."""
+    driving(probe, board)
+    assert probe.call(SetBool, "estop", data=True).success
+    mark = len(board.board.received)
+    assert board.wait_for(lambda b: len(b.received) > mark + 20 * len(LATCHED_WORDS), PATIENCE_S)
+    assert driver.end(signal.SIGKILL) == -signal.SIGKILL
+    ended = len(board.board.received)
+    assert board.wait_for(lambda b: bytes(b.received[ended:]).count(LATCHED_WORDS) > 10, PATIENCE_S)
+    assert board.wait_for(still, PATIENCE_S)
 
 
 def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
@@ -84,7 +100,7 @@ def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
     """A command that waited in the middleware while it hung is none."""
     commands = driving(probe, board)
     driver.process.send_signal(signal.SIGSTOP)
-    assert board.wait_for(lambda b: bytes(b.received).endswith(LAST_WORDS), PATIENCE_S)
+    assert board.wait_for(lambda b: bytes(b.received).endswith(LAST_WORDS), PATIENCE_S)  # it drove
     assert board.wait_for(still, PATIENCE_S)
     deaf = board.board.tick + 200  # longer than a board may be silent
     assert board.wait_for(lambda b: b.tick > deaf, PATIENCE_S)
@@ -116,10 +132,11 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
     nothing = TwistStamped(twist=twist(math.nan))
     wait_until(lambda: commands.publish(nothing) or "is not finite" in driver.output)  # it hears us
     driver.process.send_signal(signal.SIGSTOP)
+    mark = len(board.board.received)
     stamped = TwistStamped(twist=twist(0.2))
     stamped.header.stamp = probe.node.get_clock().now().to_msg()
     commands.publish(stamped)
-    assert board.wait_for(lambda b: bytes(b.received).endswith(LAST_WORDS), PATIENCE_S)
+    assert board.wait_for(lambda b: LAST_WORDS in bytes(b.received[mark:]), PATIENCE_S)
     driver.process.send_signal(signal.SIGCONT)
     driver.wait_for_line("motion command refused: it waited")
     with board.lock:
@@ -136,7 +153,6 @@ def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
     driver.wait_for_line("the guard process died.*another one is started")
     wait_until(lambda: driver.guards() not in ([], [first]))
     driver.end(signal.SIGKILL)
-    assert board.wait_for(lambda b: b.estopped, PATIENCE_S)
     assert board.wait_for(still, PATIENCE_S)
 
 
