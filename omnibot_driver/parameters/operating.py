@@ -133,7 +133,7 @@ COMMANDS: Final = (
         "command_rate",
         20.0,
         "Hz",
-        "How often the current command, or the emergency stop, is repeated.",
+        "How often the current command is repeated; Stop and the emergency stop at 20 Hz at least.",
         low=1.0,
         high=50.0,
     ),
