@@ -23,6 +23,8 @@ RESTART_S: Final = 1.0
 """A guard that dies at once is not started more often than this."""
 HANGS_AFTER: Final = 50
 """A guard that has not read so many beats would not stop the robot either."""
+MOST_DYING: Final = 3
+"""While so many killed guards are not gone yet, no other one is started."""
 LEAVES_WITHIN_S: Final = 0.5
 DIES_WITHIN_S: Final = 1.0
 """One that is killed and does not is in an uninterruptible sleep; nobody waits for that."""
@@ -40,6 +42,9 @@ class Keeper:
         self._descriptor = descriptor
         self._words = stop.hex(), emergency_stop.hex()
         self._process: subprocess.Popen[bytes] | None = None
+        self._dying: list[subprocess.Popen[bytes]] = []
+        """Killed, and not gone yet."""
+        self._broken = False
         self._restart_at = -math.inf
         self._told = False
         self._start()
@@ -47,13 +52,13 @@ class Keeper:
     def beat(self, now: float, *, latched: bool = False) -> str:
         """The driver is alive; call it every ``BEAT_S``, neither more nor less often.
 
-        Returns a sentence, once, when the guard is not as it should be.
+        Returns a sentence, once, when the guard is not as it should be. Waits for no process.
         """
-        if self._process is not None and (
-            trouble := self._beat(self._process, guard.LATCHED_BEAT if latched else guard.BEAT)
-        ):
+        self._dying = [process for process in self._dying if process.poll() is None]
+        word = guard.LATCHED_BEAT if latched else guard.BEAT
+        if self._process is not None and (trouble := self._beat(self._process, word)):
             self._tell(f"{trouble}; another one is started")
-        if self._process is None and now >= self._restart_at:
+        if self._process is None and now >= self._restart_at and len(self._dying) < MOST_DYING:
             self._restart_at = now + RESTART_S
             self._start()
         trouble, self._trouble = self._trouble, ""
@@ -71,7 +76,7 @@ class Keeper:
             self._dismiss(b"", SPEAKS_WITHIN_S)
 
     def _beat(self, process: subprocess.Popen[bytes], word: bytes) -> str:
-        """Returns what is wrong with it, and then it is gone."""
+        """Returns what is wrong with it, and then it is given up."""
         assert process.stdin is not None
         pipe = process.stdin.fileno()
         try:
@@ -80,10 +85,24 @@ class Keeper:
                 os.write(pipe, word)
                 return ""
         except OSError:
-            return f"the guard process died (exit code {self._dismiss(guard.BYE, LEAVES_WITHIN_S)})"
-        process.kill()
-        self._dismiss(b"", LEAVES_WITHIN_S)
+            if process.poll() is None and not self._broken:
+                self._broken = True  # its pipe closes a moment before its exit code is there
+                return ""
+            self._give_up(process)
+            return f"the guard process died (exit code {process.returncode})"
+        self._give_up(process)
         return "the guard process hung"
+
+    def _give_up(self, process: subprocess.Popen[bytes]) -> None:
+        """Kill it. It may be in an uninterruptible sleep, so later beats look whether it is gone.
+
+        The e-stop goes through the lock that is held here.
+        """
+        assert process.stdin is not None
+        process.stdin.close()
+        process.kill()
+        self._dying.append(process)
+        self._process, self._broken = None, False
 
     def _start(self) -> None:
         # By its bare name: whoever kills all that is called omnibot_driver does not hit the guard.

@@ -17,7 +17,7 @@ import pytest
 from terminal import fill
 
 from omnibot_driver import guard
-from omnibot_driver.keeper import HANGS_AFTER, Keeper
+from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
 
 PATIENCE_S = 20.0
 LAST_WORDS = b"these are my last words"
@@ -206,7 +206,50 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
     assert [keeper.beat(1000.0) for _ in range(HANGS_AFTER)] == [""] * HANGS_AFTER
     assert line.children() == [first]
     assert keeper.beat(1000.0) == "the guard process hung; another one is started"
-    assert first not in line.children()
+    beat_until(keeper, lambda: first not in line.children())
+    keeper.end(stopped=False)
+    line.hear(LAST_WORDS)
+
+
+def test_a_guard_that_does_not_die_never_holds_up_a_beat(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in an uninterruptible sleep. It is replaced, nobody waits for it, and it is reaped."""
+    monkeypatch.setattr("subprocess.Popen.wait", lambda *_: pytest.fail("a beat waits"))
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    (first,) = line.children()
+    started(first)
+    os.kill(first, signal.SIGSTOP)
+    os.waitid(os.P_PID, first, os.WSTOPPED)
+    with monkeypatch.context() as undying:
+        undying.setattr("subprocess.Popen.kill", lambda _process: None)
+        told = [keeper.beat(1000.0 + n * BEAT_S) for n in range(HANGS_AFTER + 2)]
+        assert [text for text in told if text] == ["the guard process hung; another one is started"]
+        assert len(line.children()) == 2
+        assert first in line.children()
+    os.kill(first, signal.SIGKILL)
+    beat_until(keeper, lambda: first not in line.children())
+    monkeypatch.undo()
+    keeper.end(stopped=False)
+    line.hear(LAST_WORDS)
+
+
+def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a host where nothing can be killed, starting more of them helps nobody."""
+    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    stopped: set[int] = set()
+    with monkeypatch.context() as undying:
+        undying.setattr("subprocess.Popen.kill", lambda _process: None)
+        for second in range(10 * HANGS_AFTER):
+            for pid in set(line.children()) - stopped:
+                os.kill(pid, signal.SIGSTOP)
+                os.waitid(os.P_PID, pid, os.WSTOPPED)
+                stopped.add(pid)
+            keeper.beat(1000.0 + second)
+    assert len(line.children()) == MOST_DYING
+    for pid in stopped:
+        os.kill(pid, signal.SIGKILL)
+    beat_until(keeper, lambda: stopped.isdisjoint(line.children()))
     keeper.end(stopped=False)
     line.hear(LAST_WORDS)
 
