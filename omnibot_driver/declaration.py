@@ -3,6 +3,7 @@
 """The table of parameters, declared on a node: given at start, described, checked when set."""
 
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -39,7 +40,7 @@ def declare(node: Node) -> dict[str, Any]:
         node.declare_parameter(
             parameter.name, values[parameter.name], _descriptor(parameter), ignore_override=True
         )
-    node.add_on_set_parameters_callback(_check)
+    node.add_on_set_parameters_callback(partial(_check, node))
     return values
 
 
@@ -70,10 +71,11 @@ def _calibration(node: Node, path: Path) -> dict[str, parameters.Value]:
     return found
 
 
-def _check(changed: list[rclpy.Parameter]) -> SetParametersResult:
+def _check(node: Node, changed: list[rclpy.Parameter]) -> SetParametersResult:
+    """Each value by itself, and together with those that stay as they are."""
+    present = {item.name: item.value for item in node.get_parameters(list(parameters.BY_NAME))}
     try:
-        for name, value in ours(changed).items():
-            parameters.BY_NAME[name].check(value)
+        parameters.check_all({**present, **ours(changed)})
     except ParameterError as error:
         return SetParametersResult(successful=False, reason=str(error))
     return SetParametersResult(successful=True)

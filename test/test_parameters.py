@@ -238,3 +238,22 @@ def test_the_file_tells_what_each_parameter_may_be(parameter: Parameter) -> None
     words = " ".join(comment.replace("#", " ").split())
     assert parameter.description in words
     assert parameter.allowed in words
+
+
+@pytest.mark.parametrize(
+    ("kind", "unit", "fastest"), [("linear", "m/s", 2.0), ("angular", "rad/s", 8.0)]
+)
+def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
+    kind: str, unit: str, fastest: float
+) -> None:
+    """Above it every displacement would be rejected, and odometry would stop without a word."""
+    commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
+    assert check_all({commanded: fastest})[commanded] == fastest
+    with pytest.raises(ParameterError) as refused:
+        check_all({commanded: fastest + 0.5})
+    sentence = str(refused.value)
+    assert f"'{commanded}' ({fastest + 0.5:g} {unit})" in sentence
+    assert f"'{possible}' ({fastest:g} {unit})" in sentence
+    with pytest.raises(ParameterError, match=f"'{commanded}' .* above '{possible}'"):
+        check_all({possible: 0.3})
+    assert check_all({commanded: fastest + 0.5, possible: 9.0})

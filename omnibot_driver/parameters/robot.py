@@ -85,7 +85,8 @@ ROBOT: Final = (
         2.0,
         "m/s",
         "What the robot can never exceed, pushed by hand too: no faster displacement and no pose"
-        " further away is believed, no correction of odom is faster.",
+        " further away is believed, no correction of odom is faster. It must not be below"
+        " max_linear_speed.",
         low=0.1,
         high=10.0,
     ),
@@ -93,7 +94,7 @@ ROBOT: Final = (
         "fastest_angular_speed",
         8.0,
         "rad/s",
-        "Likewise, for turning.",
+        "Likewise, for turning. It must not be below max_angular_speed.",
         low=0.1,
         high=100.0,
     ),

@@ -41,6 +41,7 @@ def check_all(given: Mapping[str, object]) -> dict[str, Value]:
     }
     _require_two_frames(values)
     _require_a_frame_for_goals(values)
+    _require_possible_speeds(values)
     return values
 
 
@@ -60,3 +61,15 @@ def _require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
             f"parameter 'axis_signs' must not be {values['axis_signs']} with control_method"
             " 'position': the sign of yaw must be that of x times that of y"
         )
+
+
+def _require_possible_speeds(values: Mapping[str, Any]) -> None:
+    """A displacement above the fastest speed is rejected, so odometry would stop at full speed."""
+    for kind, unit in (("linear", "m/s"), ("angular", "rad/s")):
+        commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
+        if values[commanded] > values[possible]:
+            raise ParameterError(
+                f"parameter '{commanded}' ({values[commanded]:g} {unit}) must not be above"
+                f" '{possible}' ({values[possible]:g} {unit}): odometry rejects what is faster than"
+                f" that as impossible. Lower '{commanded}', or raise '{possible}' first"
+            )

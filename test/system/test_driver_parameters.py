@@ -14,7 +14,7 @@ from driver_process import Driver
 from geometry_msgs.msg import Twist
 from probe import Probe
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import DescribeParameters, SetParameters
+from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
 
 from omnibot_driver.parameters import PARAMETERS
 
@@ -32,6 +32,8 @@ Start = Callable[..., Any]
         ({"baudrate": "fast"}, "'baudrate' must be an integer, not 'fast'"),
         ({"on_exit": "off"}, "'on_exit' must be a string, not False .*put it in quotes"),
         ({"odom_frame": "/odom"}, "leading slash"),
+        ({"max_linear_speed": 3.0}, "'max_linear_speed' .* above 'fastest_linear_speed'"),
+        ({"fastest_angular_speed": 0.4}, "'max_angular_speed' .* above 'fastest_angular_speed'"),
         ({"use_sim_times": True}, "no parameter 'use_sim_times'"),
         ({"use_sim_time": 5}, "cannot start.*use_sim_time"),
     ],
@@ -171,3 +173,27 @@ def test_every_parameter_is_described(
         if parameter.low is not None:
             (span,) = [*descriptor.floating_point_range, *descriptor.integer_range]
             assert (span.from_value, span.to_value) == (parameter.low, parameter.high)
+
+
+def test_a_speed_that_odometry_takes_as_impossible_is_refused_while_running(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """From either side of the pair; both at once may pass it, and what was refused is not set."""
+    board = start_board()
+    probe: Probe = probe_of(start_driver(board.path))
+    refused = set_parameter(probe, "max_angular_speed", real(9.0))
+    assert not refused.successful
+    assert (
+        "'max_angular_speed' (9 rad/s) must not be above 'fastest_angular_speed'" in refused.reason
+    )
+    refused = set_parameter(probe, "fastest_linear_speed", real(0.2))
+    assert not refused.successful
+    assert "'max_linear_speed' (0.5 m/s) must not be above 'fastest_linear_speed'" in refused.reason
+    assert set_parameter(probe, "max_linear_speed", real(0.2)).successful
+    assert set_parameter(probe, "fastest_linear_speed", real(0.2)).successful
+    both = [
+        Parameter(name="max_linear_speed", value=real(0.6)),
+        Parameter(name="fastest_linear_speed", value=real(0.7)),
+    ]
+    answer = probe.call(SetParametersAtomically, "set_parameters_atomically", parameters=both)
+    assert answer.result.successful
