@@ -24,7 +24,7 @@ from omnibot_driver.core.snapshot import LinkFigures, SessionFigures
 from omnibot_driver.core.supervisor import OnExit
 from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
 from omnibot_driver.port import Port
-from omnibot_driver.standstill import Standstill
+from omnibot_driver.standstill import Standstill, boot_time_s
 
 JOIN_TIMEOUT_S: Final = 2.0
 """Longer than a guard takes to repeat Stop."""
@@ -100,7 +100,7 @@ class Link:
         try:
             with self._lock:
                 now = time.monotonic()
-                self._heed_standstill(now)
+                self._heed_standstill(boot_time_s())
                 try:
                     return action(self._session, now)
                 finally:
@@ -127,8 +127,9 @@ class Link:
             with self._lock:
                 now = time.monotonic()
                 try:
-                    if not self._standstill.outlived_by(sent_ns, now):
-                        self._heed_standstill(now)
+                    boot_s = boot_time_s()
+                    if not self._standstill.outlived_by(sent_ns, boot_s):
+                        self._heed_standstill(boot_s)
                         raise CommandRefused(WAITED)
                     action(self._session, wish, now)
                 finally:
@@ -258,7 +259,7 @@ class Link:
             with self._lock:
                 self._wait_s = self.reconnect_interval_s
                 self._received += len(data)
-                stopped = self._heed_standstill(now)
+                stopped = self._heed_standstill(boot_time_s())
                 events = self._settle() if self._session.heed(now) or stopped else ()
             if events:
                 self._deliver(events)
@@ -296,8 +297,9 @@ class Link:
 
     def _beat(self, now: float) -> list[Notice]:
         """With the lock held: this thread, and so the watchdog, is alive."""
-        self._heed_standstill(now)
-        self._standstill.passed(now, time.time_ns())
+        boot_s = boot_time_s()  # read once: it may stand still between two readings
+        self._heed_standstill(boot_s)
+        self._standstill.passed(boot_s, time.time_ns())
         if now < self._beat_at:
             return []
         self._beat_at = now + BEAT_S
@@ -306,11 +308,11 @@ class Link:
         trouble = self._keeper.beat(now, latched=self._session.estop_active)
         return [Notice(trouble)] if trouble else []
 
-    def _heed_standstill(self, now: float) -> bool:
+    def _heed_standstill(self, boot_s: float) -> bool:
         """With the lock held: whether this process stood still, and the robot is to be stopped."""
-        length_s = 0.0 if self._closing.is_set() else self._standstill.begun(now)
-        if length_s:
-            self._session.stood_still(length_s, now)
+        length_s = 0.0 if self._closing.is_set() else self._standstill.begun(boot_s)
+        if length_s:  # the caller may have read the steady clock before it stood still
+            self._session.stood_still(length_s, time.monotonic())
         return length_s > 0.0
 
     def _settle(self) -> Sequence[Event]:

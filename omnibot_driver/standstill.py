@@ -1,13 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Did this process stand still? SIGSTOP, a swapped-out host, a thread that hangs.
+"""Did this process stand still? SIGSTOP, a swapped-out or suspended host, a thread that hangs.
 
 While it did, its watchdog did too, and commands went on arriving for it. So when it runs again,
 nothing that was sent meanwhile is a command any more. This module is told the time and whether the
-watchdog's thread runs; it knows no threads and no commands.
+watchdog's thread runs; it knows no threads and no commands. Its time is ``boot_time_s``.
 """
 
 import math
+import time
 from typing import Final
 
 STANDSTILL_S: Final = 0.4
@@ -17,6 +18,11 @@ SETTLE_S: Final = 0.25
 """What comes so soon after a standstill had been waiting, whatever the sender's clock says."""
 LATEST_S: Final = 10.0
 """Nothing is retransmitted so late: what seems to be from before has a sender whose clock is."""
+
+
+def boot_time_s() -> float:
+    """A steady clock that also counts the time for which the host was suspended."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 class Standstill:

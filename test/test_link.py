@@ -4,7 +4,7 @@
 
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from listener import EMERGENCY_STOP, PATIENCE_S, STOP, Listener, kinds, link_to, session
 
+from omnibot_driver import standstill
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.kinematics import BodyTwist
@@ -158,6 +159,15 @@ def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
     assert "guard" in notices[0]
 
 
+def obeyed(command: Callable[[], None]) -> bool:
+    """Not at once after a standstill: the reader may run before the pacer."""
+    try:
+        command()
+    except CommandRefused:
+        return False
+    return True
+
+
 def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -189,14 +199,34 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     listener.wait_for(lambda: any("stood still" in str(event) for event in listener.events))
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
 
-    def obeyed() -> bool:
-        try:
-            drive(time.time_ns())
-        except CommandRefused:  # the reader may run before the pacer
-            return False
-        return True
+    listener.wait_for(lambda: obeyed(lambda: drive(time.time_ns())))
+    link.close("stop")
 
-    listener.wait_for(obeyed)
+
+def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No thread misses a beat by the steady clock; the robot is stopped all the same."""
+    suspended_s = 0.0
+    monkeypatch.setattr(
+        "omnibot_driver.link.boot_time_s", lambda: standstill.boot_time_s() + suspended_s
+    )
+    monkeypatch.setattr("omnibot_driver.standstill.SETTLE_S", 0.0)
+    listener, ours = Listener(), session()
+    link = link_to(board.path, listener, ours)
+    link.start()
+    listener.wait_for(lambda: ours.state == "nominal")
+    drive = partial(link.command, Session.command_twist, BodyTwist(0.3, 0.0, 0.0))
+    for _ in range(20):  # a machine that hangs is another standstill
+        drive(time.time_ns())
+        if board.wait_for(lambda b: b.commands[-1].kind == "velocity", 0.3):
+            break
+    assert board.board.commands[-1].kind == "velocity"
+    suspended_s = 3600.0
+    assert board.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
+    listener.wait_for(lambda: any("for 3600." in str(event) for event in listener.events))
+    with pytest.raises(CommandRefused, match="waited"):
+        drive(time.time_ns() - 1_000_000_000)  # while it was suspended, by a clock that went on
+    listener.wait_for(lambda: obeyed(lambda: drive(time.time_ns())))
+    assert board.wait_for(lambda b: b.commands[-1].kind == "velocity", PATIENCE_S)
     link.close("stop")
 
 

@@ -121,6 +121,36 @@ def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
     assert board.wait_for(still, PATIENCE_S)
 
 
+SUSPENDED = """
+import os, time
+real = time.clock_gettime
+time.clock_gettime = lambda clock: real(clock) + (
+    60.0 if clock == time.CLOCK_BOOTTIME and os.path.exists({path!r}) else 0.0
+)
+"""
+"""The clock that goes on while a host is suspended has gone on, once that file is there."""
+
+
+def test_a_robot_is_stopped_when_its_host_was_suspended(
+    board: PtyBoard, start_driver: Start, probe_of: Start, tmp_path: Path
+) -> None:
+    """No time has passed for the driver; the command is discarded until a fresh one comes."""
+    resumed = tmp_path / "resumed"
+    driver: Driver = start_driver(
+        board.path, cmd_vel_timeout=10.0, before=SUSPENDED.format(path=str(resumed))
+    )
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    commands = driving(probe, board)
+    resumed.touch()
+    driver.wait_for_line(r"the driver stood still for 60\.\d s")
+    assert board.wait_for(still, PATIENCE_S)
+    with board.lock:
+        assert bytes(board.board.received).endswith(STOP)
+        assert LAST_WORDS not in board.board.received, "a guard sleeps as well"
+    wait_until(lambda: commands.publish(twist(0.3)) or not still(board.board))
+
+
 def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
