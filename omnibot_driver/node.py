@@ -130,10 +130,10 @@ class OmniBotDriver(Node):
     def _apply_parameters(self, changed: list[rclpy.Parameter]) -> None:
         self._values = parameters.check_all({**self._values, **declaration.ours(changed)})
         self._publishing.settings = messages.MessageSettings.from_parameters(self._values)
-        self._board.settings = parameters.board_settings(self._values)
         self._link.reconnect_interval_s = self._values["reconnect_interval"]
         settings = parameters.session_settings(self._values)
-        self._link.call(lambda session, now: session.configure(settings, now))
+        board = parameters.board_settings(self._values)
+        self._link.call(lambda session, now: session.configure(settings, now, board=board))
 
     # From ROS to the board
 

@@ -9,7 +9,7 @@ when something is sent. It knows no ROS, no port and no clock.
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.se2 import Pose
@@ -123,6 +123,9 @@ class Edge:
 
 class Board(Protocol):
     """One kind of board. Request methods raise RequestRefused where the mode forbids them."""
+
+    settings: Any
+    """What its wire does not tell, in values of its own kind; may be replaced at any time."""
 
     @property
     def mode(self) -> Mode:

@@ -12,6 +12,7 @@ from typing import Final
 
 from omnibot_driver.core.board import Board, DisplacementReading
 from omnibot_driver.core.commands import PACE_S, CommandSettings, CommandStream
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.helm import ControlMethod, Helm
 from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits, require_timely
@@ -41,8 +42,9 @@ class Driving:
         *,
         obeys: bool,
     ) -> None:
+        self._stop = board.stop()
         self.stream = CommandStream(
-            commands, stop=board.stop(), emergency_stop=board.emergency_stop()
+            commands, stop=self._stop, emergency_stop=board.emergency_stop()
         )
         self._odometry = odometry
         self._helm = Helm(board, odometry, limits, axis_signs, control)
@@ -63,6 +65,17 @@ class Driving:
             return []
         self.stream.halt(now)
         return ["the robot is stopped, as its limits are stricter now: command it anew"]
+
+    def encode_anew(self, now: float) -> list[str]:
+        """The board's settings have changed: the command that is repeated is said in them."""
+        if self.stream.current is None:
+            return []
+        try:
+            self.stream.current.encode_anew(self._stop)
+        except CommandRefused as error:
+            self.stream.halt(now)
+            return [f"robot stopped, the current command does not fit the new scale: {error}"]
+        return []
 
     def figures(self, now: float) -> CommandFigures:
         """Who commands, and how."""

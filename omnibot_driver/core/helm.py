@@ -7,6 +7,7 @@ when anything is sent.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Final, Literal
 
 from omnibot_driver.core.board import Board, Mode
@@ -78,6 +79,7 @@ class Helm:
             frame,
             stands=frame == self._stop,
             plain=max(map(abs, limited)) > PLAIN_WHEEL_RADPS,
+            encode=partial(self._board.wheels, limited),
         )
 
     def pose(self, goal: Pose) -> Motion:
@@ -91,7 +93,8 @@ class Helm:
                 "cmd_pose refused: where the board believes to be is not known; this needs its"
                 " poses (nominal mode) and `use_board_pose`. After a restart, wait a second"
             )
-        return GoalMotion(goal, self._board.drive_to(place), self._odometry.alignments)
+        encode = partial(self._board.drive_to, place)
+        return GoalMotion(goal, encode, self._odometry.alignments)
 
     def _at_odds(self, authority: Authority) -> CommandRefused:
         return CommandRefused(

@@ -58,6 +58,12 @@ class Motion(Protocol):
     def frame(self, now: float) -> bytes:
         """The frame to write at this time."""
 
+    def encode_anew(self, stop: bytes) -> None:
+        """From now on by the board's present settings; what makes ``stop``, stands.
+
+        Raises CommandRefused where they cannot say it.
+        """
+
 
 class BaseMotion:
     """A body velocity, approached by the acceleration limits from what was commanded before.
@@ -104,37 +110,66 @@ class BaseMotion:
         self._reached_at = now
         return self._frame
 
+    def encode_anew(self, stop: bytes) -> None:
+        """The set-point; a ramp goes on."""
+        self.stands = self._encode(self._wanted) == stop
+        if self.stands:
+            self._setpoint, self.settled = self._wanted, True
+        self._frame = self._encode(self._setpoint)
+
 
 class SteadyMotion:
-    """A command whose frame does not change."""
+    """A command whose frame does not change, unless ``encode`` makes another one of it."""
 
     settled: Final = True
 
-    def __init__(self, authority: Authority, frame: bytes, *, stands: bool, plain: bool) -> None:
+    def __init__(
+        self,
+        authority: Authority,
+        frame: bytes,
+        *,
+        stands: bool,
+        plain: bool,
+        encode: Callable[[], bytes] | None = None,
+    ) -> None:
         self.authority, self.stands, self.plain = authority, stands, plain
-        self._frame = frame
+        self._frame, self._encode = frame, encode
 
     def frame(self, now: float) -> bytes:
         """Always the same."""
         return self._frame
 
+    def encode_anew(self, stop: bytes) -> None:
+        """By ``encode``."""
+        if self._encode is not None:
+            self._frame = self._encode()
+            self.stands = self._frame == stop
+
 
 class GoalMotion:
-    """A pose to drive to: ``place`` in the odometry frame, as that lay at this ``alignment``."""
+    """A pose to drive to: ``place`` in the odometry frame, as that lay at this ``alignment``.
+
+    ``encode`` makes its frame.
+    """
 
     authority: Final = Authority.POSE
     stands: Final = False
     settled: Final = True
     plain: Final = False
 
-    def __init__(self, place: Pose, frame: bytes, alignment: int) -> None:
+    def __init__(self, place: Pose, encode: Callable[[], bytes], alignment: int) -> None:
         self.alignment = alignment
-        self._place, self._frame = place, frame
+        self._place, self._encode = place, encode
+        self._frame = encode()
         self._nearest_m = self._nearest_rad = math.inf
 
     def frame(self, now: float) -> bytes:
         """Always the same."""
         return self._frame
+
+    def encode_anew(self, stop: bytes) -> None:
+        """The same place in the board's frame."""
+        self._frame = self._encode()
 
     def is_left_by(self, pose: Pose) -> bool:
         """Whether a robot that is here now has been plainly nearer before."""

@@ -156,9 +156,15 @@ class Session:
 
     # What happens
 
-    def configure(self, settings: SessionSettings, now: float) -> None:
-        """New settings, from the next command and frame on; stricter ones end the present one."""
+    def configure(self, settings: SessionSettings, now: float, *, board: object = None) -> None:
+        """New settings, from the next command and frame on; stricter ones end the present one.
+
+        ``board``: new settings of the board's own, in which the present command is said as well.
+        """
         self._notify(self._driving.configure(settings.limits, settings.commands, now))
+        if board is not None:
+            self._board.settings = board
+            self._notify(self._driving.encode_anew(now))
         self._measuring.configure(settings.odometry, settings.motion, settings.imu)
 
     def opened(self, now: float) -> None:

@@ -123,6 +123,12 @@ class Bench:
         self.session.configure(replace(self._settings, **changed), self.now)
         self.settle()
 
+    def configure_board(self, **changed: Any) -> None:
+        """Fields of OmniBotSettings; the others are the defaults."""
+        settings = OmniBotSettings(delta_frame=self.board.settings.frame, **changed)
+        self.session.configure(self._settings, self.now, board=settings)
+        self.settle()
+
     def written_since(self, mark: int) -> bytes:
         """What was written after the first ``mark`` writes."""
         return b"".join(data for _, data in self.written[mark:])

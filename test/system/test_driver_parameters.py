@@ -159,6 +159,21 @@ def test_tuning_changes_while_running_and_identity_does_not(
     assert "linear_scale" in result.reason
 
 
+def test_the_command_that_is_repeated_is_said_in_a_new_scale(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """Nobody commands anew."""
+    board = start_board()
+    probe: Probe = probe_of(start_driver(board.path, cmd_vel_timeout=10.0))
+    probe.wait_for_state("nominal")
+    twist = Twist()
+    twist.linear.x = 0.3
+    probe.publisher(Twist, "cmd_vel").publish(twist)
+    assert board.wait_for(lambda b: b.commands[-1].values == (21, 0, 0), 20.0)
+    assert set_parameter(probe, "linear_scale", real(100.0)).successful
+    assert board.wait_for(lambda b: b.commands[-1].values == (30, 0, 0), 20.0)
+
+
 def test_every_parameter_is_described(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
