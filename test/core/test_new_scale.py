@@ -2,7 +2,7 @@
 
 """Scales of the board that change while the robot drives: the repeated command is said in them."""
 
-from bench import STOP, Bench
+from bench import STOP, Bench, bare
 from robots import driving
 
 from omnibot_driver.core.limits import SpeedLimits
@@ -13,7 +13,7 @@ RAMP = SpeedLimits(linear_mps2=0.5)
 
 def last(bench: Bench) -> bytes:
     """The frame written last."""
-    return bench.written[-1][1]
+    return bare(bench.written[-1][1])
 
 
 def going_to(x_m: float) -> Bench:
