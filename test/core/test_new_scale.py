@@ -61,7 +61,7 @@ def test_a_goal_that_the_new_scale_cannot_say_ends_with_stop_and_a_sentence() ->
     """10 m at 10,000 LSB per m are more than a word holds."""
     bench = going_to(10.0)
     bench.configure_board(position_scale=10_000.0)
-    assert last(bench) == STOP
+    assert last(bench) == bare(STOP)
     assert "does not fit the new scale" in bench.notices[-1]
     bench.run(2.0)
     assert bench.still()
@@ -93,7 +93,7 @@ def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
     bench.drive(0.05)
     bench.configure_board(linear_scale=5.0)
     bench.run(0.1)
-    assert last(bench) == STOP
+    assert last(bench) == bare(STOP)
 
 
 def test_a_robot_that_nobody_commands_hears_nothing_of_it() -> None:
