@@ -3,10 +3,11 @@
 """The threads that serve a port and a session: the only module that knows threads and the clock.
 
 The *reader* opens the port, waits for bytes, hands them to the session and delivers what comes of
-them at once, on its own thread: no queue and no timer stand between the wire and the listener. The
-*pacer* sleeps until something is due (a repeated command, a timeout, a retry), so the watchdog
-depends on nobody's executor. It is also the one whose heartbeat the guard hears. They and every
-caller go through one lock.
+them at once, on its own thread: no timer and no other thread stand between the wire and the
+listener. The *pacer* sleeps until something is due (a repeated command, a timeout, a retry), so the
+watchdog depends on nobody's executor. It is also the one whose heartbeat the guard hears. They and
+every caller go through one lock. What the pacer and callers have to tell is delivered by the
+*teller*, so a slow listener delays neither; all of it leaves in the order of that lock.
 """
 
 import math
@@ -23,6 +24,7 @@ from omnibot_driver.core.session import Session
 from omnibot_driver.core.snapshot import LinkFigures, SessionFigures
 from omnibot_driver.core.supervisor import OnExit
 from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
+from omnibot_driver.outbox import Delivery, Outbox
 from omnibot_driver.port import Port
 from omnibot_driver.standstill import Standstill, boot_time_s
 
@@ -44,10 +46,11 @@ class Link:
 
     ``last_words``: Stop, and the emergency stop, for a guard to say when this process cannot; None:
     no guard is wanted.
-    ``deliver`` gets the session's events on whichever thread they came up; ``report`` gets a
-    sentence about the port whenever it cannot be had or is lost, and None when it is open;
-    ``failed`` gets the exception that ended a thread, which nothing but a defect can do;
-    ``on_read`` and ``on_write`` get the bytes of each read and each write as they were.
+    ``deliver`` gets the session's events; ``refused`` the reason why a command was not obeyed;
+    ``report`` a sentence about the port whenever it cannot be had or is lost, and None when it is
+    open; ``on_read`` and ``on_write`` the bytes of each read and each write as they were. They are
+    called one at a time, in the order in which it happened, on the reader's thread or another.
+    ``failed`` gets the exception that ended a thread, which nothing but a defect can do.
     """
 
     def __init__(
@@ -61,8 +64,9 @@ class Link:
         deliver: Callable[[Sequence[Event]], None],
         report: Callable[[str | None], None],
         failed: Callable[[BaseException], None],
+        refused: Callable[[str], None] = lambda _reason: None,
         on_read: Callable[[bytes], None] | None = None,
-        on_write: Callable[[bytes], None] = lambda _data: None,
+        on_write: Callable[[bytes], None] | None = None,
     ) -> None:
         self._session = session
         self._url = url
@@ -72,6 +76,8 @@ class Link:
         self._last_words = last_words
         self.reconnect_interval_s = self._wait_s = reconnect_interval_s
         self._deliver, self._report, self._failed = deliver, report, failed
+        self._refused = refused
+        self._outbox = Outbox()
         self._on_read, self._on_write = on_read, on_write
         self._lock = threading.Lock()
         self._changed = threading.Condition(self._lock)
@@ -86,7 +92,11 @@ class Link:
         self._pacing_until = self._beat_at = -math.inf
         self._threads = [
             threading.Thread(target=self._guard, args=(work,), name=f"omnibot-{name}", daemon=True)
-            for name, work in (("reader", self._serve), ("pacer", self._pace))
+            for name, work in (
+                ("reader", self._serve),
+                ("pacer", self._pace),
+                ("teller", self._outbox.serve),
+            )
         ]
 
     def start(self) -> None:
@@ -95,8 +105,10 @@ class Link:
             thread.start()
 
     def call(self, action: Callable[[Session, float], T]) -> T:
-        """Do something with the session; what it has to say is on the wire before this returns."""
-        events: Sequence[Event] = ()
+        """Do something with the session; what it has to say is on the wire before this returns.
+
+        What comes of it is delivered by another thread.
+        """
         try:
             with self._lock:
                 now = time.monotonic()
@@ -104,9 +116,9 @@ class Link:
                 try:
                     return action(self._session, now)
                 finally:
-                    events = self._settle()
+                    self._settle()
         finally:
-            self._deliver(events)
+            self._outbox.hand_over()
 
     @property
     def blocked(self) -> bool:
@@ -120,9 +132,9 @@ class Link:
     def command(self, action: Callable[[Session, T, float], None], wish: T, sent_ns: int) -> None:
         """``call``, with a wish that was sent at this time of day by the sender's clock.
 
-        Raises CommandRefused for one that has been waiting while this process stood still.
+        Raises CommandRefused for one that has been waiting while this process stood still. Every
+        refusal is delivered as well, in its place among the events.
         """
-        events: Sequence[Event] = ()
         try:
             with self._lock:
                 now = time.monotonic()
@@ -132,10 +144,14 @@ class Link:
                         self._heed_standstill(boot_s)
                         raise CommandRefused(WAITED)
                     action(self._session, wish, now)
+                except CommandRefused as error:
+                    if not self._outbox.full:
+                        self._outbox.put(partial(self._refused, str(error)))
+                    raise
                 finally:
-                    events = self._settle()
+                    self._settle()
         finally:
-            self._deliver(events)
+            self._outbox.hand_over()
 
     def figures(self) -> tuple[LinkFigures, SessionFigures]:
         """All that is counted and measured, at one moment."""
@@ -155,12 +171,11 @@ class Link:
         Whether the robot was told to stand still; ``stands``: whether it was seen to.
         """
         told = False
-        events: Sequence[Event] = ()
         with self._changed:
             if not self._leaving:
                 self._leaving = True
                 self._on_exit = on_exit
-                events = self._stop_for_good()
+                self._stop_for_good()
                 self._write(self._session.farewell(on_exit))
                 if self._port is not None:
                     told = self._write_error is None
@@ -169,28 +184,33 @@ class Link:
                     self._port = None  # nobody adds to the last words
             self._closing.set()
             self._changed.notify_all()
-        self._deliver(events)
-        for thread in self._threads:
+        *serving, teller = self._threads
+        self._join(serving)
+        self._outbox.close()
+        self._join([teller])
+        return told and not any(thread.is_alive() for thread in serving)
+
+    @staticmethod
+    def _join(threads: Sequence[threading.Thread]) -> None:
+        for thread in threads:
             if thread.is_alive():
                 thread.join(JOIN_TIMEOUT_S)
-        return told and not any(thread.is_alive() for thread in self._threads)
 
     @property
     def stands(self) -> bool:
         """After ``close``: the board has shown that the robot stands."""
         return self._stands
 
-    def _stop_for_good(self) -> Sequence[Event]:
+    def _stop_for_good(self) -> None:
         """With the lock held: wait, while the pacer repeats Stop, until the robot stands."""
         self._session.leave(now := time.monotonic())
-        events = self._settle()
+        self._settle()
         alone = self._port is not None and self._keeper is None and not self._port.ends_with_us
         end = now + (UNGUARDED_S if alone else STANDS_WITHIN_S)
         while self._port is not None and self._write_error is None and not self._session.stands:
             if (left_s := end - time.monotonic()) <= 0.0:
                 break
             self._changed.wait(left_s)
-        return events
 
     def _guard(self, work: Callable[[], None]) -> None:
         try:
@@ -203,7 +223,7 @@ class Link:
         while not (leaving := self._closing.is_set()) or self._opened:
             try:
                 with closing(self._open()) as port:
-                    self._report(None)
+                    self._tell(partial(self._report, None))
                     comes_back = False
                     try:
                         self._attach(port)
@@ -218,7 +238,7 @@ class Link:
                 if leaving:
                     return
                 self._trouble = str(error)
-                self._report(self._trouble)
+                self._tell(partial(self._report, self._trouble))
                 self._closing.wait(self._wait_s)
                 longest_s = max(LONGEST_WAIT_S, self.reconnect_interval_s)
                 self._wait_s = min(BACK_OFF * self._wait_s, longest_s)
@@ -230,8 +250,10 @@ class Link:
             self._trouble = ""
             self._opened += 1
             self._session.opened(time.monotonic())
-            events = [*notices, *self._settle()]
-        self._deliver(events)
+            if notices:
+                self._outbox.put(partial(self._deliver, notices))
+            self._settle()
+        self._outbox.deliver()
 
     def _guarded(self, port: Port) -> tuple[Keeper | None, list[Notice]]:
         if self._last_words is None or port.ends_with_us:
@@ -246,7 +268,7 @@ class Link:
         while not self._closing.is_set():
             data = port.read()
             if data and self._on_read is not None:
-                self._on_read(data)
+                self._tell(partial(self._on_read, data))
             with self._lock:
                 if self._write_error is not None:
                     raise self._write_error
@@ -254,15 +276,23 @@ class Link:
                     continue
                 now = time.monotonic()
                 measured = self._session.hear(data, now)
-            if measured:
-                self._deliver(measured)
+                claimed = bool(measured) and self._outbox.claim()
+                if measured and not claimed:
+                    self._outbox.put(partial(self._deliver, measured))
+            if claimed:
+                try:
+                    self._deliver(measured)
+                finally:
+                    self._outbox.release()
+            elif measured:
+                self._outbox.deliver()
             with self._lock:
                 self._wait_s = self.reconnect_interval_s
                 self._received += len(data)
                 stopped = self._heed_standstill(boot_time_s())
-                events = self._settle() if self._session.heed(now) or stopped else ()
-            if events:
-                self._deliver(events)
+                if self._session.heed(now) or stopped:
+                    self._settle()
+            self._outbox.deliver()
 
     def _detach(self, port: Port, *, comes_back: bool) -> None:
         """Whatever ended the reading, the robot is not left with a command to carry out."""
@@ -274,10 +304,10 @@ class Link:
             stopped = self._stands if self._closing.is_set() else comes_back
             keeper, self._port, self._keeper = self._keeper, None, None
             self._session.closed(time.monotonic())
-            events = self._settle()
+            self._settle()
         if keeper is not None:
             keeper.end(stopped=stopped)
-        self._deliver(events)
+        self._outbox.deliver()
 
     def _pace(self) -> None:
         while True:
@@ -289,24 +319,24 @@ class Link:
                 if now < self._pacing_until:
                     self._changed.wait(self._pacing_until - now)
                     continue
-                events: list[Event] = [*self._beat(now)]
+                self._beat(now)
                 if now >= self._session.wake_at:
                     self._session.tick(now)
-                    events += self._settle()
-            self._deliver(events)
+                    self._settle()
+            self._outbox.hand_over()
 
-    def _beat(self, now: float) -> list[Notice]:
+    def _beat(self, now: float) -> None:
         """With the lock held: this thread, and so the watchdog, is alive."""
         boot_s = boot_time_s()  # read once: it may stand still between two readings
         self._heed_standstill(boot_s)
         self._standstill.passed(boot_s, time.time_ns())
         if now < self._beat_at:
-            return []
+            return
         self._beat_at = now + BEAT_S
         if self._keeper is None:
-            return []
-        trouble = self._keeper.beat(now, latched=self._session.estop_active)
-        return [Notice(trouble)] if trouble else []
+            return
+        if trouble := self._keeper.beat(now, latched=self._session.estop_active):
+            self._outbox.put(partial(self._deliver, [Notice(trouble)]))
 
     def _heed_standstill(self, boot_s: float) -> bool:
         """With the lock held: whether this process stood still, and the robot is to be stopped."""
@@ -315,13 +345,22 @@ class Link:
             self._session.stood_still(length_s, time.monotonic())
         return length_s > 0.0
 
-    def _settle(self) -> Sequence[Event]:
-        """With the lock held: write what is due, wake the pacer if it sleeps for too long."""
+    def _tell(self, delivery: Delivery) -> None:
+        """The reader's own, of what happened without the lock."""
+        self._outbox.put(delivery)
+        self._outbox.deliver()
+
+    def _settle(self) -> None:
+        """With the lock held: write what is due, wake the pacer if it sleeps for too long.
+
+        What there is to tell takes its place in the order.
+        """
         if data := self._session.take_output(time.monotonic()):
             self._write(data)
         if self._session.wake_at < self._pacing_until or self._leaving:
             self._changed.notify_all()
-        return self._session.take_events()
+        if events := self._session.take_events():
+            self._outbox.put(partial(self._deliver, events))
 
     def _write(self, data: bytes) -> None:
         if self._port is None or self._write_error is not None:
@@ -333,4 +372,5 @@ class Link:
             self._write_error = error
             self._port.interrupt()
         else:
-            self._on_write(data)
+            if self._on_write is not None:
+                self._outbox.put(partial(self._on_write, data))

@@ -6,6 +6,7 @@ Nothing is computed here. Measurements are published by the link's reader thread
 the executor sleeps unless a message, a service call or a parameter wakes it.
 """
 
+import contextlib
 import math
 import time
 import traceback
@@ -87,6 +88,7 @@ class OmniBotDriver(Node):
                 deliver=self._publishing.publish,
                 report=self._publishing.report_port,
                 failed=self.report_defect,
+                refused=self._refuse,
             )
         taps = self._publishing.taps() if self._values["publish_raw"] else {}
         stop = self._board.stop()
@@ -101,6 +103,7 @@ class OmniBotDriver(Node):
             deliver=self._publishing.deliver,
             report=self._publishing.report_port,
             failed=self.report_defect,
+            refused=self._refuse,
             **taps,
         )
 
@@ -150,13 +153,11 @@ class OmniBotDriver(Node):
         self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
 
     def _obey(self, action: Callable[[Session, Any, float], None]) -> Callable[..., None]:
-        """A callback that hands each message to ``action``, or tells why it is refused."""
+        """A callback that hands each message to ``action``; the link tells of a refusal."""
 
         def callback(message: Any, info: MessageInfo) -> None:
-            try:
+            with contextlib.suppress(CommandRefused):
                 self._link.command(action, message, info["source_timestamp"])
-            except CommandRefused as error:
-                self._refuse(str(error))
 
         return callback
 

@@ -2,11 +2,11 @@
 
 """What the driver says: what the session tells, on topics; news, in the log.
 
-Whichever thread an event came up on publishes it: measurements come from the link's reader.
+One call at a time, in the order in which things happened (`outbox.py` sees to it), so what is
+published last is the truth. Measurements come from the link's reader.
 """
 
 import contextlib
-import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
@@ -69,18 +69,16 @@ class Publishing:
         self._state = node.create_publisher(String, "~/state", LATCHED)
         self._estop_active = node.create_publisher(Bool, "~/estop_active", LATCHED)
         self._wheels = messages.UNTURNED
-        self._published: tuple[str, bool] | None = None
-        self._state_lock = threading.Lock()
+        self._shown: StateChanged | None = None
         self._told: set[str] = set()
         self._clock_offset_ns = self._simulated_ns = 0
-        self._simulated_lock = threading.Lock()
         self._stamped_ns: dict[type, int] = {}
         self._handlers: dict[type, Callable[[Any, int], None]] = {
             ImuEstimate: self._publish_imu,
             OdometryEstimate: self._publish_odometry,
             RequestDone: self._answer,
             Notice: self._warn,
-            StateChanged: lambda _event, _clock_offset_ns: self.publish_state(),
+            StateChanged: lambda event, _clock_offset_ns: self._show(event),
         }
 
     @property
@@ -122,19 +120,8 @@ class Publishing:
             self._handlers[type(event)](event, clock_offset_ns)
 
     def publish_state(self) -> None:
-        """Latched topics show what is so now, whichever thread says so last."""
-        with self._state_lock:
-            now = self._session.shown
-            before = self._published or (None, None)
-            self._published = now
-            if now[0] != before[0]:
-                if now[0] not in UNHEARD:
-                    self._told = set()
-                if self._is_news(state := f"state: {now[0]}"):
-                    self._node.get_logger().info(state)
-                self._state.publish(String(data=now[0]))
-            if now[1] != before[1]:
-                self._estop_active.publish(Bool(data=now[1]))
+        """For the first time, before there are events."""
+        self._show(StateChanged(*self._session.shown))
 
     def report_port(self, trouble: str | None) -> None:
         """The port is open, or cannot be had, or was lost."""
@@ -149,21 +136,20 @@ class Publishing:
 
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
         """By a clock that goes in steps, may jump back, and is 0 until somebody simulates it."""
-        with self._simulated_lock:
-            now_ns = self._clock.now().nanoseconds
-            if now_ns < self._simulated_ns:
-                self._stamped_ns = {}
-            self._simulated_ns = now_ns
-            offset_ns = now_ns - time.monotonic_ns()
-            for event in events:
-                kind = type(event)
-                if not isinstance(event, ImuEstimate | OdometryEstimate):
-                    self._handlers[kind](event, offset_ns)
-                elif now_ns:
-                    steady_ns = round(event.stamp_s * 1e9)
-                    stamp_ns = max(steady_ns + offset_ns, self._stamped_ns.get(kind, 0) + 1)
-                    self._stamped_ns[kind] = stamp_ns
-                    self._handlers[kind](event, stamp_ns - steady_ns)
+        now_ns = self._clock.now().nanoseconds
+        if now_ns < self._simulated_ns:
+            self._stamped_ns = {}
+        self._simulated_ns = now_ns
+        offset_ns = now_ns - time.monotonic_ns()
+        for event in events:
+            kind = type(event)
+            if not isinstance(event, ImuEstimate | OdometryEstimate):
+                self._handlers[kind](event, offset_ns)
+            elif now_ns:
+                steady_ns = round(event.stamp_s * 1e9)
+                stamp_ns = max(steady_ns + offset_ns, self._stamped_ns.get(kind, 0) + 1)
+                self._stamped_ns[kind] = stamp_ns
+                self._handlers[kind](event, stamp_ns - steady_ns)
 
     def _end(self) -> None:
         """ROS is being shut down; to ask it each time costs more than an Imu."""
@@ -200,6 +186,18 @@ class Publishing:
         done.token.set_result(done)
         if self._node.executor is not None:
             self._node.executor.wake()
+
+    def _show(self, now: StateChanged) -> None:
+        state, before = now.state, self._shown
+        self._shown = now
+        if before is None or state != before.state:
+            if state not in UNHEARD:
+                self._told = set()
+            if self._is_news(text := f"state: {state}"):
+                self._node.get_logger().info(text)
+            self._state.publish(String(data=state))
+        if before is None or now.estop_active != before.estop_active:
+            self._estop_active.publish(Bool(data=now.estop_active))
 
     def _warn(self, notice: Notice, _clock_offset_ns: int) -> None:
         self._node.get_logger().warning(notice.text)

@@ -14,10 +14,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Final, TypeVar
 
-from omnibot_driver.core.errors import LinkError
+from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.session import Session
 from omnibot_driver.core.supervisor import OnExit
+from omnibot_driver.outbox import Delivery, Outbox
 from omnibot_driver.recording import Recording
 
 JOIN_TIMEOUT_S: Final = 1.0
@@ -30,9 +31,10 @@ T = TypeVar("T")
 class Replay:
     """One session on one recording, which is played once.
 
-    ``deliver`` gets the session's events and the time of day, in ns, at which its time is zero, on
-    whichever thread they came up; ``report`` gets None when the recording begins; ``failed`` gets
-    the exception that ended the thread, which nothing but a defect can do.
+    ``deliver`` gets the session's events and the time of day, in ns, at which its time is zero;
+    ``refused`` the reason why a command was not obeyed; ``report`` gets None when the recording
+    begins. They are called one at a time, in the order in which it happened. ``failed`` gets the
+    exception that ended the thread, which nothing but a defect can do.
     """
 
     def __init__(
@@ -43,12 +45,15 @@ class Replay:
         deliver: Callable[[Sequence[Event], int], None],
         report: Callable[[None], None],
         failed: Callable[[BaseException], None],
+        refused: Callable[[str], None] = lambda _reason: None,
     ) -> None:
         self._session = session
         self._recording = recording
         self._deliver = deliver
         self._report = report
         self._failed = failed
+        self._refused = refused
+        self._outbox = Outbox()
         self._lock = threading.Lock()
         self._closing = threading.Event()
         self._now = self._began_at = 0.0
@@ -61,15 +66,17 @@ class Replay:
 
     def call(self, action: Callable[[Session, float], T]) -> T:
         """Do something with the session, at the time that the recording has come to."""
-        events: Sequence[Event] = ()
         try:
             with self._lock:
                 try:
                     return action(self._session, self._now)
+                except CommandRefused as error:
+                    self._outbox.put(partial(self._refused, str(error)))
+                    raise
                 finally:
-                    events = self._settle()
+                    self._settle()
         finally:
-            self._deliver(events, self._epoch_ns)
+            self._outbox.deliver()
 
     @property
     def blocked(self) -> bool:
@@ -102,7 +109,7 @@ class Replay:
             for at_ns, data in self._recording.chunks():
                 if not opened:
                     opened, self._epoch_ns, self._began_at = True, at_ns, time.monotonic()
-                    self._report(None)
+                    self._tell(partial(self._report, None))
                     self.call(lambda session, now: session.opened(now))
                 if not self._run_until((at_ns - self._epoch_ns) * 1e-9):
                     return
@@ -110,7 +117,7 @@ class Replay:
         except LinkError as error:
             end = str(error)
         self.call(lambda session, now: session.closed(now))
-        self._deliver([Notice(end)], self._epoch_ns)
+        self._tell(partial(self._deliver, [Notice(end)], self._epoch_ns))
 
     def _run_until(self, end_s: float) -> bool:
         """Let the time pass, with everything that falls due in it; False when it is cut short."""
@@ -132,9 +139,14 @@ class Replay:
             self._now = max(self._now, until_s)
         return True
 
-    def _settle(self) -> Sequence[Event]:
+    def _tell(self, delivery: Delivery) -> None:
+        self._outbox.put(delivery)
+        self._outbox.deliver()
+
+    def _settle(self) -> None:
         self._session.take_output(self._now)
-        return self._session.take_events()
+        if events := self._session.take_events():
+            self._outbox.put(partial(self._deliver, events, self._epoch_ns))
 
 
 def _hear(data: bytes, session: Session, now: float) -> None:

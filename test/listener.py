@@ -4,6 +4,7 @@
 
 import threading
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.events import Event
@@ -28,6 +29,7 @@ class Listener:
     def __init__(self) -> None:
         self.events: list[Event] = []
         self.reports: list[str | None] = []
+        self.refused: list[str] = []
         self.failures: list[BaseException] = []
         self.threads: set[str] = set()
         self._changed = threading.Condition()
@@ -61,9 +63,7 @@ def session(*, run: bool = True, obeys: bool = True) -> Session:
     return Session(OmniBot(OmniBotSettings()), settings, run=run, obeys=obeys)
 
 
-def link_to(
-    url: str, listener: Listener, session: Session, **taps: Callable[[bytes], None]
-) -> Link:
+def link_to(url: str, listener: Listener, session: Session, **taps: Callable[[Any], None]) -> Link:
     return Link(
         session,
         url,

@@ -11,7 +11,10 @@ from omnibot_driver.core.supervisor import RequestDone
 
 @dataclass(frozen=True, slots=True)
 class StateChanged:
-    """``Session.state`` or ``Session.estop_active`` is another than before."""
+    """``Session.state`` or ``Session.estop_active`` is another than before: what they are now."""
+
+    state: str
+    estop_active: bool
 
 
 @dataclass(frozen=True, slots=True)

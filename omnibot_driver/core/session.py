@@ -365,7 +365,7 @@ class Session:
             shown = (self.state, self.estop_active)
             if shown != self.shown:
                 self.shown = shown
-                self._events.append(StateChanged())
+                self._events.append(StateChanged(*shown))
         events, self._events = self._events, []
         return events
 

@@ -34,7 +34,7 @@ def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
     bench.run(5.0)
     assert {data for _, data in bench.written[start:]} == {EMERGENCY_STOP + STOP}
     assert bench.still()
-    assert StateChanged() in bench.events
+    assert StateChanged("nominal", True) in bench.events
 
 
 def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> None:

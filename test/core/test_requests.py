@@ -179,4 +179,7 @@ def test_the_state_does_not_flap_while_a_deaf_board_is_asked_to_reset(bench: Ben
         shown.append(bench.session.state)
         bench.run(0.01)
     assert [state for state, _ in itertools.groupby(shown)] == ["nominal", "connecting", "nominal"]
-    assert bench.events.count(StateChanged()) == 2
+    assert [event for event in bench.events if isinstance(event, StateChanged)] == [
+        StateChanged("connecting", False),
+        StateChanged("nominal", False),
+    ]

@@ -1,0 +1,158 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Deliveries of several threads: in order, one at a time, and nobody waits who must not."""
+
+import random
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+
+import pytest
+
+from omnibot_driver.outbox import MOST_WAITING, Outbox
+
+PATIENCE_S = 20.0
+
+
+def in_threads(*works: Callable[[], object]) -> None:
+    """All at once, until all are done."""
+    threads = [threading.Thread(target=work) for work in works]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(PATIENCE_S)
+        assert not thread.is_alive()
+
+
+class Held:
+    """A delivery that is under way until it is let go."""
+
+    def __init__(self, outbox: Outbox) -> None:
+        self._begun, self._over = threading.Event(), threading.Event()
+        outbox.put(self._deliver)
+        self._thread = threading.Thread(target=outbox.deliver)
+        self._thread.start()
+        assert self._begun.wait(PATIENCE_S)
+
+    def let_go(self) -> None:
+        self._over.set()
+        self._thread.join(PATIENCE_S)
+        assert not self._thread.is_alive()
+
+    def _deliver(self) -> None:
+        self._begun.set()
+        assert self._over.wait(PATIENCE_S)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_everything_leaves_once_in_the_order_of_the_lock_and_one_at_a_time(seed: int) -> None:
+    """However threads are held up between the lock and the delivery, or within one."""
+    outbox, lock = Outbox(), threading.Lock()
+    happened: list[int] = []
+    left: list[int] = []
+    under_way = 0
+
+    def deliver(number: int, pause_s: float) -> None:
+        nonlocal under_way
+        under_way += 1
+        assert under_way == 1
+        time.sleep(pause_s)
+        left.append(number)
+        under_way -= 1
+
+    def happen(own_seed: int) -> None:
+        chance = random.Random(own_seed)
+        for _ in range(60):
+            with lock:
+                claimed = chance.random() < 0.5 and outbox.claim()
+                mine = partial(deliver, len(happened), chance.choice((0.0, 0.0, 1e-4)))
+                happened.append(len(happened))
+                if not claimed:
+                    outbox.put(mine)
+            time.sleep(chance.choice((0.0, 1e-5, 1e-4)))
+            if claimed:
+                mine()
+                outbox.release()
+            else:
+                chance.choice((outbox.deliver, outbox.hand_over))()
+
+    teller = threading.Thread(target=outbox.serve)
+    teller.start()
+    in_threads(*(partial(happen, 100 * seed + number) for number in range(6)))
+    outbox.close()
+    teller.join(PATIENCE_S)
+    assert left == happened == list(range(len(happened)))
+    assert len(happened) > 200
+
+
+def test_nobody_claims_what_is_not_next() -> None:
+    """While another one delivers, or anything waits."""
+    outbox = Outbox()
+    held = Held(outbox)
+    assert not outbox.claim()
+    held.let_go()
+    outbox.put(lambda: None)
+    assert not outbox.claim()
+    outbox.deliver()
+    assert outbox.claim()
+    outbox.release()
+
+
+def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
+    """It finds the place taken, and what it put leaves when that one is done."""
+    outbox = Outbox()
+    left: list[str] = []
+    held = Held(outbox)
+    for name in ("a command", "a stop"):
+        outbox.put(partial(left.append, name))
+        outbox.deliver()
+        outbox.hand_over()
+    assert left == []
+    held.let_go()
+    assert left == ["a command", "a stop"]
+
+
+def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
+    """The next ones leave with whoever comes next."""
+    outbox = Outbox()
+    left: list[int] = []
+
+    def fail() -> None:
+        raise ZeroDivisionError
+
+    outbox.put(fail)
+    outbox.put(partial(left.append, 1))
+    with pytest.raises(ZeroDivisionError):
+        outbox.deliver()
+    assert left == []
+    outbox.deliver()
+    assert left == [1]
+
+
+def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
+    """After it."""
+    outbox = Outbox()
+    left: list[int] = []
+    outbox.put(lambda: outbox.put(partial(left.append, 2)) or left.append(1))
+    outbox.deliver()
+    assert left == [1, 2]
+
+
+def test_whoever_brings_more_than_can_be_told_waits() -> None:
+    """What waits does not grow for ever."""
+    outbox = Outbox()
+    left: list[int] = []
+    held = Held(outbox)
+    assert not outbox.full
+    for number in range(MOST_WAITING):
+        outbox.put(partial(left.append, number))
+    assert outbox.full
+    reader = threading.Thread(target=outbox.deliver)
+    reader.start()
+    reader.join(0.1)
+    assert reader.is_alive()
+    held.let_go()
+    reader.join(PATIENCE_S)
+    assert not reader.is_alive()
+    assert left == list(range(MOST_WAITING))
