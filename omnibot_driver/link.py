@@ -130,7 +130,7 @@ class Link:
             return self._write_error is not None
 
     def command(self, action: Callable[[Session, T, float], None], wish: T, sent_ns: int) -> None:
-        """``call``, with a wish that was sent at this time of day by the sender's clock.
+        """``call``, with a wish that was sent at this time of day, as far as is known.
 
         Raises CommandRefused for one that has been waiting while this process stood still. Every
         refusal is delivered as well, in its place among the events.

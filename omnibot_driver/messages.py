@@ -15,7 +15,14 @@ from typing import Any, Final
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import Point, Quaternion, Transform, TransformStamped, Vector3
+from geometry_msgs.msg import (
+    Point,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    TwistStamped,
+    Vector3,
+)
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header, UInt8MultiArray
@@ -225,6 +232,12 @@ def age(stamp: Time, now_ns: int) -> float:
     """Seconds since the stamp by the clock that gave both; 0 for a zero stamp, which is none."""
     stamp_ns = stamp.sec * 10**9 + stamp.nanosec
     return (now_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
+
+
+def is_stamped(stamped: TwistStamped) -> bool:
+    """A stamp of zero is none."""
+    stamp = stamped.header.stamp
+    return bool(stamp.sec or stamp.nanosec)
 
 
 def raw_message(data: bytes) -> UInt8MultiArray:

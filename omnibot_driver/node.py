@@ -33,9 +33,12 @@ from omnibot_driver.publishing import Publishing
 from omnibot_driver.recording import is_recording, open_recording
 from omnibot_driver.replay import Replay
 from omnibot_driver.services import Services
+from omnibot_driver.standstill import boot_time_ns
+from omnibot_driver.transit import Arrival, Transit
 
 LOOK_EVERY_S = WARN_EVERY_S = 2.0
 MessageInfo = dict[str, int]
+Action = Callable[[Session, Any, float], None]
 
 
 class OmniBotDriver(Node):
@@ -142,22 +145,53 @@ class OmniBotDriver(Node):
 
     def _create_inputs(self) -> None:
         if self._values["enable_stamped_cmd_vel"]:
-            self.create_subscription(TwistStamped, "cmd_vel", self._obey(self._twist_stamped), 1)
+            obey = self._obey("cmd_vel", self._twist_stamped, may_be_old=messages.is_stamped)
+            self.create_subscription(TwistStamped, "cmd_vel", obey, 1)
         else:
-            self.create_subscription(Twist, "cmd_vel", self._obey(_twist), 1, raw=True)
+            obey = self._obey("cmd_vel", _twist)
+            self.create_subscription(Twist, "cmd_vel", obey, 1, raw=True)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._looks = [self._see_other_types, self._see_namesakes, self._see_no_clock]
         self.create_timer(LOOK_EVERY_S, self._look_around, clock=steady)
-        self.create_subscription(Float32MultiArray, "wheel_cmd", self._obey(_wheels), 1)
-        self.create_subscription(PoseStamped, "cmd_pose", self._obey(self._pose), 1)
+        self.create_subscription(
+            Float32MultiArray, "wheel_cmd", self._obey("wheel_cmd", _wheels), 1
+        )
+        obey = self._obey("cmd_pose", self._pose, may_be_old=lambda _goal: True)
+        self.create_subscription(PoseStamped, "cmd_pose", obey, 1)
         self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
 
-    def _obey(self, action: Callable[[Session, Any, float], None]) -> Callable[..., None]:
-        """A callback that hands each message to ``action``; the link tells of a refusal."""
+    def _obey(
+        self,
+        topic: str,
+        action: Action,
+        *,
+        may_be_old: Callable[[Any], bool] = lambda _message: False,
+    ) -> Callable[..., None]:
+        """A callback that hands each message to ``action``; the link tells of a refusal.
+
+        ``may_be_old``: whether it does not matter how long a message was under way.
+        """
+        transit = Transit()
 
         def callback(message: Any, info: MessageInfo) -> None:
+            longest_s = self._values["cmd_vel_timeout"]
+            now_ns = time.time_ns()
+            arrival = Arrival(
+                sent_ns=info["source_timestamp"],
+                received_ns=info["received_timestamp"],
+                now_ns=now_ns,
+                steady_ns=boot_time_ns(),
+                number=info.get("publication_sequence_number"),
+            )
+            delay = transit.delay(arrival, longest_s)
+
+            def obey(session: Session, message: Any, now: float) -> None:
+                if not may_be_old(message):
+                    delay.require(topic, longest_s)
+                action(session, message, now)
+
             with contextlib.suppress(CommandRefused):
-                self._link.command(action, message, info["source_timestamp"])
+                self._link.command(obey, message, now_ns - round(delay.total_s * 1e9))
 
         return callback
 

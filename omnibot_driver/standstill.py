@@ -22,7 +22,12 @@ LATEST_S: Final = 10.0
 
 def boot_time_s() -> float:
     """A steady clock that also counts the time for which the host was suspended."""
-    return time.clock_gettime(time.CLOCK_BOOTTIME)
+    return boot_time_ns() / 1e9
+
+
+def boot_time_ns() -> int:
+    """The same in ns."""
+    return time.clock_gettime_ns(time.CLOCK_BOOTTIME)
 
 
 class Standstill:
@@ -55,7 +60,9 @@ class Standstill:
         self._passed_at = now
 
     def outlived_by(self, sent_ns: int, now: float) -> bool:
-        """A command, sent at this time of day by the sender's clock, is not from before its end."""
+        """A command that was sent at this time of day, as far as is known, is not from before its
+        end.
+        """
         if self._begun or now - self._passed_at >= STANDSTILL_S or now < self._over_at + SETTLE_S:
             return False
         return now >= self._over_at + LATEST_S or not self._from_ns <= sent_ns <= self._until_ns

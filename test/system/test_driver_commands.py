@@ -39,6 +39,40 @@ def test_cmd_vel_reaches_the_board_as_the_manuals_frame(probe: Probe, board: Pty
     assert board.wait_for(lambda b: newest(b) == ReceivedCommand(newest(b).tick, "wheels"), 20.0)
 
 
+HELD_UP = """
+import time
+import omnibot_driver.node
+def hold_up(_driver, message):
+    print("the executor is held up", flush=True)
+    time.sleep(2.0)
+omnibot_driver.node.OmniBotDriver._on_estop_topic = hold_up
+"""
+
+
+@pytest.mark.parametrize("topic", ["cmd_vel", "wheel_cmd"])
+def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
+    board: PtyBoard, start_driver: Start, probe_of: Start, topic: str
+) -> None:
+    """It has no stamp, but the middleware has; the next one is obeyed."""
+    driver: Driver = start_driver(board.path, before=HELD_UP)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    message: Any = Twist() if topic == "cmd_vel" else Float32MultiArray(data=[10.0, 0.0, 0.0])
+    if topic == "cmd_vel":
+        message.linear.x = 0.3
+    commands = probe.publisher(type(message), topic)
+    probe.publisher(Bool, "estop").publish(Bool(data=True))
+    driver.wait_for_line("the executor is held up")
+    with board.lock:
+        mark = len(board.board.commands)
+    commands.publish(message)
+    driver.wait_for_line(f"{topic} refused: it was sent .* s ago.*in this driver's queue")
+    with board.lock:
+        assert all(c.values == (0, 0, 0) for c in list(board.board.commands)[mark:])
+    commands.publish(message)
+    assert board.wait_for(lambda b: newest(b).values != (0, 0, 0), 20.0)
+
+
 def test_a_zero_twist_is_the_stop_frame(probe: Probe, board: PtyBoard) -> None:
     """Never zeros in mode 1."""
     commands = probe.publisher(Twist, "cmd_vel")

@@ -123,9 +123,9 @@ def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
 
 SUSPENDED = """
 import os, time
-real = time.clock_gettime
-time.clock_gettime = lambda clock: real(clock) + (
-    60.0 if clock == time.CLOCK_BOOTTIME and os.path.exists({path!r}) else 0.0
+real = time.clock_gettime_ns
+time.clock_gettime_ns = lambda clock: real(clock) + (
+    60_000_000_000 if clock == time.CLOCK_BOOTTIME and os.path.exists({path!r}) else 0
 )
 """
 """The clock that goes on while a host is suspended has gone on, once that file is there."""

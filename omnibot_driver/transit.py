@@ -1,0 +1,174 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How long a command without a stamp was under way, by the time at which the middleware sent it.
+
+The sender's clock may be off by any amount, so a delay shows only against other messages: of a
+sender's messages, the one that came with the smallest difference between our clock and its clock
+was under way for the shortest time, and tells how far the two clocks are apart. What is above that
+is delay. Time that a message waited in this process is known exactly, by our own clock.
+
+Clocks step. Ours is looked at twice, as time of day and as a steady clock: a step of the time of
+day that our senders share (one host, or NTP everywhere) shows in the second alone, a step of ours
+in the first alone, and the smaller delay counts. A sender whose clock is set back by itself seems
+to be late from then on. When all of its messages have been late for ``HEALS_AFTER_S``, the smallest
+difference among those counts. A delay that lasts as long cannot be told from that.
+
+Middleware numbers the messages of each sender. It does not say who sent one, but a number that is
+not above a sender's last one is another sender's. This module reads no clock and knows no ROS.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.errors import CommandRefused
+
+HEALS_AFTER_S: Final = 5.0
+LONGEST_SILENCE_S: Final = 2.0
+"""Messages that are further apart are not said to have been late all the time."""
+LARGEST_DRIFT: Final = 5e-4
+"""Of two clocks: a crystal is off by a tenth of this, NTP corrects a clock at most at this rate."""
+CLOCK_RETREATS: Final = 10.0
+"""A message that seems to be early is so many times less likely to be a sender's than one that is
+late by as much."""
+MOST_SENDERS: Final = 8
+
+Differences = tuple[float, float]
+"""Our clock less a sender's when its message came in, in s: by the time of day, and steady."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arrival:
+    """One message.
+
+    ``sent_ns``: time of day by its sender's clock; ``received_ns``: by ours, when it came in;
+    ``now_ns``: by ours, now; ``steady_ns``: by a steady clock, now. ``number`` counts its sender's
+    messages; None where the middleware does not.
+    """
+
+    sent_ns: int
+    received_ns: int
+    now_ns: int
+    steady_ns: int
+    number: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """``total_s`` since it was sent, of which it ``waited_s`` to be taken from our own queue."""
+
+    total_s: float
+    waited_s: float
+
+    def require(self, topic: str, longest_s: float) -> None:
+        """Raises CommandRefused for a command that was under way for longer."""
+        if self.total_s <= longest_s:
+            return
+        if 2 * self.waited_s > self.total_s:
+            where = (
+                f"{self.waited_s:.1f} s of it in this driver's queue: its executor was held up;"
+                " check the load of this computer"
+            )
+        else:
+            where = "check the network, and the load and the clock of the sending computer"
+        raise CommandRefused(
+            f"{topic} refused: it was sent {self.total_s:.1f} s ago, cmd_vel_timeout is"
+            f" {longest_s:g} s; {where}"
+        )
+
+
+class Transit:
+    """The messages of one topic, whoever sends them."""
+
+    def __init__(self) -> None:
+        self._senders: list[_Sender] = []
+
+    def delay(self, arrival: Arrival, longest_s: float) -> Delay:
+        """How long this message was under way; one above ``longest_s`` counts as late.
+
+        The first of each sender was under way for no time, as far as can be told.
+        """
+        waited_ns = max(0, arrival.now_ns - arrival.received_ns)
+        at_s = (arrival.steady_ns - waited_ns) / 1e9
+        differences_s = (
+            (arrival.received_ns - arrival.sent_ns) / 1e9,
+            (arrival.steady_ns - waited_ns - arrival.sent_ns) / 1e9,
+        )
+        late_s = self._late_s(arrival.number, differences_s, at_s, longest_s)
+        return Delay(late_s + waited_ns / 1e9, waited_ns / 1e9)
+
+    def _late_s(
+        self, number: int | None, differences_s: Differences, at_s: float, longest_s: float
+    ) -> float:
+        possible = [sender for sender in self._senders if sender.may_send(number)]
+        if not possible:
+            self._senders = [*self._senders[1 - MOST_SENDERS :], _Sender(differences_s, at_s)]
+            self._senders[-1].number = number
+            return 0.0
+        sender = min(possible, key=lambda sender: sender.improbability(differences_s, at_s))
+        self._senders.remove(sender)
+        self._senders.append(sender)  # the one that was silent for longest is forgotten first
+        sender.number = number
+        return sender.hear(differences_s, at_s, longest_s)
+
+
+class _Sender:
+    """One of those on a topic, and its clock by both of ours."""
+
+    def __init__(self, differences_s: Differences, at_s: float) -> None:
+        self.number: int | None = None
+        self._offsets = [_Offset(difference_s, at_s) for difference_s in differences_s]
+
+    def may_send(self, number: int | None) -> bool:
+        """Its numbers only grow."""
+        return number is None or self.number is None or self.number < number
+
+    def improbability(self, differences_s: Differences, at_s: float) -> float:
+        """How much speaks against its having sent a message, to be compared with other senders."""
+        late_s = min(
+            offset.late_s(difference_s, at_s)
+            for offset, difference_s in zip(self._offsets, differences_s, strict=True)
+        )
+        return late_s if late_s >= 0.0 else -CLOCK_RETREATS * late_s
+
+    def hear(self, differences_s: Differences, at_s: float, longest_s: float) -> float:
+        """It sent a message: for how long that was under way."""
+        return min(
+            offset.hear(difference_s, at_s, longest_s)
+            for offset, difference_s in zip(self._offsets, differences_s, strict=True)
+        )
+
+
+class _Offset:
+    """Between one of our clocks and a sender's: the smallest difference of its messages."""
+
+    def __init__(self, difference_s: float, at_s: float) -> None:
+        self._least_s, self._least_at_s = difference_s, at_s
+        self._late_at_s = -math.inf
+        self._late_since_s = self._least_late_s = math.inf
+
+    def late_s(self, difference_s: float, at_s: float) -> float:
+        """By how much this difference is above the smallest one; negative for one below it."""
+        drift_s = LARGEST_DRIFT * max(0.0, at_s - self._least_at_s)
+        return difference_s - self._least_s - drift_s
+
+    def hear(self, difference_s: float, at_s: float, longest_s: float) -> float:
+        """Learn from a message; for how long it was under way."""
+        late_s = self.late_s(difference_s, at_s)
+        if late_s > longest_s:
+            return self._hear_late(difference_s, at_s, late_s)
+        self._late_at_s = -math.inf
+        if late_s <= 0.0:
+            self._least_s, self._least_at_s = difference_s, at_s
+        return max(0.0, late_s)
+
+    def _hear_late(self, difference_s: float, at_s: float, late_s: float) -> float:
+        if at_s - self._late_at_s > LONGEST_SILENCE_S:
+            self._late_since_s, self._least_late_s = at_s, math.inf
+        self._late_at_s = at_s
+        self._least_late_s = min(self._least_late_s, difference_s)
+        if at_s - self._late_since_s < HEALS_AFTER_S:
+            return late_s
+        self._late_at_s = -math.inf
+        self._least_s, self._least_at_s = self._least_late_s, at_s
+        return difference_s - self._least_s

@@ -1,0 +1,224 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How long commands were under way, with clocks that are off, drift and step."""
+
+from dataclasses import dataclass, field
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.transit import (
+    HEALS_AFTER_S,
+    LARGEST_DRIFT,
+    MOST_SENDERS,
+    Arrival,
+    Delay,
+    Transit,
+)
+
+LONGEST_S = 0.5
+DAY_NS = 1_700_000_000_000_000_000
+HOUR_S = 3600.0
+NS = 1_000_000_000
+
+
+@dataclass
+class Sender:
+    """Publishes on one topic; its clock is ahead of the true time by ``ahead_s``."""
+
+    ahead_s: float = 0.0
+    numbered: bool = True
+    sent: int = 0
+
+
+@dataclass
+class Receiver:
+    """``ahead_s``: of its time of day; its steady clock is right."""
+
+    ahead_s: float = 0.0
+    transit: Transit = field(default_factory=Transit)
+
+    def hear(
+        self, sender: Sender, sent_s: float, under_way_s: float = 0.0, waited_s: float = 0.0
+    ) -> Delay:
+        """A message sent at this true time."""
+        sender.sent += 1
+        received_s = sent_s + under_way_s
+        now_s = received_s + waited_s
+        arrival = Arrival(
+            sent_ns=DAY_NS + round((sent_s + sender.ahead_s) * NS),
+            received_ns=DAY_NS + round((received_s + self.ahead_s) * NS),
+            now_ns=DAY_NS + round((now_s + self.ahead_s) * NS),
+            steady_ns=round(now_s * NS),
+            number=sender.sent if sender.numbered else None,
+        )
+        return self.transit.delay(arrival, LONGEST_S)
+
+
+def refused(delay: Delay) -> bool:
+    try:
+        delay.require("cmd_vel", LONGEST_S)
+    except CommandRefused:
+        return True
+    return False
+
+
+offsets_s = st.one_of(st.floats(-2.0, 2.0), st.sampled_from([0.0, HOUR_S, -HOUR_S, 1.7e9, -1.7e9]))
+in_time_s = st.floats(0.0, LONGEST_S)
+pauses_s = st.floats(0.001, 30.0)
+
+
+@given(offsets_s, offsets_s, st.lists(st.tuples(pauses_s, in_time_s, st.booleans()), min_size=1))
+def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apart(
+    sender_s: float, receiver_s: float, messages: list[tuple[float, float, bool]]
+) -> None:
+    """On the way or in our own queue; what is told is never more than the true delay."""
+    receiver, sender, now_s = Receiver(receiver_s), Sender(sender_s), 100.0
+    for pause_s, late_s, waits in messages:
+        now_s += pause_s
+        under_way_s, waited_s = (0.0, late_s) if waits else (late_s, 0.0)
+        delay = receiver.hear(sender, now_s, under_way_s, waited_s)
+        assert -1e-9 <= delay.waited_s <= delay.total_s + 1e-9
+        assert delay.total_s <= late_s + 1e-6
+
+
+@given(offsets_s, offsets_s, st.booleans(), st.floats(0.6, 100.0), st.floats(0.0, 60.0))
+def test_a_command_that_was_under_way_for_longer_is_refused(
+    sender_s: float, receiver_s: float, numbered: bool, late_s: float, silent_s: float
+) -> None:
+    """After any silence, of any sender, and the next one that comes in time is not."""
+    receiver, sender = Receiver(receiver_s), Sender(sender_s, numbered)
+    for number in range(10):
+        assert not refused(receiver.hear(sender, 100.0 + 0.1 * number, 0.01))
+    sent_s = 101.0 + silent_s
+    delay = receiver.hear(sender, sent_s, 0.01 + late_s)
+    assert refused(delay)
+    drift_s = LARGEST_DRIFT * (silent_s + late_s + 1.0)
+    assert late_s - drift_s - 1e-6 <= delay.total_s <= late_s + 0.01 + 1e-6
+    assert not refused(receiver.hear(sender, sent_s + late_s + 0.1, 0.02))
+
+
+@given(st.floats(0.6, 100.0))
+def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_first(
+    waited_s: float,
+) -> None:
+    """Our own clock alone says so."""
+    delay = Receiver().hear(Sender(-HOUR_S), 100.0, 0.01, waited_s)
+    assert refused(delay)
+    assert delay.total_s == pytest.approx(waited_s)
+
+
+@given(st.sampled_from([1, -1]), st.floats(1.0, 1e6), st.booleans())
+def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, shared: bool) -> None:
+    """NTP sets the clock of a robot that has none of its own; senders on it step with it."""
+    receiver, sender, now_s = Receiver(), Sender(), 100.0
+    for number in range(1000):
+        now_s += 0.1
+        if number == 500:
+            receiver.ahead_s += sign * step_s
+            sender.ahead_s += sign * step_s * shared
+        assert not refused(receiver.hear(sender, now_s, 0.01))
+        if number == 900:
+            assert refused(receiver.hear(sender, now_s, 1.0)), "it is still looked at"
+
+
+@given(st.floats(1.0, 1e6), st.floats(0.0, 0.3))
+def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
+    step_s: float, jitter_s: float
+) -> None:
+    """It cannot be told from a network that has become slow; that would have been told."""
+    receiver, sender, now_s = Receiver(), Sender(), 100.0
+    for _ in range(100):
+        now_s += 0.1
+        receiver.hear(sender, now_s, 0.01)
+    sender.ahead_s -= step_s
+    stepped_s = now_s
+    while refused(receiver.hear(sender, now_s, 0.01 + jitter_s * (round(now_s * 10) % 2))):
+        now_s += 0.1
+    assert now_s - stepped_s <= HEALS_AFTER_S + 0.2
+    for _ in range(100):
+        now_s += 0.1
+        assert not refused(receiver.hear(sender, now_s, 0.01 + jitter_s))
+    assert refused(receiver.hear(sender, now_s, 1.0 + jitter_s))
+
+
+@given(st.floats(1.0, 1e6))
+def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
+    """And its next late command is refused by the new clock."""
+    receiver, sender, now_s = Receiver(), Sender(), 100.0
+    for number in range(100):
+        now_s += 0.1
+        if number == 50:
+            sender.ahead_s += step_s
+        assert not refused(receiver.hear(sender, now_s, 0.01))
+    assert refused(receiver.hear(sender, now_s, 1.0))
+
+
+def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() -> None:
+    """Each after a silence, as by somebody who presses a key on a bad network."""
+    receiver, sender = Receiver(), Sender()
+    receiver.hear(sender, 100.0, 0.01)
+    for number in range(20):
+        assert refused(receiver.hear(sender, 110.0 + 10.0 * number, 2.0))
+
+
+def test_a_burst_of_what_an_outage_had_kept_is_refused_as_far_as_it_is_old() -> None:
+    """Reliable transport repeats them all, the oldest first."""
+    receiver, sender = Receiver(), Sender()
+    for number in range(50):
+        receiver.hear(sender, 100.0 + 0.1 * number, 0.01)
+    outage = [receiver.hear(sender, 105.0 + 0.1 * n, 4.0 - 0.1 * n) for n in range(40)]
+    assert [refused(delay) for delay in outage] == 35 * [True] + 5 * [False]
+
+
+@given(offsets_s, offsets_s, st.lists(st.integers(0, 1), min_size=50, max_size=100))
+def test_two_senders_with_clocks_of_their_own_are_both_heard(
+    one_s: float, other_s: float, turns: list[int]
+) -> None:
+    """One is ahead of the other by hours, and has sent before."""
+    receiver, senders, now_s = Receiver(), (Sender(one_s, sent=1000), Sender(other_s)), 100.0
+    for sender in senders:
+        receiver.hear(sender, now_s, 0.01)
+    for turn in turns:
+        now_s += 0.05
+        assert not refused(receiver.hear(senders[turn], now_s, 0.01))
+
+
+def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
+    """Their clocks agree, as those of one host do."""
+    receiver, old, new = Receiver(), Sender(sent=1000), Sender()
+    for number in range(20):
+        receiver.hear(old, 100.0 + 0.1 * number, 0.01)
+        receiver.hear(new, 100.05 + 0.1 * number, 0.01)
+    assert refused(receiver.hear(old, 110.0, 1.0))
+    assert refused(receiver.hear(new, 112.0, 1.0))
+
+
+def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
+    """``ros2 topic pub --once``, again and again, from a computer whose clock is behind."""
+    receiver = Receiver()
+    for number in range(20):
+        assert not refused(receiver.hear(Sender(), 100.0 + number, 0.01))
+        assert not refused(receiver.hear(Sender(-3.0), 100.5 + number, 0.01))
+    assert len(receiver.transit._senders) <= MOST_SENDERS
+
+
+@given(st.floats(-1e-4, 1e-4))
+def test_clocks_that_drift_are_followed(drift: float) -> None:
+    """For a day, with a silence of an hour now and then."""
+    receiver, sender, now_s = Receiver(), Sender(), 100.0
+    for number in range(200):
+        now_s += HOUR_S if number % 20 == 0 else 0.1
+        sender.ahead_s = drift * now_s
+        assert not refused(receiver.hear(sender, now_s, 0.01 + 0.1 * (number % 3)))
+
+
+def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
+    """On the network, or on this computer."""
+    with pytest.raises(CommandRefused, match=r"^cmd_vel refused: it was sent 1\.2 s ago.*network"):
+        Delay(1.2, 0.1).require("cmd_vel", 0.5)
+    with pytest.raises(CommandRefused, match=r"1\.1 s of it in this driver's queue.* executor"):
+        Delay(1.2, 1.1).require("cmd_vel", 0.5)
+    Delay(0.5, 0.5).require("cmd_vel", 0.5)
