@@ -8,6 +8,8 @@ Knows the manual's state machine and control equations. Must not know ports or r
 Where the manual is silent:
 - The control loop runs from the end of the boot on, also while paused (motors off), so motion while
   paused is in the first 25 Hz difference afterwards. The rates count from the end of the boot.
+- Its mode list has 10 Hz where its frame table has 25 Hz: the settings say how often differences
+  are sent.
 - Pausing and emergency stop switch the motors off; friction stops the wheels within 0.3 s.
 - The number in the paused text starts from zero each time the board becomes paused.
 - With the switch on positional control (see `position`) the wheels' targets follow the goal.
@@ -39,7 +41,6 @@ from omnibot_driver.simulator.wire import (
 )
 from omnibot_driver.simulator.world import Held, TruePose, World
 
-TICKS_PER_DELTA = 4
 TICKS_PER_POSE = 20
 TICKS_PER_TEXT = 100
 
@@ -110,6 +111,7 @@ class SimulatedBoard:
 
     def __init__(self, settings: BoardSettings = _IDEAL) -> None:
         self.settings = settings
+        self._ticks_per_delta = round(settings.delta_period_s / TICK_S)
         self.tick = 0
         self.commands: deque[ReceivedCommand] = deque(maxlen=COMMAND_LOG)
         self.sent: deque[SentFrame] = deque(maxlen=SENT_LOG)
@@ -274,7 +276,7 @@ class SimulatedBoard:
     def _running_output(self) -> list[bytes]:
         frames = [imu_frame(*self._imu.read(self._world))]
         if self.mode is BoardMode.NOMINAL:
-            if self._ticks_since_boot % TICKS_PER_DELTA == 0:
+            if self._ticks_since_boot % self._ticks_per_delta == 0:
                 frames.append(self._delta())
             if self._ticks_since_boot % TICKS_PER_POSE == 0:
                 frames.append(self._absolute())

@@ -11,6 +11,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from omnibot_driver.simulator.faults import FaultyLine, LineFaults
 from omnibot_driver.simulator.firmware import SimulatedBoard
+from omnibot_driver.simulator.motors import TICK_S
 from omnibot_driver.simulator.settings import BoardSettings
 
 
@@ -32,6 +33,13 @@ def add_board_options(parser: argparse.ArgumentParser) -> None:
         choices=("earth", "body", "wheel_counts"),
         default="earth",
         help="meaning of the 25 Hz frame (default earth)",
+    )
+    parser.add_argument(
+        "--delta-period",
+        type=_ticks,
+        default=0.04,
+        metavar="SECONDS",
+        help="from one such frame to the next (default 0.04; the manual also has 0.1)",
     )
     parser.add_argument(
         "--control",
@@ -67,6 +75,7 @@ def board_from(arguments: argparse.Namespace) -> tuple[SimulatedBoard, FaultyLin
         BoardSettings(
             seed=arguments.seed,
             frame=arguments.frame,
+            delta_period_s=arguments.delta_period,
             imu_only=arguments.imu_only,
             control=arguments.control,
             estop_latches=arguments.latching_estop,
@@ -92,6 +101,19 @@ def board_from_url(url: str) -> tuple[SimulatedBoard, FaultyLine]:
     if unknown:
         raise OptionError(f"there is no option '{unknown[0].lstrip('-')}'")
     return board_from(arguments)
+
+
+def _ticks(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = 0.0
+    ticks = seconds / TICK_S
+    if not 0.999 < ticks < 1000.5 or abs(ticks - round(ticks)) > 1e-6:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no period of the board: give a multiple of {TICK_S:g} up to 10"
+        )
+    return seconds
 
 
 def _chance(text: str) -> float:

@@ -30,6 +30,8 @@ class BoardSettings:
     frame: meaning of the 25 Hz frame: "earth", the difference of two positions in the board's
         earth frame, "body", the sum of each control tick's displacement in the robot's frame, or
         "wheel_counts", the encoder counts of wheels A, B, C (manual, Deprecated).
+    delta_period_s: from one 25 Hz frame to the next, in whole ticks of 10 ms; the manual has 10 Hz
+        as well.
     imu_only: running, the board is in IMU only mode instead of nominal mode.
     linear_scale: LSB per m/s, of Vx and Vy and of the rim speeds in wheel mode.
     angular_scale: LSB per rad/s, of Omega.
@@ -62,6 +64,7 @@ class BoardSettings:
 
     seed: int = 0
     frame: DeltaFrameMeaning = "earth"
+    delta_period_s: float = 0.04
     imu_only: bool = False
     linear_scale: float = 70.0
     angular_scale: float = 500.0

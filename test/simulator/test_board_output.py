@@ -35,6 +35,17 @@ def test_a_nominal_board_sends_at_100_25_and_5_hz() -> None:
     assert len(data) == 1000 * 14 + 250 * 9 + 50 * 15
 
 
+def test_a_board_may_send_its_deltas_at_10_hz() -> None:
+    """The manual's other figure: ten IMU frames to each, which holds the motion of all of them."""
+    board = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
+    board.receive(velocity(35, 0, 0))
+    run(board, 10.0)
+    counts = [len(sent(board, header)) for header in (IMU, DELTA, POSE)]
+    assert counts == [1000, 100, 50]
+    assert [seq for *_, seq in deltas(board)] == list(range(100))
+    assert deltas(board)[-1][0] == pytest.approx(500, abs=10)  # 0.5 m/s in 0.1 mm
+
+
 def test_an_imu_only_board_sends_imu_frames_alone_and_obeys_motion() -> None:
     """The third mode of the manual listens like the second."""
     board = booted(BoardSettings(imu_only=True))

@@ -2,8 +2,10 @@
 
 """What may be chosen about a simulated board, in words."""
 
+import pytest
+
 from omnibot_driver.simulator import BoardSettings, FaultyLine, LineFaults
-from omnibot_driver.simulator.options import board_from_url
+from omnibot_driver.simulator.options import OptionError, board_from_url
 
 SENT = bytes(range(256)) * 4
 
@@ -11,19 +13,27 @@ SENT = bytes(range(256)) * 4
 def test_every_option_reaches_the_board_and_its_line() -> None:
     """Each by its name, the seed twice."""
     board, line = board_from_url(
-        "sim://?seed=7&imu_only&frame=body&control=position&latching_estop&running"
+        "sim://?seed=7&imu_only&frame=body&delta_period=0.1&control=position&latching_estop&running"
         "&lose=0.1&burst=0.002&flip=0.2"
     )
     assert board.settings == BoardSettings(
         seed=7,
         imu_only=True,
         frame="body",
+        delta_period_s=0.1,
         control="position",
         estop_latches=True,
         running=True,
     )
     expected = FaultyLine(LineFaults(lose=0.1, burst=0.002, flip=0.2), 7)
     assert line.carry(SENT) == expected.carry(SENT)
+
+
+@pytest.mark.parametrize("period", ["0", "-0.04", "0.045", "nan", "inf", "fast", "11"])
+def test_deltas_are_sent_every_so_many_ticks(period: str) -> None:
+    """Anything else is refused."""
+    with pytest.raises(OptionError, match="no period of the board"):
+        board_from_url(f"sim://?delta_period={period}")
 
 
 def test_without_options_all_is_as_usual() -> None:
