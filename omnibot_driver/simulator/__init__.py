@@ -14,6 +14,7 @@ from omnibot_driver.simulator.firmware import (
     SimulatedBoard,
 )
 from omnibot_driver.simulator.pty import PtyBoard
+from omnibot_driver.simulator.receivers import ReceiverKind
 from omnibot_driver.simulator.settings import BoardPose, BoardSettings
 from omnibot_driver.simulator.world import TruePose
 
@@ -25,6 +26,7 @@ __all__ = [
     "LineFaults",
     "PtyBoard",
     "ReceivedCommand",
+    "ReceiverKind",
     "SentFrame",
     "SimulatedBoard",
     "TruePose",

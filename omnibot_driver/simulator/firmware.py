@@ -14,6 +14,7 @@ Where the manual is silent:
 - The number in the paused text starts from zero each time the board becomes paused.
 - With the switch on positional control (see `position`) the wheels' targets follow the goal.
 - Control frames with a mode that the manual does not name are taken off the line and ignored.
+- How commands are found among the bytes is a choice of several (see `receivers`).
 """
 
 from collections import deque
@@ -27,9 +28,10 @@ from omnibot_driver.simulator.imu import Mpu6050
 from omnibot_driver.simulator.motors import TICK_S, WheelController
 from omnibot_driver.simulator.odometry import Odometry
 from omnibot_driver.simulator.position import approach, commanded_pose
+from omnibot_driver.simulator.receivers import CommandReceiver
 from omnibot_driver.simulator.settings import BoardPose, BoardSettings
 from omnibot_driver.simulator.wire import (
-    CommandReceiver,
+    BYTE_S,
     ControlFrame,
     ControlMode,
     StateLetter,
@@ -120,7 +122,7 @@ class SimulatedBoard:
         self._imu = Mpu6050(settings)
         self._power_up(settings.initial_pose)
         if settings.running:
-            self._receiver = CommandReceiver(awake=True)
+            self._receiver = CommandReceiver(settings.receiver, awake=True)
             self._run()
 
     def reboot(self) -> None:
@@ -132,7 +134,7 @@ class SimulatedBoard:
         self.estopped = False
         self._boot_ticks_left = max(1, round(self.settings.boot_time_s / TICK_S))
         self._ticks_since_boot = 0
-        self._receiver = CommandReceiver()
+        self._receiver = CommandReceiver(self.settings.receiver)
         self._encoders = self._world.encoders
         self._odometry = Odometry(self.settings, pose)
         self._delta_seq = 0
@@ -163,18 +165,28 @@ class SimulatedBoard:
         """Whether the motors have been told to turn, and not to stop since."""
         return self._goal is not None or self._targets != _ALL_ZERO
 
-    def receive(self, data: bytes) -> None:
-        """Take bytes off the line, in any chunking; each command acts at once."""
+    def receive(self, data: bytes, at_s: float | None = None) -> None:
+        """Take bytes off the line, in any chunking; each command acts at once.
+
+        at_s: when the first of them arrived, in seconds by any steady clock; the last tick by
+            default. The others follow without a pause. Only a receiver that looks for idle gaps
+            cares.
+        """
         self.received += data
         if len(self.received) > RECEIVED_LOG_BYTES:
             del self.received[: len(self.received) // 2]
+        arrives_s = self.tick * TICK_S if at_s is None else at_s
         for byte in data:
-            if self.mode is not BoardMode.BOOTING:
-                item = self._receiver.feed(byte, control_frames=self.mode in _RUNNING)
-                if isinstance(item, ControlFrame):
-                    self._obey_frame(item)
-                elif item is not None:
-                    self._obey_letter(item)
+            if self.mode is BoardMode.BOOTING:
+                self._receiver.boot()
+            else:
+                running = self.mode in _RUNNING
+                for command in self._receiver.feed(byte, arrives_s, control_frames=running):
+                    if isinstance(command, ControlFrame):
+                        self._obey_frame(command)
+                    else:
+                        self._obey_letter(command)
+            arrives_s += BYTE_S
 
     def step(self) -> bytes:
         """Let one tick of 10 ms pass; return the bytes sent in it."""
@@ -207,7 +219,7 @@ class SimulatedBoard:
 
     def _obey_frame(self, frame: ControlFrame) -> None:
         kind = _FRAME_KINDS.get(frame.mode)
-        if kind is None:
+        if kind is None or (kind == "estop" and not self.settings.obeys_estop):
             return
         if kind == "estop":
             self.estopped = True

@@ -6,12 +6,13 @@ Knows words and their meaning. Must not know what runs the board.
 """
 
 import argparse
-from typing import NoReturn
+from typing import NoReturn, get_args
 from urllib.parse import parse_qsl, urlsplit
 
 from omnibot_driver.simulator.faults import FaultyLine, LineFaults
 from omnibot_driver.simulator.firmware import SimulatedBoard
 from omnibot_driver.simulator.motors import TICK_S
+from omnibot_driver.simulator.receivers import FramingName, LetterPlace, ReceiverKind
 from omnibot_driver.simulator.settings import BoardSettings
 
 
@@ -48,6 +49,28 @@ def add_board_options(parser: argparse.ArgumentParser) -> None:
         help="where the on-board switch stands (default velocity)",
     )
     parser.add_argument(
+        "--receiver",
+        choices=get_args(FramingName),
+        default="counting",
+        help="how the firmware finds control frames: it counts bytes after FF FE, for ever "
+        "(counting, the default); the same, and FF FF FE is no header (naive); the same, and a "
+        "pause of 5 ms ends half a frame (idle_gap); it searches the last 9 bytes (window)",
+    )
+    parser.add_argument(
+        "--letters",
+        choices=get_args(LetterPlace),
+        default="between",
+        help="where S, P and R act: between control frames, or anywhere (default between)",
+    )
+    parser.add_argument(
+        "--wakes-while-booting",
+        action="store_true",
+        help="bytes that arrive while the board boots count for its three wake-up bytes",
+    )
+    parser.add_argument(
+        "--ignore-estop", action="store_true", help="the firmware knows no emergency stop"
+    )
+    parser.add_argument(
         "--latching-estop",
         action="store_true",
         help="an emergency stop holds until the board is reset",
@@ -78,6 +101,12 @@ def board_from(arguments: argparse.Namespace) -> tuple[SimulatedBoard, FaultyLin
             delta_period_s=arguments.delta_period,
             imu_only=arguments.imu_only,
             control=arguments.control,
+            receiver=ReceiverKind(
+                framing=arguments.receiver,
+                letters=arguments.letters,
+                wakes_while_booting=arguments.wakes_while_booting,
+            ),
+            obeys_estop=not arguments.ignore_estop,
             estop_latches=arguments.latching_estop,
             running=arguments.running,
         )

@@ -91,7 +91,7 @@ class RunningBoard(ABC):
                 due_s -= remaining_s
             if data := self._receive(max(0.0, remaining_s)):
                 with self.lock:
-                    self.board.receive(data)
+                    self.board.receive(data, time.monotonic())
             ticks, due_s = self._due(due_s)
             if ticks:
                 with self._ticked:

@@ -7,6 +7,7 @@ from math import pi
 from typing import Literal
 
 from omnibot_driver.simulator.motors import MANUAL, USUAL, MotorConstants, WheelGains
+from omnibot_driver.simulator.receivers import COUNTING, ReceiverKind
 from omnibot_driver.simulator.wire import ByteOrder, Triple
 
 DeltaFrameMeaning = Literal["earth", "body", "wheel_counts"]
@@ -39,6 +40,8 @@ class BoardSettings:
         pose in the board's own earth frame to drive to.
     position_scale: LSB per m, of X and Y.
     heading_scale: LSB per rad, of theta, which is unwrapped as in the 5 Hz frame.
+    receiver: how the firmware finds commands among the bytes.
+    obeys_estop: an emergency stop frame stops the robot; otherwise it is ignored.
     estop_latches: after an emergency stop frame every motion is refused until a reset;
         otherwise the next motion command moves the robot again.
     pose_byte_order: of the three floats of the 5 Hz frame.
@@ -71,6 +74,8 @@ class BoardSettings:
     control: ControlMethod = "velocity"
     position_scale: float = 1000.0
     heading_scale: float = 1000.0
+    receiver: ReceiverKind = COUNTING
+    obeys_estop: bool = True
     estop_latches: bool = False
     pose_byte_order: ByteOrder = "big"
     axis_signs: tuple[int, int, int] = (1, 1, 1)

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The wire as the board sees it: the frames it sends and the bytes it understands.
+"""The wire as the board sees it: the layouts of what it sends and of what it understands.
 
 Knows the byte layouts of the manual (sections Serial Command and Serial Data Output), written from
-the manual alone. Must not know modes, motion or time, and shares no code with the driver's codec.
+the manual alone. Must not know modes or motion, nor how a command is found among the bytes, and
+shares no code with the driver's codec.
 """
 
 import struct
@@ -11,13 +12,16 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Literal
 
-WAKE_UP_BYTES = 3
-"""Serial Command: "Serial initialization: 3 arbitrary byte"."""
+BYTE_S = 10 / 115200
+"""How long a byte takes, with its start and stop bit."""
 
 _IMU = struct.Struct(">2B6h")
 _DELTA = struct.Struct(">2B3hB")
 _POSE = {"big": struct.Struct(">2B3fB"), "little": struct.Struct("<2B3fB")}
 _COMMAND = struct.Struct(">2BB3h")
+
+COMMAND_HEADER = b"\xff\xfe"
+COMMAND_LENGTH = _COMMAND.size
 
 ByteOrder = Literal["big", "little"]
 Triple = tuple[int, int, int]
@@ -47,7 +51,8 @@ class ControlFrame:
     values: Triple
 
 
-_LETTERS = {int(letter): letter for letter in StateLetter}
+LETTERS = {int(letter): letter for letter in StateLetter}
+"""By their bytes."""
 
 
 def imu_frame(accel: Triple, gyro: Triple) -> bytes:
@@ -72,33 +77,7 @@ def paused_text(count: int) -> bytes:
     return b"Paused: %d \n" % count
 
 
-class CommandReceiver:
-    """The firmware's receiver: one byte in, at most one command out.
-
-    After power-up it swallows the wake-up bytes unseen. A control frame is recognised only where
-    the caller says so; elsewhere each of its bytes is looked at for a state letter.
-    """
-
-    def __init__(self, *, awake: bool = False) -> None:
-        self._to_swallow = 0 if awake else WAKE_UP_BYTES
-        self._frame = bytearray()
-
-    def feed(self, byte: int, *, control_frames: bool) -> StateLetter | ControlFrame | None:
-        """Take one byte; return the command that it completes, if any."""
-        if self._to_swallow:
-            self._to_swallow -= 1
-            return None
-        if control_frames:
-            if len(self._frame) == 1 and byte != 0xFE:
-                self._frame.clear()
-            if self._frame or byte == 0xFF:
-                return self._collect(byte)
-        return _LETTERS.get(byte)
-
-    def _collect(self, byte: int) -> ControlFrame | None:
-        self._frame.append(byte)
-        if len(self._frame) < _COMMAND.size:
-            return None
-        _, _, mode, a, b, c = _COMMAND.unpack(self._frame)
-        self._frame.clear()
-        return ControlFrame(mode, (a, b, c))
+def control_frame(data: bytes) -> ControlFrame:
+    """Decode the nine bytes of a control data frame."""
+    _, _, mode, a, b, c = _COMMAND.unpack(data)
+    return ControlFrame(mode, (a, b, c))

@@ -42,6 +42,7 @@ from omnibot_driver.core.omnibot.frames import (
     measure,
 )
 from omnibot_driver.simulator import wire
+from omnibot_driver.simulator.receivers import CommandReceiver
 
 APPENDIX = {
     "Stop": ("FF FE 02 00 00 00 00 00 00", CommandFrame(0x02, (0, 0, 0))),
@@ -168,9 +169,9 @@ def test_the_simulated_board_speaks_the_same_language(
 @given(commands)
 def test_the_simulated_board_understands_every_command(command: CommandFrame) -> None:
     """What the driver encodes is what the board reads."""
-    receiver = wire.CommandReceiver(awake=True)
-    understood = [receiver.feed(byte, control_frames=True) for byte in encode(command)]
-    assert understood[-1] == wire.ControlFrame(command.mode, command.values)
+    receiver = CommandReceiver(awake=True)
+    understood = [receiver.feed(byte, 0.0, control_frames=True) for byte in encode(command)]
+    assert understood[-1] == (wire.ControlFrame(command.mode, command.values),)
     assert not any(understood[:-1])
 
 

@@ -90,8 +90,8 @@ class BreakableLine:
     def heal(self) -> None:
         self.to_board = self.from_board = whole
 
-    def receive(self, data: bytes) -> None:
-        self.board.receive(self.to_board(data))
+    def receive(self, data: bytes, at_s: float | None = None) -> None:
+        self.board.receive(self.to_board(data), at_s)
 
     def step(self) -> bytes:
         data = self.board.step()

@@ -25,6 +25,7 @@ from omnibot_driver.simulator import (
     BoardPose,
     BoardSettings,
     ReceivedCommand,
+    ReceiverKind,
     SimulatedBoard,
 )
 
@@ -51,6 +52,15 @@ def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
     board = booted(BoardSettings())
     board.receive(b"SSS")
     assert mode_of(board) is BoardMode.PAUSED
+    board.receive(b"S")
+    assert mode_of(board) is BoardMode.NOMINAL
+
+
+def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
+    """Three bytes during the boot, and the first S afterwards is obeyed."""
+    board = SimulatedBoard(BoardSettings(receiver=ReceiverKind(wakes_while_booting=True)))
+    board.receive(bytes(3))
+    run(board, 0.3)
     board.receive(b"S")
     assert mode_of(board) is BoardMode.NOMINAL
 
@@ -126,6 +136,14 @@ def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() ->
     assert mode_of(board) is BoardMode.BOOTING
 
 
+def test_a_board_that_takes_letters_anywhere_pauses_in_the_middle_of_a_frame() -> None:
+    """The 0x50 acts, and the rest of the frame meets a board that looks for letters alone."""
+    board = SimulatedBoard(BoardSettings(running=True, receiver=ReceiverKind(letters="anywhere")))
+    board.receive(wheels(0x50, 0, 0x50))
+    assert [command.kind for command in board.commands] == ["pause", "pause"]
+    assert mode_of(board) is BoardMode.NOMINAL
+
+
 def test_a_running_board_takes_no_letters_out_of_frames() -> None:
     """Within a control frame 0x50, 0x52 and 0x53 are numbers."""
     board = SimulatedBoard(RUNNING)
@@ -140,6 +158,28 @@ def test_an_unknown_control_mode_is_ignored() -> None:
     board.receive(bytes.fromhex("FF FE 03 00 50 00 50 00 50"))
     assert not board.commands
     assert mode_of(board) is BoardMode.NOMINAL
+
+
+def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
+    """The frame is taken off the line and ignored."""
+    board = SimulatedBoard(BoardSettings(running=True, obeys_estop=False))
+    board.receive(velocity(35, 0, 0) + ESTOP)
+    assert [command.kind for command in board.commands] == ["velocity"]
+    assert board.driven
+    assert not board.estopped
+
+
+def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
+    """By the time that the caller gives, or else by the ticks in between."""
+    kind = ReceiverKind(framing="idle_gap")
+    timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))
+    timed.receive(STOP[:-1], 5.000)
+    timed.receive(velocity(35, 0, 0), 5.006)
+    ticking.receive(STOP[:-1])
+    ticking.step()
+    ticking.receive(velocity(35, 0, 0))
+    assert [command.values for command in timed.commands] == [(35, 0, 0)]
+    assert [command.values for command in ticking.commands] == [(35, 0, 0)]
 
 
 def test_what_was_received_and_obeyed_is_on_record() -> None:

@@ -4,7 +4,7 @@
 
 import pytest
 
-from omnibot_driver.simulator import BoardSettings, FaultyLine, LineFaults
+from omnibot_driver.simulator import BoardSettings, FaultyLine, LineFaults, ReceiverKind
 from omnibot_driver.simulator.options import OptionError, board_from_url
 
 SENT = bytes(range(256)) * 4
@@ -14,6 +14,7 @@ def test_every_option_reaches_the_board_and_its_line() -> None:
     """Each by its name, the seed twice."""
     board, line = board_from_url(
         "sim://?seed=7&imu_only&frame=body&delta_period=0.1&control=position&latching_estop&running"
+        "&receiver=idle_gap&letters=anywhere&wakes_while_booting&ignore_estop"
         "&lose=0.1&burst=0.002&flip=0.2"
     )
     assert board.settings == BoardSettings(
@@ -22,6 +23,8 @@ def test_every_option_reaches_the_board_and_its_line() -> None:
         frame="body",
         delta_period_s=0.1,
         control="position",
+        receiver=ReceiverKind(framing="idle_gap", letters="anywhere", wakes_while_booting=True),
+        obeys_estop=False,
         estop_latches=True,
         running=True,
     )

@@ -3,13 +3,10 @@
 """The simulator's codec against bytes typed by hand from the manual."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from omnibot_driver.simulator.wire import (
-    CommandReceiver,
     ControlFrame,
-    StateLetter,
+    control_frame,
     delta_frame,
     imu_frame,
     paused_text,
@@ -30,86 +27,18 @@ APPENDIX = {
 }
 
 
-def understood(
-    data: bytes, *, awake: bool = True, control_frames: bool = True
-) -> list[StateLetter | ControlFrame]:
-    """Everything that a fresh receiver makes of some bytes."""
-    receiver = CommandReceiver(awake=awake)
-    items = (receiver.feed(byte, control_frames=control_frames) for byte in data)
-    return [item for item in items if item is not None]
-
-
 @pytest.mark.parametrize(("typed", "mode", "values"), APPENDIX.values(), ids=APPENDIX.keys())
 def test_each_command_of_the_appendix_is_understood(
     typed: str, mode: int, values: tuple[int, int, int]
 ) -> None:
     """The ten useful serial commands of the manual's appendix decode to their printed meaning."""
-    assert understood(bytes.fromhex(typed)) == [ControlFrame(mode, values)]
+    assert control_frame(bytes.fromhex(typed)) == ControlFrame(mode, values)
 
 
 def test_commands_reach_the_whole_range_of_a_short() -> None:
     """The extremes +32,767 and -32,768 keep their sign and byte order."""
     frame = bytes.fromhex("FF FE 01 7F FF 80 00 FF FF")
-    assert understood(frame) == [ControlFrame(0x01, (32767, -32768, -1))]
-
-
-def test_letters_count_between_control_frames_and_not_within() -> None:
-    """A frame full of P, R and S is one frame; the letters around it are letters."""
-    frame = bytes.fromhex("FF FE 01 00 50 00 52 00 53")
-    assert understood(b"S" + frame + b"P") == [
-        StateLetter.START,
-        ControlFrame(0x01, (0x50, 0x52, 0x53)),
-        StateLetter.PAUSE,
-    ]
-
-
-def test_letters_within_a_control_frame_count_where_frames_are_not_obeyed() -> None:
-    """Where only letters are obeyed, a motion frame acts by the letters it happens to contain."""
-    frame = bytes.fromhex("FF FE 01 00 50 00 52 00 53")
-    assert understood(frame, control_frames=False) == [
-        StateLetter.PAUSE,
-        StateLetter.RESET,
-        StateLetter.START,
-    ]
-
-
-def test_the_first_three_bytes_after_power_up_are_swallowed() -> None:
-    """The serial initialisation takes any three bytes, letters included."""
-    assert understood(b"RPSS", awake=False) == [StateLetter.START]
-
-
-def test_a_frame_that_wakes_the_board_loses_its_header() -> None:
-    """What is left of a motion frame after the wake-up is read as letters."""
-    frame = bytes.fromhex("FF FE 01 00 52 00 00 00 00")
-    assert understood(frame, awake=False) == [StateLetter.RESET]
-
-
-def test_a_doubled_header_byte_does_not_hide_the_frame() -> None:
-    """FF FF FE starts a frame with its second FF."""
-    frame = bytes.fromhex("FF FF FE 02 00 20 00 00 00 00")
-    assert understood(frame) == [ControlFrame(0x02, (32, 0, 0))]
-
-
-def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
-    """FF S is a stray byte and a start."""
-    assert understood(b"\xffS") == [StateLetter.START]
-
-
-@given(st.lists(st.sampled_from([typed for typed, _, _ in APPENDIX.values()]), max_size=20))
-def test_frames_back_to_back_are_all_understood(typed: list[str]) -> None:
-    """A run of commands yields as many frames, in order."""
-    meanings = {typed: ControlFrame(mode, values) for typed, mode, values in APPENDIX.values()}
-    assert understood(bytes.fromhex("".join(typed))) == [meanings[one] for one in typed]
-
-
-@given(st.binary(max_size=300), st.booleans(), st.booleans())
-def test_no_bytes_disturb_the_receiver_for_longer_than_a_frame(
-    noise: bytes, awake: bool, control_frames: bool
-) -> None:
-    """After any bytes, eight zeros bring the receiver back to listening for letters."""
-    data = noise + bytes(8) + b"S"
-    items = understood(data, awake=awake, control_frames=control_frames)
-    assert items[-1] is StateLetter.START
+    assert control_frame(frame) == ControlFrame(0x01, (32767, -32768, -1))
 
 
 def test_the_imu_frame_is_laid_out_as_in_the_manual() -> None:
