@@ -1,0 +1,88 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A scene as the driver plays it: rehearsed once for all trials in which the board shows the same.
+
+The line from the board is whole, so what the driver writes depends on nothing but what the board
+shows: its mode, and whether the robot moves. A `Course` is what the session writes while the board
+shows one thing after another. When it shows something else in a trial, that trial goes on with
+another course, which is rehearsed when it is first needed.
+"""
+
+from dataclasses import dataclass
+from itertools import accumulate
+
+from outbound_drive import History, Scene, Shown, rehearse
+from outbound_words import parse
+
+from omnibot_driver.simulator.receivers import Command, CommandReceiver, ReceiverKind
+from omnibot_driver.simulator.wire import BYTE_S, ControlFrame
+
+
+@dataclass(frozen=True, slots=True)
+class Understood:
+    """What a receiver makes of an undamaged course of writes.
+
+    held: by it after each write. alike_until: by write, the first one after it that is not of the
+    same kind (motion, or none), or is not understood as exactly what it says.
+    """
+
+    held: list[bytes]
+    alike_until: list[int]
+
+
+class Course:
+    """What the driver writes in a scene while the board shows this `history`."""
+
+    def __init__(self, scene: Scene, history: History | None = None) -> None:
+        self.scene = scene
+        self.history: History = ((0, scene.begins),) if history is None else history
+        self.writes = rehearse(scene, self.history)
+        self.items = [parse(write.data) for write in self.writes]
+        self.bytes_before = [0, *accumulate(len(write.data) for write in self.writes)]
+        self.frames_before = [0, *accumulate(len(items.frames) for items in self.items)]
+        self._others: dict[tuple[int, Shown], Course] = {}
+        self._understood: dict[ReceiverKind, Understood] = {}
+
+    def when(self, tick: int, shown: Shown) -> "Course":
+        """The course that this one becomes when the board shows something else from a tick on."""
+        other = self._others.get((tick, shown))
+        if other is None:
+            other = Course(self.scene, (*self.history, (tick, shown)))
+            self._others[tick, shown] = other
+        return other
+
+    def understood(self, kind: ReceiverKind) -> Understood:
+        """By a receiver of this kind that is awake and runs."""
+        if kind not in self._understood:
+            self._understood[kind] = self._understand(kind)
+        return self._understood[kind]
+
+    @property
+    def rehearsals(self) -> int:
+        """How often the session was run, for this course and for those that branch off."""
+        return 1 + sum(other.rehearsals for other in self._others.values())
+
+    def _understand(self, kind: ReceiverKind) -> Understood:
+        receiver = CommandReceiver(kind, awake=True)
+        held, plain = [], []
+        free_s = -1.0
+        for number, (write, items) in enumerate(zip(self.writes, self.items, strict=True)):
+            waits = write.at_s < free_s
+            free_s = max(write.at_s, free_s) + len(write.data) * BYTE_S
+            heard = [
+                (at, command)
+                for at, byte in enumerate(write.data)
+                for command in receiver.feed(byte, write.at_s + at * BYTE_S, control_frames=True)
+            ]
+            held.append(receiver.held)
+            says: list[tuple[int, Command]] = [
+                (at, ControlFrame(mode, words)) for at, mode, words in items.frames
+            ]
+            flushed = number + 1 < len(self.writes) and self.writes[number + 1].flush
+            plain.append(heard == says and not waits and not flushed)
+        until = [len(self.writes)] * len(self.writes)
+        for number in reversed(range(len(self.writes) - 1)):
+            after = number + 1
+            alike = plain[after] and self.items[after].moves == self.items[number].moves
+            until[number] = until[after] if alike else after
+        return Understood(held, until)

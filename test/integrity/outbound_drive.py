@@ -1,0 +1,176 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The driver's side of an outbound trial: what the real session writes, and when.
+
+A `Scene` says what is wanted of the driver. `rehearse` runs the session through it in simulated
+time, given what the board shows. What ends a driver, its link and its guard, is written here anew
+as pure words.
+"""
+
+import contextlib
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+from outbound_teller import TICK_S, Shown, Teller
+from outbound_words import is_motion, parse
+
+from omnibot_driver import guard
+from omnibot_driver.core.commands import CommandSettings
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.helm import ControlMethod
+from omnibot_driver.core.limits import SpeedLimits
+from omnibot_driver.core.odometry import OdometrySettings
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.session import Session, SessionSettings
+from omnibot_driver.core.supervisor import OnExit
+from omnibot_driver.link import STANDS_WITHIN_S
+
+READ_S: Final = 0.002
+"""What the board sends in a tick is read so long after it."""
+STANDS: Final = Shown("running", False)
+CLOCK_S: Final = 1e-6
+"""A clock that is read again has gone on."""
+History = tuple[tuple[int, Shown], ...]
+"""What the board shows, each from a tick on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """Bytes that the driver or its guard writes; `flush`: what waits is dropped before."""
+
+    at_s: float
+    data: bytes
+    flush: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What is wanted of the session at a time; a refusal is an answer like any other."""
+
+    at_s: float
+    do: Callable[[Session, float], object]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """One script.
+
+    begins: what the board shows at first; run: whether the driver is to start it.
+    control: where the board's switch stands. linear_scale: LSB per m/s.
+    faults_from_s: the line is whole until then, and not again.
+    still_by_s: the robot has to stand by then.
+    exits_s, killed_s: when the driver ends, and how; on_exit: what it leaves behind.
+    guard_after_s: so soon after that its guard acts.
+    """
+
+    kind: str
+    wishes: tuple[Wish, ...]
+    ends_s: float
+    faults_from_s: float
+    still_by_s: float
+    begins: Shown = STANDS
+    run: bool = True
+    rate_hz: float = 20.0
+    control: ControlMethod = "velocity"
+    linear_scale: float = 70.0
+    limits: SpeedLimits = field(default_factory=SpeedLimits)
+    exits_s: float = math.inf
+    killed_s: float = math.inf
+    guard_after_s: float = 0.001
+    on_exit: OnExit = "stop"
+
+
+def rehearse(scene: Scene, history: History) -> list[Write]:
+    """All that is written from the opening of the port on."""
+    return [write for write in _Rehearsal(scene).run(dict(history)) if write.at_s < scene.ends_s]
+
+
+class _Rehearsal:
+    """One session on a board that shows what it is told to."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._bot = OmniBot(OmniBotSettings(linear_scale=scene.linear_scale))
+        self._session = Session(
+            self._bot,
+            SessionSettings(
+                limits=scene.limits,
+                commands=CommandSettings(rate_hz=scene.rate_hz),
+                odometry=OdometrySettings(),
+            ),
+            run=scene.run,
+            control=scene.control,
+        )
+        self._teller = Teller(scene.linear_scale, goals=scene.control == "position")
+        self._writes: list[Write] = []
+
+    def run(self, changes: dict[int, Shown]) -> list[Write]:
+        """Events in the order of their times."""
+        scene, session = self._scene, self._session
+        wishes = iter(sorted(scene.wishes, key=lambda wish: wish.at_s))
+        wish = next(wishes, None)
+        shown, tick, now = scene.begins, 0, 0.0
+        session.opened(0.0)
+        self._settle(0.0)
+        while True:
+            read_s = (tick + 1) * TICK_S + READ_S
+            wish_s = wish.at_s if wish else math.inf
+            now = min(read_s, wish_s, max(now + CLOCK_S, session.wake_at))
+            if now >= min(scene.ends_s, scene.exits_s, scene.killed_s):
+                break
+            if wish and now == wish_s:
+                with contextlib.suppress(CommandRefused, RequestRefused):
+                    wish.do(session, now)
+                wish = next(wishes, None)
+            elif now == read_s:
+                tick += 1
+                shown = changes.get(tick, shown)
+                session.receive(self._teller.step(shown), now)
+            self._settle(now)
+        if scene.exits_s < scene.ends_s:
+            self._leave(changes, shown, tick)
+        elif scene.killed_s < scene.ends_s:
+            self._writes += self._guards_words(scene.killed_s)
+        return self._writes
+
+    def _settle(self, now: float) -> None:
+        if now >= self._session.wake_at:
+            self._session.tick(now)
+        if data := self._session.take_output(now):
+            self._writes.append(Write(now, data))
+            for _, mode, words in parse(data).frames:
+                if is_motion(mode, words):
+                    self._teller.moves_as(mode, words)
+        self._session.take_events()
+
+    def _leave(self, changes: dict[int, Shown], shown: Shown, tick: int) -> None:
+        """As the link does: Stop until the robot is seen to stand, the farewell, or the guard."""
+        session, now = self._session, self._scene.exits_s
+        gives_up_s = now + STANDS_WITHIN_S
+        session.leave(now)
+        self._settle(now)
+        while not session.stands:
+            read_s = (tick + 1) * TICK_S + READ_S
+            now = min(read_s, max(now + CLOCK_S, session.wake_at), gives_up_s)
+            if now == gives_up_s:
+                break
+            if now == read_s:
+                tick += 1
+                shown = changes.get(tick, shown)
+                session.receive(self._teller.step(shown), now)
+            self._settle(now)
+        stands = session.stands
+        self._writes.append(Write(now, session.farewell(self._scene.on_exit)))
+        if not stands:
+            self._writes += self._guards_words(now)
+
+    def _guards_words(self, now: float) -> Iterator[Write]:
+        """What the guard writes; it drops what waits."""
+        words = self._bot.stop()
+        if self._session.estop_active:
+            words = self._bot.emergency_stop() + words
+        begin_s = now + self._scene.guard_after_s
+        for number in range(guard.TIMES):
+            yield Write(begin_s + number * guard.PACE_S, words, flush=number == 0)

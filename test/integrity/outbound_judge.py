@@ -1,0 +1,165 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The judge of an outbound trial: what was understood, held against what was sent.
+
+- The driver *drives* from the first byte of a write with a motion frame until the next frame that
+  is none is due in full at the board; from then until the next such write it *stands*.
+- A set-point is *commanded* if, when it is understood, it is among the control frames of the write
+  on the line or of the write before. It stays so until another frame is understood, however old.
+- Any other is *uncommanded*, from when it is understood while the driver drives until the next one
+  that is commanded, or a pause or a reboot.
+- A motion frame that is understood while the driver stands is *stray*.
+- A letter that acts is *false* if its byte is none of the letters sent, and *added* if the line has
+  added or changed that byte.
+"""
+
+import math
+from copy import copy
+from dataclasses import dataclass, field, fields
+from typing import Final
+
+from outbound_words import Items, is_motion
+
+from omnibot_driver.simulator.wire import BYTE_S, ControlFrame, ControlMode
+
+LONG_S: Final = 0.002
+EXAMPLES: Final = 3
+_LONGEST: Final = ("stray_s", "longest_s")
+
+
+@dataclass(slots=True)
+class Score:
+    """Counts and times; they add up.
+
+    strayed: trials with stray motion; stray_s: the longest of it.
+    overdue, for_good: trials in which the robot was driven when it had to stand, and those in which
+        it was at the end.
+    driving_s, frames: how long the driver drove, and the control frames sent meanwhile.
+    uncommanded_s, uncommanded, long, longest_s: the time under uncommanded set-points, how many,
+        those beyond LONG_S, and the longest.
+    """
+
+    trials: int = 0
+    strayed: int = 0
+    stray_s: float = 0.0
+    overdue: int = 0
+    for_good: int = 0
+    driving_s: float = 0.0
+    frames: int = 0
+    uncommanded_s: float = 0.0
+    uncommanded: int = 0
+    long: int = 0
+    longest_s: float = 0.0
+    false_letters: int = 0
+    added_letters: int = 0
+    false_estops: int = 0
+    examples: list[object] = field(default_factory=list)
+
+    def __iadd__(self, other: "Score") -> "Score":
+        for each in fields(self):
+            mine, more = getattr(self, each.name), getattr(other, each.name)
+            both = max(mine, more) if each.name in _LONGEST else mine + more
+            setattr(self, each.name, both)
+        del self.examples[EXAMPLES:]
+        return self
+
+
+class Judge:
+    """Hears of every write and of everything that is understood, in the order of time.
+
+    ``driving``: whether the driver drives. ``calm``: no set-point is stray or uncommanded.
+    """
+
+    def __init__(self) -> None:
+        self.score = Score(trials=1)
+        self.driving = self._strayed = False
+        self._now, self._before = Items(), Items()
+        self._driving_from_s = 0.0
+        self._stands_from_s = -math.inf
+        self._uncommanded_from_s: float | None = None
+        self._stray_from_s: float | None = None
+
+    @property
+    def calm(self) -> bool:
+        """Nothing is in force that was not commanded."""
+        return self._uncommanded_from_s is None and self._stray_from_s is None
+
+    def branch(self, score: Score) -> "Judge":
+        """A judge of a further trial, which adds to this score."""
+        other = copy(self)
+        other.score = score
+        score.trials += 1
+        return other
+
+    def write(self, items: Items, start_s: float) -> None:
+        """The first byte of a write is on the line."""
+        self._before, self._now = self._now, items
+        if items.moves and not self.driving:
+            self.driving = True
+            self._driving_from_s, self._stands_from_s = start_s, math.inf
+        if self.driving:
+            self.score.frames += len(items.frames)
+            if items.stops:
+                offset = items.frames[0][0]
+                self._stands_from_s = start_s + (offset + 1) * BYTE_S
+                self.score.driving_s += self._stands_from_s - self._driving_from_s
+                self.driving = False
+
+    def writes(self, last: Items, frames: int) -> None:
+        """Some went by as they were, all of the same kind as the one before; the last of them."""
+        self._now = last
+        if self.driving:
+            self.score.frames += frames
+
+    def frame(self, frame: ControlFrame, at_s: float) -> str:
+        """A control frame is understood; what is wrong with it, if anything."""
+        if at_s > self._stands_from_s + BYTE_S / 2:
+            self.no_setpoint(at_s)
+            if not is_motion(frame.mode, frame.values):
+                return ""
+            self._stray_from_s = at_s
+            self.score.strayed += not self._strayed
+            self._strayed = True
+            return "stray motion"
+        for items in (self._now, self._before):
+            for _, mode, words in items.frames:
+                if mode == frame.mode and words == frame.values:
+                    self.no_setpoint(at_s)
+                    return ""
+        self.score.false_estops += frame.mode == ControlMode.ESTOP
+        if self._uncommanded_from_s is not None:
+            return ""
+        self._uncommanded_from_s = at_s
+        return "uncommanded"
+
+    def letter(self, letter: int, at: int) -> str:
+        """A letter acts, whose byte is the write's ``at``, or below zero if it is the line's."""
+        if at < 0:
+            self.score.added_letters += 1
+        elif (at, letter) not in self._now.letters:
+            self.score.false_letters += 1
+            return "false letter"
+        return ""
+
+    def no_setpoint(self, at_s: float) -> None:
+        """What was in force ends."""
+        score = self.score
+        if self._uncommanded_from_s is not None:
+            lasted_s = at_s - self._uncommanded_from_s
+            score.uncommanded_s += lasted_s
+            score.uncommanded += 1
+            score.long += lasted_s > LONG_S
+            score.longest_s = max(score.longest_s, lasted_s)
+            self._uncommanded_from_s = None
+        if self._stray_from_s is not None:
+            score.stray_s = max(score.stray_s, at_s - self._stray_from_s)
+            self._stray_from_s = None
+
+    def end(self, at_s: float, *, driven_when_due: bool = False, driven: bool = False) -> bool:
+        """The scene is over; whether the robot was driven when it had to stand, or is now."""
+        self.no_setpoint(at_s)
+        if self.driving:
+            self.score.driving_s += at_s - self._driving_from_s
+        self.score.overdue += driven_when_due
+        self.score.for_good += driven
+        return driven_when_due or driven

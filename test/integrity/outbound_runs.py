@@ -1,0 +1,115 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Which outbound trials are run, how many and on which boards; their scores by name."""
+
+import math
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from functools import partial
+from multiprocessing import get_context
+from random import Random
+from typing import Final
+
+from outbound_course import Course
+from outbound_judge import Score
+from outbound_line import FAULTS, OTHERS, Fault
+from outbound_scenes import DRIVES, ENDED, SCENES
+from outbound_trial import BoardKind, Memo, Trial
+
+from omnibot_driver.simulator.receivers import FRAMINGS, ReceiverKind
+
+SCRIPTS: Final = 6
+"""Of each scene, with other commands each."""
+NEEDED: Final = 10_000
+"""Trials for each receiver and loss; at 1 byte in 100 for each of some endings."""
+HURRIES: Final = ("timeout", "e-stop", "exit")
+AT_HURRIES: Final = "1 byte in 100 lost"
+DRIVEN: Final = 150
+"""Trials of each script that only drives."""
+OTHER_TRIALS: Final = 20
+"""Of each script with faults that have no bound."""
+ESTOPS: Final = ("e-stop", "goal", "exit")
+"""Scenes in which it matters whether the board knows an emergency stop."""
+BOOTS: Final = ("reset", "exit")
+"""Scenes in which it may matter what the wake-up counts."""
+
+RECEIVERS: Final = {
+    f"{framing.replace('_', ' ')}, letters {letters}": (framing, letters)
+    for framing in FRAMINGS
+    for letters in ("between", "anywhere")
+}
+Scores = dict[tuple[str, str, str], Score]
+"""By fault, receiver and scene."""
+
+
+def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
+    """What a receiver's name stands for in a scene, and the scene's name with each."""
+    framing, letters = RECEIVERS[receiver]
+    for obeys in (True, False) if scene in ESTOPS else (True,):
+        name = f"{scene}, {'obeyed' if obeys else 'ignored'}" if scene == "e-stop" else scene
+        for counts in (False, True) if scene in BOOTS else (False,):
+            kind = ReceiverKind(framing=framing, letters=letters, wakes_while_booting=counts)
+            yield name, BoardKind(kind, obeys)
+
+
+def trials(fault: str, scene: str) -> int:
+    """Of each script, for each receiver."""
+    if fault in OTHERS:
+        return OTHER_TRIALS
+    if scene in DRIVES:
+        return DRIVEN
+    hurry = fault == AT_HURRIES and scene in HURRIES
+    return math.ceil(NEEDED / SCRIPTS / (1 if hurry else len(ENDED)))
+
+
+def one(
+    share: float, job: tuple[str, int], faults: Mapping[str, Fault] = FAULTS
+) -> tuple[Scores, int]:
+    """One script on all boards with each fault, and how often it was rehearsed."""
+    scene, seed = job
+    course = Course(SCENES[scene](Random(f"{scene} {seed}")))
+    scores: Scores = {}
+    for receiver in RECEIVERS:
+        memo: Memo = {}
+        variants = list(boards(scene, receiver))
+        names = {name for name, _ in variants}
+        for fault, line in faults.items():
+            number = max(1, round(share * trials(fault, scene) * len(names) / len(variants)))
+            for name, board in variants:
+                total = scores.setdefault((fault, receiver, name), Score())
+                random = Random(f"{fault} {board} {scene} {seed}")
+                trial = Trial(course, board, memo)
+                for _ in range(number):
+                    trial.run(line(random), total)
+    return scores, course.rehearsals
+
+
+def add(total: Scores, more: Scores) -> None:
+    """Into the total."""
+    for key, score in more.items():
+        total.setdefault(key, Score()).__iadd__(score)
+
+
+def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> Score:
+    """The sum of one scene's, or of all that end; of one receiver's or of all."""
+    total = Score()
+    for (its_fault, its_receiver, its_scene), score in scores.items():
+        wanted = its_scene == scene if scene else its_scene not in DRIVES
+        if wanted and its_fault == fault and receiver in ("", its_receiver):
+            total += score
+    return total
+
+
+def run(share: float, scripts: int, kinds: tuple[str, ...] = tuple(SCENES)) -> tuple[Scores, int]:
+    """All of it, on all processors; how often a session was rehearsed."""
+    jobs = [(scene, seed) for seed in range(scripts) for scene in kinds]
+    total: Scores = {}
+    rehearsals = 0
+    with get_context("spawn").Pool(os.cpu_count()) as pool:
+        for done, (scores, number) in enumerate(pool.imap_unordered(partial(one, share), jobs), 1):
+            add(total, scores)
+            rehearsals += number
+            if sys.stderr.isatty():
+                print(f"\r{done} of {len(jobs)} scripts", end="", file=sys.stderr, flush=True)
+    return total, rehearsals

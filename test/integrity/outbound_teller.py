@@ -1,0 +1,105 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The board's side of the line to the driver, as simple as it can be, without a line of the driver.
+
+It sends what a board sends that is booting, paused or running, and whose robot stands or moves.
+Moving, it does what the last motion frame that was written says, at once and without slip: whether
+it does something else is not shown, so the driver gets no help from noticing it.
+"""
+
+import math
+from typing import NamedTuple
+
+from omnibot_driver.simulator.wire import (
+    Triple,
+    delta_frame,
+    imu_frame,
+    paused_text,
+    pose_frame,
+)
+
+TICK_S = 0.01
+ANGULAR_SCALE = 500.0
+BASE_RADIUS_M = 0.143
+GYRO_LSB_PER_DPS = 131.0
+GOAL_MPS = 0.2
+"""So fast it drives to a goal."""
+ACCEL_Z = -16384
+"""Upside down."""
+
+
+class Shown(NamedTuple):
+    """What anybody could tell of a board from what it sends."""
+
+    mode: str
+    """booting, paused, running."""
+    moves: bool
+
+
+class Teller:
+    """One board; `linear_scale`: LSB per m/s; `goals`: its switch stands on position."""
+
+    def __init__(self, linear_scale: float, *, goals: bool = False) -> None:
+        self._linear_scale, self._goals = linear_scale, goals
+        self._twist = (0.0, 0.0, 0.0)
+        self._mode = ""
+        self._reboot()
+
+    def moves_as(self, mode: int, words: Triple) -> None:
+        """The robot's motion from now on, while it moves."""
+        a, b, c = words
+        if self._goals:
+            way = math.atan2(1e-3 * b - self._y, 1e-3 * a - self._x) - self._yaw
+            self._twist = (GOAL_MPS * math.cos(way), GOAL_MPS * math.sin(way), 0.0)
+        elif mode == 0x01:
+            scale = self._linear_scale
+            self._twist = (a / scale, b / scale, c / ANGULAR_SCALE)
+        else:  # the manual's inverse, from rim speeds
+            va, vb, vc = (word / self._linear_scale for word in words)
+            self._twist = (
+                (vb - va) / (2 * math.cos(math.radians(30))),
+                (2 * vc - va - vb) / 3,
+                -(va + vb + vc) / (3 * BASE_RADIUS_M),
+            )
+
+    def step(self, shown: Shown) -> bytes:
+        """Let one tick pass; return what is sent in it."""
+        if shown.mode != self._mode:
+            if self._mode == "booting":
+                self._reboot()
+            self._mode, self._texts, self._to_text = shown.mode, 0, 0
+        if shown.mode == "booting":
+            return b""
+        self._ticks += 1
+        if shown.mode == "paused":
+            self._to_text -= 1
+            if self._to_text >= 0:
+                return b""
+            self._to_text = 99
+            self._texts += 1
+            return paused_text((self._texts - 1) % 256)
+        vx, vy, yaw_rate = self._twist if shown.moves else (0.0, 0.0, 0.0)
+        half = self._yaw + yaw_rate * TICK_S / 2
+        self._x += (math.cos(half) * vx - math.sin(half) * vy) * TICK_S
+        self._y += (math.sin(half) * vx + math.cos(half) * vy) * TICK_S
+        self._yaw += yaw_rate * TICK_S
+        gyro_z = round(-math.degrees(yaw_rate) * GYRO_LSB_PER_DPS)
+        sent = imu_frame((20, 30, ACCEL_Z), (9, -12, max(-32768, min(32767, gyro_z - 3))))
+        if self._ticks % 4 == 0:
+            sent += self._delta()
+        if self._ticks % 20 == 0:
+            sent += pose_frame(1e3 * self._x, 1e3 * self._y, 1e3 * self._yaw, self._poses % 256)
+            self._poses += 1
+        return sent
+
+    def _reboot(self) -> None:
+        self._x = self._y = self._yaw = 0.0
+        self._told = (0, 0, 0)
+        self._ticks = self._deltas = self._poses = self._texts = self._to_text = 0
+
+    def _delta(self) -> bytes:
+        here = (round(1e4 * self._x), round(1e4 * self._y), round(1e4 * self._yaw))
+        dx, dy, dyaw = (now - then for now, then in zip(here, self._told, strict=True))
+        self._told = here
+        self._deltas += 1
+        return delta_frame((dx, dy, dyaw), (self._deltas - 1) % 256)
