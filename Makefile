@@ -46,13 +46,13 @@ docs: $(VENV)/.docs  ## write what is generated, and build the documents as a si
 pictures: $(VENV)/.test  ## make the pictures of README and documents anew (5 minutes)
 	@$(PY) test/pictures
 
-integrity: $(VENV)/.test  ## measure framing on damaged streams (15 minutes), into docs/integrity.md
-	$(PY) test/integrity/report.py
+integrity: $(VENV)/.test  ## measure damaged lines, both ways (15 minutes), into docs/integrity.md
+	$(PY) test/integrity/report.py; inbound=$$?; $(PY) test/integrity/outbound.py && exit $$inbound
 
 bench: $(VENV)/.test  ## measure speed against a floor (11 minutes), into docs/performance.md
 	$(PY) test/bench/report.py
 
-faults: $(VENV)/.test  ## break everything, with the real node (16 minutes), into docs/safety.md
+faults: $(VENV)/.test  ## break everything, with the real node (25 minutes), into docs/safety.md
 	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py
 
 soak: $(VENV)/.test  ## random faults for MINUTES (10)

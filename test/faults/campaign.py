@@ -24,6 +24,7 @@ from cases import Case, survivable
 from endings import ENDINGS, terminal_is_closed
 from fuzz import fuzz
 from goals import GOAL_ENDINGS, GOALS
+from losses import LIVES, lose, losing_rig
 from other_rigs import GoalRig, NetworkRig
 from rig import Rig
 from stuck import NETWORK
@@ -34,6 +35,8 @@ BEGIN, END = "<!-- campaign: begin -->", "<!-- campaign: end -->"
 ROUNDS: Final = 2
 WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
+LOSSES: Final = 30
+"""Of each stop on a line that loses bytes towards the board."""
 SOAK_STEPS: Final = 30
 
 
@@ -127,6 +130,18 @@ class Campaign:
             with self.rig(kind, before) as rig:
                 self.run(row, case, rig, again=False)
 
+    def losses(self) -> None:
+        """Each stop with losses towards the board that last until the verdict."""
+        for life in LIVES:
+            rows = {
+                name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life
+            }
+            for number in range(LOSSES):
+                with losing_rig(Path(tempfile.mkdtemp(dir=self._folder.name)), number) as rig:
+                    lose(rig, number)
+                    for name, case in life.items():
+                        self.run(rows[name], case, rig, again=False)
+
     def random_input(self) -> None:
         row = self.row(f"{FUZZ:,} random messages and calls, 1,000 a second")
         with self.rig() as rig:
@@ -182,21 +197,26 @@ def main() -> int:
     """Run, print, write."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--minutes", type=float, help="a soak of random walks only")
-    minutes = arguments.parse_args().minutes
+    arguments.add_argument("--losses", action="store_true", help="stops on a lossy line only")
+    chosen = arguments.parse_args()
+    minutes = chosen.minutes
     os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
     rclpy.init()
     campaign = Campaign()
     if minutes is not None:
         campaign.soak(minutes)
+    elif chosen.losses:
+        campaign.losses()
     else:
         campaign.scripted()
+        campaign.losses()
         campaign.random_input()
         campaign.walks(f"random walks of {STEPS} faults", Rig, range(WALKS))
         campaign.walks(f"with goals: random walks of {STEPS} faults", GoalRig, range(GOAL_WALKS))
     rclpy.shutdown()
     table = campaign.table()
     print(f"\n{table}\n", *campaign.complaints, sep="\n")
-    if minutes is None:
+    if minutes is None and not chosen.losses:
         before, rest = DOCUMENT.read_text().split(BEGIN)
         DOCUMENT.write_text(f"{before}{BEGIN}\n{table}\n{END}{rest.split(END)[1]}")
     return 1 if campaign.complaints else 0

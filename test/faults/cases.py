@@ -14,7 +14,7 @@ from typing import Final, TypeVar
 from breakable_line import Damage, cut, gaining, late, losing, losing_bursts, noise
 from driver_process import Driver
 from geometry_msgs.msg import Twist
-from rig import TICK_S, TIMEOUT_S, Rig
+from rig import TICK_S, Rig
 from std_msgs.msg import Bool, Float32MultiArray
 from std_srvs.srv import SetBool, Trigger
 from stuck import TERMINAL
@@ -26,6 +26,10 @@ Case = Callable[[R], object]
 NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
 HANGS_S: Final = 1.0
 """So long the guard waits for a sign of life."""
+DAMAGED_S: Final = 1.1
+"""After the last command the robot stands by then, and the rig's grace, on a damaged line."""
+UNHEARD: Final = "robot moves although|moving without a command|stop unconfirmed"
+"""In the log of a driver that the board does not hear."""
 NEXT_ATTEMPT_S: Final = 2.0
 """At the latest after so long a lost port is opened again."""
 SILENCE_S: Final = 1.5
@@ -88,22 +92,24 @@ def flood_of_commands(rig: Rig) -> None:
 
 
 def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, rig: Rig) -> None:
-    """The line damages bytes for a while; then it is whole, and nobody commands."""
+    """The line damages bytes for a while, and then until the robot has to stand."""
     rig.drive()
     rig.line.to_board = to_board or rig.line.to_board
     rig.line.from_board = from_board or rig.line.from_board
     rig.wait_ticks(ticks(seconds))
     rig.hand.leave()
+    rig.expect_still(rig.line.tick, "on a damaged line", DAMAGED_S)
     rig.line.heal()
-    rig.expect_still(rig.line.tick, "the line is whole again", TIMEOUT_S)
+    rig.expect_still(rig.line.tick, "the line is whole again", 0.0)
 
 
 def cut_to_the_board(rig: Rig) -> None:
-    """Longer than Stop is repeated, so all of it is lost on the way."""
+    """No stop can arrive, so the verdict is what the driver says of it; then the line heals."""
     rig.drive()
+    mark = len(rig.driver.lines)
     rig.line.to_board = cut
     rig.hand.leave()
-    rig.wait_ticks(ticks(2.5))
+    rig.driver.wait_for_line(UNHEARD, mark)
     rig.line.heal()
     rig.expect_still(rig.line.tick, "cut to the board, whole again", 1.0)
 
@@ -120,6 +126,7 @@ def cut_both_ways(rig: Rig) -> None:
     rig.drive()
     rig.line.from_board = rig.line.to_board = cut
     rig.wait_ticks(ticks(3.0))
+    rig.probe.wait_for_state("connecting")
     rig.hand.leave()
     rig.line.heal()
     rig.expect_still(rig.line.tick, "cut both ways, whole again")

@@ -2,8 +2,9 @@
 
 """Faults in random order, on top of each other, while somebody drives at random.
 
-Every few steps the line heals and the hand leaves the stick: then the robot has to stand in time,
-come back to its state, and obey a fresh command.
+Every few steps the hand leaves the stick: then the robot has to stand in time, come back to its
+state and obey a fresh command. The line heals before, but losses towards the board last until it
+has stood.
 """
 
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from std_srvs.srv import SetBool, Trigger
 STEPS_TO_A_REST: Final = 3
 TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
-"""After the line heals: a driver that heard nothing must first see that the robot moves."""
+"""A driver that heard nothing must first see that the robot moves."""
 
 
 def walk(rig: Rig, random: Random, steps: int) -> list[str]:
@@ -38,9 +39,13 @@ def walk(rig: Rig, random: Random, steps: int) -> list[str]:
 
 
 def _rest(rig: Rig, what: str) -> None:
+    to_board = rig.line.to_board
     rig.heal()
+    if to_board is not cut:
+        rig.line.to_board = to_board
     rig.hand.leave()
     rig.expect_still(rig.line.tick, what, STANDS_AGAIN_S)
+    rig.heal()
     rig.probe.call(SetBool, "estop", data=False)
     for _ in range(TRIES):  # another request may be under way
         answer = rig.probe.call(SetBool, "pause", data=False)

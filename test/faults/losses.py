@@ -1,0 +1,92 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Stops on a line that loses bytes towards the board: before, during and after, up to the verdict.
+
+Real processes and a real pseudo-terminal. How rare a failure is cannot be seen here; that is
+measured in simulated time (test/integrity/outbound.py). Each driver meets another receiver.
+"""
+
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from typing import Final
+
+from breakable_line import losing
+from rig import Rig
+from std_srvs.srv import SetBool
+
+from omnibot_driver.simulator import BoardSettings, ReceiverKind
+from omnibot_driver.simulator.receivers import FRAMINGS
+
+GRACE_S: Final = 0.1
+"""The rig's own, which it adds."""
+TIMED_OUT_S: Final = 1.2 - GRACE_S
+ESTOPPED_S: Final = 0.3 - GRACE_S
+ENDED_S: Final = 0.5 - GRACE_S
+RATES: Final = (1e-2, 5e-2)
+GUARD_S: Final = 1.5
+"""What the end takes longer if the guard has to repeat Stop."""
+RECEIVERS: Final = [
+    ReceiverKind(framing=framing, letters=letters)
+    for letters in ("between", "anywhere")
+    for framing in FRAMINGS
+]
+
+
+def losing_rig(folder: Path, number: int, **more: float) -> Rig:
+    """A driver on a board of its own kind; the line is whole until the first stop."""
+    receiver = RECEIVERS[number % len(RECEIVERS)]
+    board = BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)
+    return Rig(folder, board=board, **more)
+
+
+def lose(rig: Rig, number: int) -> None:
+    """From now on."""
+    rig.line.to_board = losing(RATES[number % len(RATES)], Random(number))
+
+
+def times_out(rig: Rig) -> None:
+    """The publisher ceases."""
+    rig.drive()
+    rig.hand.leave()
+    rig.expect_still(rig.line.tick, "timeout", TIMED_OUT_S)
+
+
+def is_estopped(rig: Rig) -> None:
+    """While somebody drives on."""
+    rig.drive()
+    since = rig.line.tick
+    answer = rig.probe.call(SetBool, "estop", data=True)
+    rig.findings.expect(answer.success, "the e-stop was refused")
+    rig.expect_still(since, "e-stop", ESTOPPED_S)
+    rig.hand.leave()
+    rig.probe.call(SetBool, "estop", data=False)
+    rig.expect_still(since, "e-stop released", ESTOPPED_S)
+
+
+def _ends(by: signal.Signals, exit_code: int, rig: Rig) -> None:
+    rig.drive()
+    since = rig.line.tick
+    rig.driver.process.send_signal(by)
+    rig.expect_ended(exit_code, late_s=GUARD_S)
+    rig.wait_ticks(150)  # whatever the guard writes is on the line by then
+    rig.expect_still(since, f"the driver ends by {by.name}", ENDED_S)
+    rig.hand.leave()
+
+
+def is_interrupted(rig: Rig) -> None:
+    """Ctrl-C."""
+    _ends(signal.SIGINT, 0, rig)
+
+
+def is_killed(rig: Rig) -> None:
+    """The guard is left."""
+    _ends(signal.SIGKILL, -signal.SIGKILL, rig)
+
+
+LIVES: Final[tuple[dict[str, Callable[[Rig], None]], ...]] = (
+    {"timeout": times_out, "ctrl-C": is_interrupted},
+    {"e-stop": is_estopped, "SIGKILL": is_killed},
+)
+"""What one driver goes through, one after the other; the last ends it."""

@@ -1,0 +1,20 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""One of each stop on a line that loses bytes towards the board; ``make faults`` has thirty."""
+
+from pathlib import Path
+
+import pytest
+from losses import LIVES, lose, losing_rig
+
+
+@pytest.mark.parametrize("number", range(len(LIVES)), ids=[", ".join(life) for life in LIVES])
+def test_the_robot_stands_though_bytes_are_lost_on_the_way_to_it(
+    number: int, tmp_path: Path, lenience: dict[str, float]
+) -> None:
+    """The line is not healed before the verdict."""
+    with losing_rig(tmp_path, number, **lenience) as rig:
+        lose(rig, number)
+        for case in LIVES[number].values():
+            case(rig)
+        assert not rig.findings.take(), rig.driver.output
