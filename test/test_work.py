@@ -85,7 +85,7 @@ def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     assert most_calls(FrameDecoder().feed)[kind] <= bound
 
 
-@pytest.mark.parametrize(("kind", "bound"), [(IMU, 46), (DELTA, 132), (POSE, 254)])
+@pytest.mark.parametrize(("kind", "bound"), [(IMU, 47), (DELTA, 155), (POSE, 277)])
 def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     """From the bytes of one read to its events, and what the link asks after each."""
     session = opened_session()
@@ -129,7 +129,7 @@ def test_a_command_calls_no_more_than_it_did() -> None:
         written.append(session.take_output(now))
 
     now += TICK_S
-    assert calls(work) <= 30
+    assert calls(work) <= 43
     assert written != [b""]
 
 

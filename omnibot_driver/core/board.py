@@ -189,6 +189,12 @@ class Board(Protocol):
     def wheels(self, rates_radps: Vector3) -> bytes:
         """Turn the wheels A, B, C at these rates, already within the limits."""
 
+    def meaning(self, data: bytes) -> BodyTwist:
+        """The body velocity that the last frame in these bytes commands, in the board's own axes.
+
+        Of ``velocity`` and ``wheels``, as rounded; at rest for every other.
+        """
+
     def drive_to(self, pose: Pose) -> bytes:
         """Go to this pose in the board's own earth frame, and stay.
 

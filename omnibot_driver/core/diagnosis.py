@@ -228,8 +228,14 @@ class Diagnosis:
         refused = self._grew("refusals", refusals.count, now)
         too_large = self._grew("saturated", saturated, now)
         limited = self._grew("limited", commands.limited, now)
+        tripped = self._grew("trips", commands.trips, now)
         level = Level.OK
-        if refused:
+        if commands.interlock:
+            level, message = Level.ERROR, f"motion is refused: {commands.interlock}"
+        elif tripped:
+            level = Level.WARN
+            message = "the motion monitor has stopped the robot: the log says what it saw"
+        elif refused:
             level, message = Level.WARN, f"lately: {refusals.last}"
         elif too_large:
             level = Level.WARN
@@ -246,6 +252,7 @@ class Diagnosis:
             "Refused": str(refusals.count),
             "Limited": str(commands.limited),
             "Saturated": str(saturated),
+            "Motion monitor trips": str(commands.trips),
         }
         return Status("Commands", level, message, values)
 

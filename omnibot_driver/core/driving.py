@@ -2,8 +2,8 @@
 
 """Motion commands, from a wish to what comes of it: when each expires, and whether the robot obeys.
 
-Composes the helm, the command stream and the watch. Knows no modes and no requests: whether a robot
-may be driven now is decided elsewhere.
+Composes the helm, the command stream and the motion monitor with its interlock. Knows no modes and
+no requests: whether a robot may be driven now is decided elsewhere.
 """
 
 import math
@@ -18,10 +18,12 @@ from omnibot_driver.core.kinematics import BodyTwist
 from omnibot_driver.core.limits import SpeedLimits, require_timely
 from omnibot_driver.core.measuring import Estimate
 from omnibot_driver.core.motion import GoalMotion, Motion
+from omnibot_driver.core.motion_interlock import MotionInterlock
+from omnibot_driver.core.motion_monitor import ADVICE, Fault, MotionMonitor
 from omnibot_driver.core.odometry import Odometry, OdometryEstimate
 from omnibot_driver.core.se2 import Pose, Signs
+from omnibot_driver.core.setpoint_history import AT_REST
 from omnibot_driver.core.snapshot import CommandFigures
-from omnibot_driver.core.watch import Finding, Watch
 
 Wish = tuple[Motion, float]
 """A motion that may be commanded, and when it expires."""
@@ -29,7 +31,9 @@ NEVER: Final = math.inf
 
 
 class Driving:
-    """``stream`` is what goes out; ``obeys``: whether the robot can be expected to do it."""
+    """``stream`` is what goes out; ``obeys``: whether the robot can be expected to do it;
+    ``interlock`` refuses motion after it did not.
+    """
 
     def __init__(
         self,
@@ -48,7 +52,9 @@ class Driving:
         )
         self._odometry = odometry
         self._helm = Helm(board, odometry, limits, axis_signs, control)
-        self._watch = Watch()
+        self.interlock = MotionInterlock()
+        self._board, self._axis_signs = board, axis_signs
+        self._monitor = MotionMonitor()
         self._obeys = obeys
 
     def configure(self, limits: SpeedLimits, commands: CommandSettings, now: float) -> list[str]:
@@ -85,17 +91,19 @@ class Driving:
             age_s=now - self.stream.commanded_at,
             limited=self._helm.limited,
             estop=self.stream.latched,
+            trips=self.interlock.trips,
+            interlock=self.interlock.reason(self.stream.settings.timeout_s),
         )
 
     def begin(self) -> None:
         """What was commanded and seen has nothing to do with what comes."""
         self.stream.discard()
-        self._watch.begin()
+        self._monitor.begin()
 
     def release(self, now: float) -> None:
         """End the e-stop."""
         self.stream.release(now)
-        self._watch.release()
+        self._monitor.release()
 
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Wish:
         """Drive the body. Raises CommandRefused, as all wishes do."""
@@ -115,19 +123,65 @@ class Driving:
         """Drive to a pose in the odometry frame."""
         return self._helm.pose(goal), NEVER
 
+    def wrote(self, data: bytes, now: float) -> None:
+        """The stream said this."""
+        goal = isinstance(self.stream.current, GoalMotion)
+        self._monitor.set_point(None if goal else self._board.meaning(data), now)
+
     def look(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> list[str]:
-        """Hold what the robot did against what it was told; sentences for the user."""
+        """Compare what the robot did with what was commanded; sentences for the user."""
         self.stream.proof.look(reading, now)
-        news = []
-        finding = self._watch.look(reading, self.stream.current) if self._obeys else None
-        if finding is not None:
-            if finding is Finding.ASTRAY:
-                self.stream.halt(now)
-            if self._watch.is_news(finding):
-                news.append(finding.value)
-        return news + self.check_goal(estimates, now)
+        fault = self._check(reading, estimates, now) if self._obeys else None
+        return self._react_to(fault, now) + self.check_goal(estimates, now)
+
+    def count_refused(self, count: int, now: float) -> list[str]:
+        """``count``: displacements so far that no robot can have made; sentences for the user."""
+        fault = self._monitor.count_refused(count, now) if self._obeys else None
+        return self._react_to(fault, now)
+
+    def _check(
+        self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
+    ) -> Fault | None:
+        """What the newest estimate, or else the bare displacement, shows."""
+        seconds = reading.duration_s
+        if not seconds or reading.restarted:
+            self._monitor.begin()
+            return None
+        if self.stream.current is None:
+            self._monitor.set_point(AT_REST, now)
+        newest = estimates[-1] if estimates else None
+        if isinstance(newest, OdometryEstimate) and newest.rolling is not None:
+            known = reading.frame == "body" or self._odometry.heading_known
+            return self._monitor.check(newest.rolling, seconds, newest.stamp_s, heading_known=known)
+        motion = Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad).over(seconds)
+        known = reading.frame == "body"
+        return self._monitor.check(motion, seconds, now, heading_known=known)
+
+    def _react_to(self, fault: Fault | None, now: float) -> list[str]:
+        """Stop a robot that moves otherwise than commanded; say what is wrong."""
+        if fault is None:
+            return []
+        if fault in ADVICE:
+            self.stream.halt(now)
+            self.interlock.trip(now)
+            seen = "" if fault is Fault.BEYOND_LIMITS else self._seen()
+            until = self.interlock.until.value
+            return [f"{fault.value}{seen}; robot stopped: {ADVICE[fault]}. {until}"]
+        if fault is Fault.UNCOMMANDED:
+            self.stream.halt(now)
+        return [fault.value] if self._monitor.is_news(fault) else []
+
+    def _seen(self) -> str:
+        """What was commanded and what was measured, in REP-103's axes."""
+        x, y, yaw = self._axis_signs
+        commanded, measured = (
+            f"{x * twist.vx_mps:.2f}, {y * twist.vy_mps:.2f} m/s, {yaw * twist.yaw_rate_radps:.2f}"
+            " rad/s"
+            for twist in (self._monitor.commanded, self._monitor.measured)
+        )
+        return f" (commanded {commanded}; measured {measured})"
 
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
         """Drop a goal that is another place by now, or that the robot drives away from."""
@@ -142,6 +196,7 @@ class Driving:
             if isinstance(estimate, OdometryEstimate)
         ):
             why = "the robot drives away from it: does the board's switch stand on position?"
+            self.interlock.trip(now)
         else:
             return []
         self.stream.halt(now)

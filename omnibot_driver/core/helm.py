@@ -8,7 +8,7 @@ when anything is sent.
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Final, Literal
+from typing import Literal
 
 from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.errors import CommandRefused
@@ -19,9 +19,6 @@ from omnibot_driver.core.odometry import Odometry
 from omnibot_driver.core.se2 import Pose, Signs
 
 ControlMethod = Literal["velocity", "position"]
-
-PLAIN_WHEEL_RADPS: Final = 3.0
-"""Wheels that are commanded to turn faster than this are seen to turn."""
 
 
 class Helm:
@@ -78,7 +75,6 @@ class Helm:
             Authority.WHEELS,
             frame,
             stands=frame == self._stop,
-            plain=max(map(abs, limited)) > PLAIN_WHEEL_RADPS,
             encode=partial(self._board.wheels, limited),
         )
 

@@ -67,6 +67,11 @@ class Measuring:
         )
 
     @property
+    def refused_displacements(self) -> int:
+        """Of these, those that no robot can have made."""
+        return self._plausibility.refused_displacements
+
+    @property
     def skew_ppm(self) -> float:
         """How much faster the board's clock runs than ours."""
         return self._clock.skew_ppm

@@ -20,9 +20,6 @@ LONGEST_STEP_S: Final = 0.05
 """A frame that goes out late does not make up for more time than this."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
-PLAIN_MPS: Final = 0.05
-PLAIN_RADPS: Final = 0.15
-"""A robot that is commanded to move faster than this is seen to move."""
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
 """No controller that drives to a goal overshoots by so much."""
@@ -50,10 +47,6 @@ class Motion(Protocol):
     @property
     def settled(self) -> bool:
         """False while each next frame is another one."""
-
-    @property
-    def plain(self) -> bool:
-        """Whether anybody would see the robot move under what is commanded now."""
 
     def frame(self, now: float) -> bytes:
         """The frame to write at this time."""
@@ -95,11 +88,6 @@ class BaseMotion:
                 self._setpoint = before._setpoint
                 self._reached_at = max(before._reached_at, since)
 
-    @property
-    def plain(self) -> bool:
-        """By the set-point, not by what is wanted."""
-        return self._setpoint.faster_than(PLAIN_MPS, PLAIN_RADPS)
-
     def frame(self, now: float) -> bytes:
         """The set-point of this time; asking moves it."""
         if not self.settled:
@@ -129,10 +117,9 @@ class SteadyMotion:
         frame: bytes,
         *,
         stands: bool,
-        plain: bool,
         encode: Callable[[], bytes] | None = None,
     ) -> None:
-        self.authority, self.stands, self.plain = authority, stands, plain
+        self.authority, self.stands = authority, stands
         self._frame, self._encode = frame, encode
 
     def frame(self, now: float) -> bytes:
@@ -155,7 +142,6 @@ class GoalMotion:
     authority: Final = Authority.POSE
     stands: Final = False
     settled: Final = True
-    plain: Final = False
 
     def __init__(self, place: Pose, encode: Callable[[], bytes], alignment: int) -> None:
         self.alignment = alignment

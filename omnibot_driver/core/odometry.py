@@ -28,6 +28,8 @@ LONG_GAP: Final = 25
 """After more lost displacements the next ones wait for the pose, which tells what was lost."""
 POSE_DUE_S: Final = 0.24
 """Board time within which a pose comes, unless it is lost as well."""
+WELL_KNOWN_RAD: Final = 0.15
+"""Standard deviation of a heading that open gaps have made uncertain."""
 UNKNOWN_S: Final = 0.5
 """Time in which a robot rolls out: what may be unreported where nobody knows how long it was."""
 
@@ -163,6 +165,13 @@ class Odometry:
         if self._board is None or self._restarted is not None or not self._settles:
             return None
         return self._board.moved(roll(self._track.way_to(place)))
+
+    @property
+    def heading_known(self) -> bool:
+        """Whether the board's heading is known well enough to tell forward from sideways."""
+        gap_rad2 = self._track.uncertainty.gap.yaw_yaw
+        proved = self._belief.proved is not None and self._restarted is None
+        return proved and gap_rad2 < WELL_KNOWN_RAD * WELL_KNOWN_RAD
 
     @property
     def _settles(self) -> bool:

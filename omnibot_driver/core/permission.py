@@ -10,8 +10,13 @@ from omnibot_driver.core.motion import Motion
 from omnibot_driver.core.supervisor import Phase
 
 
-def why_not_drive(phase: Phase, mode: Mode, *, latched: bool, unheard_s: float) -> str:
-    """``unheard_s``: for so long nothing was heard from the board; 0 where that does not matter."""
+def why_not_drive(
+    phase: Phase, mode: Mode, *, latched: bool, unheard_s: float, interlock: str
+) -> str:
+    """``unheard_s``: for so long nothing was heard from the board; 0 where that does not matter.
+
+    ``interlock``: why the motion monitor refuses motion, empty where it does not.
+    """
     if latched:
         return "the e-stop is latched; release it with the service ~/estop (data: false)"
     if phase is not Phase.SETTLED:
@@ -19,7 +24,9 @@ def why_not_drive(phase: Phase, mode: Mode, *, latched: bool, unheard_s: float) 
         return f"the board is {phase.value}{hint}"
     if not mode.running:
         return f"the board is {mode.value}; the service ~/start makes it run"
-    return f"nothing was heard from the board for {unheard_s:g} s" if unheard_s else ""
+    if unheard_s:
+        return f"nothing was heard from the board for {unheard_s:g} s"
+    return interlock
 
 
 def why_not_calibrate(phase: Phase, mode: Mode, current: Motion | None, *, measuring: bool) -> str:

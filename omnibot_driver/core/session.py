@@ -224,7 +224,9 @@ class Session:
             and self._supervisor.at_rest
         ):
             return False
-        if measured := self._measuring.digest():
+        if self._measuring.undigested:
+            measured = self._measuring.digest()
+            self._notify(self._driving.count_refused(self._measuring.refused_displacements, now))
             self._react(measured, now)
         if now >= self._tell_at:
             self._tell(now)
@@ -284,7 +286,9 @@ class Session:
             raise RequestRefused("the driver is shutting down")
         self.heed(now)  # what came before is no answer
         self._supervisor.request(request, token, now)
-        if request is not Request.START:
+        if request is Request.START:
+            self._driving.interlock.start()
+        else:
             self._commands.halt(now)
 
     def calibrate_gyro(self, token: object, now: float) -> None:
@@ -347,7 +351,9 @@ class Session:
             return b""
         if data := self._supervisor.take_output():
             self._commands.wrote(data, now)
-        data += self._commands.due(now)
+        if due := self._commands.due(now):
+            self._driving.wrote(due, now)
+            data += due
         if self._commands.unconfirmed:
             self._commands.unconfirmed = False
             self._notify(self._bulletin.unconfirmed(self._board.mode))
@@ -422,6 +428,9 @@ class Session:
             self._board.mode,
             latched=self._commands.latched,
             unheard_s=UNHEARD_S if unheard else 0.0,
+            interlock=self._driving.interlock.arrive(
+                now, self._commands.settings.timeout_s, stands=motion.stands
+            ),
         ):
             raise CommandRefused(f"motion command refused: {reason}")
         self._commands.command(motion, now, expires_at=expires_at)

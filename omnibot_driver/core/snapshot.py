@@ -22,12 +22,18 @@ class LinkFigures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandFigures:
-    """``source``: the topic that commands, ``age_s`` old by now; None while nobody does."""
+    """``source``: the topic that commands, ``age_s`` old by now; None while nobody does.
+
+    ``trips``: how often the motion monitor has stopped the robot; ``interlock``: what motion is
+    refused until, in a sentence; empty while it is allowed.
+    """
 
     source: str | None = None
     age_s: float = 0.0
     limited: int = 0
     estop: bool = False
+    trips: int = 0
+    interlock: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

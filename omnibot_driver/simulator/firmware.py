@@ -41,7 +41,7 @@ from omnibot_driver.simulator.wire import (
     paused_text,
     pose_frame,
 )
-from omnibot_driver.simulator.world import Held, TruePose, World
+from omnibot_driver.simulator.world import Force, Held, TruePose, Twist, World
 
 TICKS_PER_POSE = 20
 TICKS_PER_TEXT = 100
@@ -159,6 +159,18 @@ class SimulatedBoard:
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
         """Be held by somebody: tilted so much, and turned to the left so fast."""
         self._world.held = Held(roll_rad, pitch_rad, yaw_rate)
+
+    def push(self, x_pwm: float = 0.0, y_pwm: float = 0.0, turning_pwm: float = 0.0) -> None:
+        """Be pushed from now on, against the motors, along its own axes (see `world.Force`)."""
+        self._world.force = Force(x_pwm, y_pwm, turning_pwm)
+
+    def grip(self, vx_mps: float = 0.0, vy_mps: float = 0.0, yaw_rate: float = 0.0) -> None:
+        """Be moved by somebody stronger than the motors: held in place, or with this twist."""
+        self._world.gripped = Twist(vx_mps, vy_mps, yaw_rate)
+
+    def let_go(self) -> None:
+        """Be left to itself again."""
+        self._world.gripped = None
 
     @property
     def driven(self) -> bool:

@@ -66,11 +66,14 @@ class Motor:
         """The whole counts that the firmware can read."""
         return floor(self.position)
 
-    def advance(self, pwm: float) -> float:
-        """Turn for one tick under a constant effort; return the counts turned, with fraction."""
+    def advance(self, pwm: float, load_pwm: float = 0.0) -> float:
+        """Turn for one tick under a constant effort; return the counts turned, with fraction.
+
+        ``load_pwm`` is what the floor adds to the effort, at once.
+        """
         constants, start = self._constants, self.speed
         self._on_the_way.append(pwm)
-        pwm = self._on_the_way.popleft()
+        pwm = self._on_the_way.popleft() + load_pwm
         if abs(start) < STICKING_SPEED and abs(pwm) <= DEAD_ZONE_PWM:
             self.speed = 0.0
             return 0.0
@@ -85,6 +88,13 @@ class Motor:
         self.speed = end
         self.position += turned
         return turned
+
+    def turn(self, counts: float, pwm: float) -> None:
+        """Be turned from outside for one tick, whatever the effort."""
+        self._on_the_way.append(pwm)
+        self._on_the_way.popleft()
+        self.speed = counts
+        self.position += counts
 
 
 class WheelController:

@@ -48,12 +48,16 @@ class BoardSettings:
     axis_signs: of the board's x, y and yaw against the robot's: forward, left, counter-clockwise.
     wheel_gains: of the firmware's three speed controllers.
     motors: of wheels A, B, C.
+    motor_wiring: the motor that each controller drives, 1 to 3 for wheels A to C; negative
+        where its two poles are swapped. The encoders stay where they are.
     wheel_radius_m, base_radius_m, counts_per_revolution: as the firmware believes them
         (manual, Vehicle Parameters).
     wheel_radius_scale: true radius of wheels A, B, C over `wheel_radius_m`.
     base_radius_scale: true distance of the wheels from the centre over `base_radius_m`.
     slip: mean fraction of each wheel's rim motion that is lost on the floor; the momentary fraction
         wanders about it for each wheel by itself.
+    slope_pwm: how hard the floor's slope pulls the robot along the x axis of its first pose, as an
+        effort at the rim.
     imu_rpy_rad: how the IMU is mounted: the fixed-axis roll, pitch and yaw that turn the body's
         axes into the sensor's, as in a URDF.
     gyro_bias_dps, gyro_noise_dps: degrees per second in the sensor's axes; noise rms per reading.
@@ -81,12 +85,14 @@ class BoardSettings:
     axis_signs: tuple[int, int, int] = (1, 1, 1)
     wheel_gains: WheelGains = MANUAL
     motors: tuple[MotorConstants, MotorConstants, MotorConstants] = (USUAL, USUAL, USUAL)
+    motor_wiring: tuple[int, int, int] = (1, 2, 3)
     wheel_radius_m: float = 0.029
     base_radius_m: float = 0.143
     counts_per_revolution: int = 390 * 4
     wheel_radius_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
     base_radius_scale: float = 1.0
     slip: float = 0.0
+    slope_pwm: float = 0.0
     imu_rpy_rad: tuple[float, float, float] = (pi, 0.0, 0.0)
     gyro_bias_dps: tuple[float, float, float] = (-0.046, -0.038, -0.031)
     gyro_noise_dps: float = 0.05

@@ -8,11 +8,11 @@ commands or sends; the firmware reads the encoders and the IMU here, nothing els
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, sqrt
+from math import copysign, cos, exp, sin, sqrt
 from random import Random
 from typing import NamedTuple
 
-from omnibot_driver.simulator.chassis import PlanarPose, Wheels, body_from_rims
+from omnibot_driver.simulator.chassis import PlanarPose, Wheels, body_from_rims, rims_from_body
 from omnibot_driver.simulator.motors import TICK_S, Motor
 from omnibot_driver.simulator.settings import BoardSettings
 
@@ -43,12 +43,32 @@ class Held(NamedTuple):
     yaw_rate: float = 0.0
 
 
+class Force(NamedTuple):
+    """What pushes the robot along its x and y, and turns it to the left.
+
+    As an effort at the rims, shared by the wheels as a velocity of that direction would be.
+    """
+
+    x_pwm: float = 0.0
+    y_pwm: float = 0.0
+    turning_pwm: float = 0.0
+
+
+class Twist(NamedTuple):
+    """Along the robot's x and y in m/s, and to the left in rad/s."""
+
+    vx_mps: float = 0.0
+    vy_mps: float = 0.0
+    yaw_rate: float = 0.0
+
+
 class World:
     """Three motors and the floor under them."""
 
     def __init__(self, settings: BoardSettings) -> None:
         self._random = Random(f"slip {settings.seed}")
         self._motors = tuple(Motor(constants) for constants in settings.motors)
+        self._wiring = [(abs(motor) - 1, copysign(1, motor)) for motor in settings.motor_wiring]
         self._rim_m_per_count = [
             settings.rim_m_per_count * scale for scale in settings.wheel_radius_scale
         ]
@@ -57,7 +77,12 @@ class World:
         self._slip = [settings.slip] * 3
         self._pose = PlanarPose(0.0, 0.0, 0.0)
         self._twist = (0.0, 0.0, 0.0)
+        self._slope_pwm = settings.slope_pwm
         self.held = Held()
+        self.force = Force()
+        """Of somebody who pushes, or of a bump."""
+        self.gripped: Twist | None = None
+        """How somebody moves the robot who is stronger than its motors."""
         self.acceleration = (0.0, 0.0)
         """Acceleration of the body's origin over the last tick, along body x and y, in m/s²."""
 
@@ -82,13 +107,8 @@ class World:
         return a, b, c
 
     def advance(self, pwm: Wheels) -> None:
-        """Let one tick pass under the given efforts."""
-        rims_m = [
-            motor.advance(effort) * rim_m_per_count
-            for motor, effort, rim_m_per_count in zip(
-                self._motors, pwm, self._rim_m_per_count, strict=True
-            )
-        ]
+        """Let one tick pass under the given efforts of the three controllers."""
+        rims_m = self._turn_wheels(self._wired(pwm))
         if self._mean_slip:
             self._slip = [self._wander(*now) for now in zip(self._slip, rims_m, strict=True)]
         self._pose = self._pose.moved(*body_from_rims(self._on_floor(rims_m), self._base_radius_m))
@@ -100,6 +120,34 @@ class World:
             (vx - old_vx) / TICK_S - yaw_rate * vy,
             (vy - old_vy) / TICK_S + yaw_rate * vx,
         )
+
+    def _wired(self, pwm: Wheels) -> list[float]:
+        """The efforts as they reach the motors A, B, C."""
+        reached = [0.0] * 3
+        for effort, (motor, sign) in zip(pwm, self._wiring, strict=True):
+            reached[motor] += sign * effort
+        return reached
+
+    def _turn_wheels(self, efforts: Sequence[float]) -> list[float]:
+        """Rim motion of the wheels in this tick, in m."""
+        wheels = zip(self._motors, efforts, self._rim_m_per_count, strict=True)
+        if self.gripped is not None:
+            moved = rims_from_body(*self.gripped, self._base_radius_m)
+            for (motor, effort, rim_m_per_count), rim_mps in zip(wheels, moved, strict=True):
+                motor.turn(rim_mps * TICK_S / rim_m_per_count, effort)
+            return [rim_mps * TICK_S for rim_mps in moved]
+        return [
+            motor.advance(effort, load) * rim_m_per_count
+            for (motor, effort, rim_m_per_count), load in zip(wheels, self._loads(), strict=True)
+        ]
+
+    def _loads(self) -> Wheels:
+        """Efforts that the slope and whoever pushes add at the rims."""
+        x, y, turning = self.force
+        if self._slope_pwm:
+            x += self._slope_pwm * cos(self._pose.yaw_rad)
+            y -= self._slope_pwm * sin(self._pose.yaw_rad)
+        return rims_from_body(x, y, turning, 1.0)
 
     def _on_floor(self, rims: Sequence[float]) -> Wheels:
         a, b, c = (rim * (1 - slip) for rim, slip in zip(rims, self._slip, strict=True))

@@ -215,3 +215,19 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
     odometry.reset()
     counted.append(odometry.alignments)
     assert [count - counted[0] for count in counted] == [0, 0, 1, 2, 3]
+
+
+def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
+    """Not before two of them agree, not after a long gap until the next, not while it is assumed."""
+    odometry = Odometry(SETTINGS)
+    assert not odometry.heading_known
+    attach(odometry, heading(1.0))
+    assert odometry.heading_known
+    odometry.displace(replace(earth(0.01, 0.0), lost=3), 0.0)
+    assert odometry.heading_known
+    odometry.displace(replace(earth(0.01, 0.0), lost=20), 0.0)
+    assert not odometry.heading_known
+    assumed = Odometry(SETTINGS)
+    for _ in range(30):
+        assumed.displace(earth(0.01, 0.0), 0.0)
+    assert not assumed.heading_known

@@ -25,7 +25,7 @@ TIMEOUT_S = 0.5
 def order(
     stream: CommandStream, frame: bytes, now: float, authority: Authority = Authority.BASE
 ) -> None:
-    motion = SteadyMotion(authority, frame, stands=frame == STOP, plain=True)
+    motion = SteadyMotion(authority, frame, stands=frame == STOP)
     stream.command(motion, now, expires_at=now + TIMEOUT_S)
 
 

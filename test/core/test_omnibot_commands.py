@@ -152,3 +152,34 @@ def test_settings_may_be_replaced_while_it_runs() -> None:
     board = bot()
     board.settings = OmniBotSettings(linear_scale=100.0)
     assert bare(board.velocity(BodyTwist(1.0, 0.0, 0.0)))[3:5] == b"\x00\x64"
+
+
+@pytest.mark.parametrize(
+    ("typed", "twist"),
+    [
+        ("FF FE 01 00 23 00 00 00 00", (0.5, 0.0, 0.0)),
+        ("FF FE 01 FF F9 00 0E FF 6A", (-0.1, 0.2, -0.3)),
+        ("FF FE 02 00 00 00 00 00 00", (0.0, 0.0, 0.0)),
+        ("FF FE 10 00 00 00 00 00 00", (0.0, 0.0, 0.0)),
+        ("FF FE 02 FF F2 FF F2 FF F2", (0.0, 0.0, 0.2 / 0.143)),
+        ("FF FE 02 00 00 00 00 00 15", (0.0, 0.2, -0.1 / 0.143)),
+        ("53", (0.0, 0.0, 0.0)),
+        ("FF FE 01 00 23 00 00 00 00 FF FE 02 00 00 00 00 00 00", (0.0, 0.0, 0.0)),
+    ],
+)
+def test_a_frame_means_the_velocity_that_it_commands(
+    typed: str, twist: tuple[float, float, float]
+) -> None:
+    """The last one that was written; zeros before it mean nothing."""
+    found = bot().meaning(bytes(8) + bytes.fromhex(typed))
+    assert (found.vx_mps, found.vy_mps, found.yaw_rate_radps) == pytest.approx(twist, abs=1e-9)
+
+
+@given(twists)
+def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
+    """Half a unit, or one and a half where a byte would be a letter."""
+    found = bot().meaning(bot().velocity(twist))
+    assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)
+    assert found.vx_mps == pytest.approx(twist.vx_mps, abs=1.51 / 70)
+    assert found.vy_mps == pytest.approx(twist.vy_mps, abs=1.51 / 70)
+    assert found.yaw_rate_radps == pytest.approx(twist.yaw_rate_radps, abs=1.51 / 500)

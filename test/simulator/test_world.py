@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from omnibot_driver.simulator import BoardSettings
 from omnibot_driver.simulator.chassis import PlanarPose, body_from_rims, rims_from_body
-from omnibot_driver.simulator.world import World
+from omnibot_driver.simulator.world import Force, Twist, World
 
 ordinary = st.floats(-10, 10)
 L = 0.143
@@ -78,3 +78,57 @@ def test_the_twist_is_the_derivative_of_the_pose() -> None:
     before = world.truth
     world.advance((1000.0, 1000.0, 1000.0))
     assert (world.truth.yaw_rad - before.yaw_rad) / 0.01 == pytest.approx(before.yaw_rate)
+
+
+def test_a_force_moves_the_robot_in_its_direction() -> None:
+    """As efforts of the motors in the pattern of that motion would."""
+    for force, moved in (((500.0, 0.0, 0.0), 0), ((0.0, 500.0, 0.0), 1), ((0.0, 0.0, 500.0), 2)):
+        world = World(BoardSettings())
+        world.force = Force(*force)
+        for _ in range(100):
+            world.advance((0.0, 0.0, 0.0))
+        truth = world.truth
+        twist = [truth.vx_mps, truth.vy_mps, truth.yaw_rate * L]
+        assert twist.pop(moved) > 0.05
+        assert twist == pytest.approx([0.0, 0.0], abs=0.02)
+
+
+def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
+    """Along the floor's x axis."""
+    world = World(BoardSettings(slope_pwm=500.0))
+    world.gripped = Twist(0.0, 0.0, pi / 2)
+    for _ in range(100):
+        world.advance((0.0, 0.0, 0.0))
+    world.gripped = Twist()
+    world.advance((0.0, 0.0, 0.0))
+    world.gripped = None
+    for _ in range(100):
+        world.advance((0.0, 0.0, 0.0))
+    assert world.truth.yaw_rad == pytest.approx(pi / 2, abs=0.05)
+    assert world.truth.x_m > 0.05
+    assert abs(world.truth.y_m) < 0.02
+
+
+def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> None:
+    """Whatever the motors do; afterwards they go on from there."""
+    world = World(BoardSettings())
+    world.gripped = Twist(0.1, -0.2, 0.0)
+    for _ in range(100):
+        world.advance((4000.0, 4000.0, 4000.0))
+    assert (world.truth.x_m, world.truth.y_m) == pytest.approx((0.1, -0.2))
+    rim_m = 2 * pi * 0.029 / 1560
+    rims = rims_from_body(0.1, -0.2, 0.0, L)
+    assert [count * rim_m for count in world.encoders] == pytest.approx(rims, abs=2e-4)
+    world.gripped = None
+    world.advance((4000.0, 4000.0, 4000.0))
+    assert world.truth.yaw_rad < 0.0
+
+
+def test_swapped_motors_get_each_others_effort() -> None:
+    """The encoders stay where they are."""
+    world = World(BoardSettings(motor_wiring=(2, -1, 3)))
+    for _ in range(50):
+        world.advance((1000.0, 500.0, 0.0))
+    a, b, c = world.encoders
+    assert b > -a > 0
+    assert c == 0

@@ -13,7 +13,7 @@ from typing import Final
 from omnibot_driver.core.board import BoardFigures, Edge, Mode, Reading, Vector3
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, gravity_advice
-from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
 from omnibot_driver.core.limits import MAX_WORD, slow, to_nearest
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
@@ -169,6 +169,18 @@ class OmniBot:
         unit = self._settings.linear_scale * self._settings.wheel_radius_m
         a, b, c = rates_radps
         return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
+
+    def meaning(self, data: bytes) -> BodyTwist:
+        """By the mode and the words of the last command frame."""
+        settings = self._settings
+        mode, a, b, c = frames.last_command(data)
+        linear = settings.linear_scale
+        if mode == frames.VELOCITY_MODE:
+            return BodyTwist(a / linear, b / linear, c / settings.angular_scale)
+        if mode == frames.WHEEL_MODE:
+            rims = OmniKinematics(wheel_radius_m=1.0, base_radius_m=settings.base_radius_m)
+            return rims.body_twist((a / linear, b / linear, c / linear))
+        return BodyTwist(0.0, 0.0, 0.0)
 
     def drive_to(self, pose: Pose) -> bytes:
         """Base vector control with the switch on position; the origin is a pose like any other."""

@@ -114,6 +114,12 @@ def command(mode: int, a: int, b: int, c: int) -> bytes:
     return _COMMAND.pack(COMMAND_HEADER, mode, a, b, c)
 
 
+def last_command(data: bytes) -> tuple[int, int, int, int]:
+    """Mode and words of the command frame that these bytes end with; zeros if it is none."""
+    header, mode, a, b, c = _COMMAND.unpack(data[-_COMMAND.size :].rjust(_COMMAND.size, b"\0"))
+    return (mode, a, b, c) if header == COMMAND_HEADER else (0, 0, 0, 0)
+
+
 def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> bytes:
     """The bytes of one frame. Raises FrameError when a value does not fit its field."""
     try:

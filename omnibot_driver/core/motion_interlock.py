@@ -1,0 +1,68 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a robot that did not move as commanded has to wait for until it may move again.
+
+Knows when commands arrive and when the motion monitor tripped; not why it did, nor what is
+commanded. Time is an argument.
+"""
+
+import math
+from enum import Enum
+from typing import Final
+
+AGAIN_S: Final = 60.0
+"""Who trips the motion monitor twice within this time has not found the cause."""
+
+
+class Until(Enum):
+    """What ends the refusal."""
+
+    NOTHING = "Motion is allowed"
+    RELEASE = "Motion is refused until a zero command, or a pause of `cmd_vel_timeout`"
+    START = "Motion is refused until ~/start, as this is the second time within 60 s"
+
+
+class MotionInterlock:
+    """``until``: what motion is refused until."""
+
+    def __init__(self) -> None:
+        self.until = Until.NOTHING
+        self.trips = 0
+        self._tripped_at = self._commanded_at = -math.inf
+
+    def trip(self, now: float) -> None:
+        """The robot was stopped, as it did not move as commanded."""
+        again = now - self._tripped_at <= AGAIN_S or self.until is Until.START
+        self.until = Until.START if again else Until.RELEASE
+        self.trips += 1
+        self._tripped_at = now
+
+    def start(self) -> None:
+        """Somebody has looked, and calls ~/start."""
+        self.until, self._tripped_at = Until.NOTHING, -math.inf
+
+    def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
+        """A motion command arrived, or one to stand still: why it is refused; empty if it is not.
+
+        A refused command is a sign that its sender goes on, so silence is counted from there.
+        """
+        silent = now - self._commanded_at >= timeout_s
+        if not stands:
+            self._commanded_at = now
+        if self.until is Until.RELEASE and (stands or silent):
+            self.until = Until.NOTHING
+        return "" if stands else self.reason(timeout_s)
+
+    def reason(self, timeout_s: float) -> str:
+        """Why motion is refused, and what to do; empty while it is allowed."""
+        if self.until is Until.RELEASE:
+            return (
+                "the motion monitor has stopped the robot; send a zero command, or none for"
+                f" {timeout_s:g} s"
+            )
+        if self.until is Until.START:
+            return (
+                "the motion monitor has stopped the robot twice within 60 s; find the cause, then"
+                " call ~/start"
+            )
+        return ""

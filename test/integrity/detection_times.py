@@ -1,0 +1,133 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How long the motion monitor takes, in board time, as a table for docs/safety.md.
+
+PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
+
+From the first tick in which the robot is 0.05 m/s or 0.15 rad/s from everything between rest and
+its command until Stop is on the wire; shortest and longest over all phases of the displacements.
+"""
+
+from collections.abc import Callable
+
+from bench import STOP, TICK_S, Bench
+from disobeying import (
+    PERIOD_S,
+    SLOWLY,
+    Triple,
+    by_velocity,
+    by_wheels,
+    on_the_wrong_switch,
+    started,
+    stopped_after_s,
+)
+
+from omnibot_driver.simulator import BoardSettings
+
+PHASES = 8
+
+
+def robot(**settings: object) -> Callable[[], Bench]:
+    """One that stands and runs."""
+    return lambda: started(BoardSettings(running=True, **settings))  # type: ignore[arg-type]
+
+
+def gripped_after_s(bench: Bench, command: Triple, motion: Triple) -> float:
+    """From the tick in which an obeying robot is made to move otherwise until Stop."""
+    if any(command):
+        for _ in range(15):
+            by_velocity(bench, command)
+            bench.run(PERIOD_S)
+    mark, begun = len(bench.written), bench.now
+    bench.board.grip(*motion)
+    while not any(data == STOP for _, data in bench.written[mark:]):
+        if any(command) and bench.board.tick % 10 == 0:
+            by_velocity(bench, command)
+        bench.run(TICK_S)
+        if bench.now > begun + 3.0:
+            raise AssertionError("never stopped")
+    return bench.now - begun
+
+
+def row(
+    what: str, command: Triple, time_s: Callable[[Bench], float], make: Callable[[], Bench]
+) -> None:
+    """Print one, over all phases."""
+    times = []
+    for phase in range(PHASES):
+        bench = make()
+        bench.run(phase * TICK_S)
+        times.append(time_s(bench))
+    x, y, yaw = command
+    commanded = f"{yaw:g} rad/s" if yaw else f"{x or y:g} m/s" if x or y else "nothing"
+    print(f"| {what} | {commanded} | {min(times):.2f} s to {max(times):.2f} s |")
+
+
+def main() -> None:
+    """All rows."""
+    print("| the robot | commanded | stopped after |\n|---|---|---|")
+    row(
+        "the board's switch stands on position, 3 m from its origin",
+        SLOWLY,
+        lambda bench: stopped_after_s(bench, SLOWLY),
+        lambda: on_the_wrong_switch("earth"),
+    )
+    for scale in (1.6, 2.38):
+        for speed in (0.05, 0.1, 0.2, 0.5):
+            if scale * speed - speed > 0.05:
+                forward = (speed, 0.0, 0.0)
+                row(
+                    f"is {scale:g} times as fast (`linear_scale`)",
+                    forward,
+                    lambda bench, forward=forward: stopped_after_s(bench, forward),  # type: ignore[misc]
+                    robot(linear_scale=70 / scale),
+                )
+    forward = (0.3, 0.0, 0.0)
+    row(
+        "the same, by `wheel_cmd`",
+        forward,
+        lambda bench: stopped_after_s(bench, forward, by_wheels),
+        robot(linear_scale=70 / 2.38),
+    )
+    for rate in (0.15, 0.5):
+        turn = (0.0, 0.0, rate)
+        row(
+            "turns 2.38 times as fast (`angular_scale`)",
+            turn,
+            lambda bench, turn=turn: stopped_after_s(bench, turn),  # type: ignore[misc]
+            robot(angular_scale=500 / 2.38),
+        )
+    for what, wiring in (
+        ("the leads of motors A and B are swapped", (2, 1, 3)),
+        ("the leads of motor A are reversed", (-1, 2, 3)),
+    ):
+        for speed in (0.05, 0.3):
+            forward = (speed, 0.0, 0.0)
+            row(
+                what,
+                forward,
+                lambda bench, forward=forward: stopped_after_s(bench, forward),  # type: ignore[misc]
+                robot(motor_wiring=wiring),
+            )
+    for what, command, motion in (
+        ("suddenly goes back at 0.05 m/s", (0.05, 0.0, 0.0), (-0.05, 0.0, 0.0)),
+        ("suddenly goes back as fast", (0.3, 0.0, 0.0), (-0.3, 0.0, 0.0)),
+        ("suddenly drifts sideways by 0.1 m/s", (0.3, 0.0, 0.0), (0.3, 0.1, 0.0)),
+        ("suddenly turns at 0.15 rad/s", (0.3, 0.0, 0.0), (0.3, 0.0, 0.15)),
+        ("suddenly turns the other way", (0.0, 0.0, 0.15), (0.0, 0.0, -0.15)),
+        ("suddenly does 1.19 m/s", (0.5, 0.0, 0.0), (1.19, 0.0, 0.0)),
+        ("stood, and moves at 0.05 m/s", (0.0, 0.0, 0.0), (0.05, 0.0, 0.0)),
+        ("stood, and turns at 0.15 rad/s", (0.0, 0.0, 0.0), (0.0, 0.0, 0.15)),
+    ):
+        row(
+            what,
+            command,
+            lambda bench, command=command, motion=motion: gripped_after_s(  # type: ignore[misc]
+                bench, command, motion
+            ),
+            robot(),
+        )
+
+
+if __name__ == "__main__":
+    main()
