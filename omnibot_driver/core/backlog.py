@@ -41,6 +41,11 @@ class Backlog:
         return self._waiting[0][0].lost if self._waiting else 0
 
     @property
+    def lost_s(self) -> float:
+        """The same in board time."""
+        return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
+
+    @property
     def duration_s(self) -> float:
         """Board time that they stand for, as far as it is known."""
         return sum(reading.duration_s or 0.0 for reading, _ in self._waiting)

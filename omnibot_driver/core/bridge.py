@@ -12,8 +12,8 @@ from omnibot_driver.core.backlog import chord
 from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.se2 import Pose, unroll
 
-LONGEST_BRIDGE: Final = 50
-"""Displacements that a bridge stands for at the most; a robot that is not heard is soon stopped."""
+LONGEST_BRIDGE_S: Final = 2.0
+"""Board time that a bridge stands for at the most; a robot that is not heard is soon stopped."""
 NO_WAY: Final = Pose()
 
 
@@ -36,7 +36,7 @@ class Bridge:
         last, self.last = self.last, None
         if reading.duration_s is None:
             return NO_WAY, _tangent(reading, heading_rad)
-        half = min(reading.lost, LONGEST_BRIDGE) / 2
+        half = min(reading.lost, round(LONGEST_BRIDGE_S / reading.duration_s)) / 2
         if half and heading_rad is not None:
             last_turn_rad = last[0].yaw_rad if last else reading.dyaw_rad
             heading_rad += half * (last_turn_rad + reading.dyaw_rad)

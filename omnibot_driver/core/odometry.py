@@ -24,8 +24,8 @@ from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0
 """Board time without any pose after which heading 0 is assumed."""
-LONG_GAP: Final = 25
-"""After more lost displacements the next ones wait for the pose, which tells what was lost."""
+LONG_GAP_S: Final = 1.0
+"""After more lost board time the next ones wait for the pose, which tells what was lost."""
 POSE_DUE_S: Final = 0.24
 """Board time within which a pose comes, unless it is lost as well."""
 WELL_KNOWN_RAD: Final = 0.15
@@ -126,7 +126,8 @@ class Odometry:
         self._belief.displaced(reading)
         is_nowhere = self._board is None or self._restarted is not None
         means_nothing = is_nowhere and reading.frame == "earth"
-        if not (means_nothing or self._backlog or reading.lost > LONG_GAP):
+        lost_s = reading.lost * (reading.duration_s or 0.0)
+        if not (means_nothing or self._backlog or lost_s > LONG_GAP_S):
             return [*estimates, self._integrate(reading, stamp_s)]
         self._backlog.add(reading, stamp_s)
         waited_s = self._backlog.duration_s
@@ -134,7 +135,7 @@ class Odometry:
             if waited_s < LONGEST_WAIT_S:
                 return estimates
             self._assume()
-        elif self._backlog.lost > LONG_GAP and self._settles and waited_s < POSE_DUE_S:
+        elif self._backlog.lost_s > LONG_GAP_S and self._settles and waited_s < POSE_DUE_S:
             return estimates
         return estimates + self._release()
 

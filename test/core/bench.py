@@ -44,14 +44,14 @@ class Bench:
         control: ControlMethod | None = None,
     ) -> None:
         self.board = SimulatedBoard(board or BoardSettings())
-        frame = self.board.settings.frame
+        frame, period_s = self.board.settings.frame, self.board.settings.delta_period_s
         self._settings = SessionSettings(
             limits=limits or SpeedLimits(),
             commands=CommandSettings(),
             odometry=OdometrySettings(use_board_pose=use_board_pose),
         )
         self.session = Session(
-            OmniBot(OmniBotSettings(delta_frame=frame)),
+            OmniBot(OmniBotSettings(delta_frame=frame, delta_period_s=period_s)),
             self._settings,
             run=run,
             axis_signs=axis_signs,
@@ -125,7 +125,10 @@ class Bench:
 
     def configure_board(self, **changed: Any) -> None:
         """Fields of OmniBotSettings; the others are the defaults."""
-        settings = OmniBotSettings(delta_frame=self.board.settings.frame, **changed)
+        board = self.board.settings
+        settings = OmniBotSettings(
+            delta_frame=board.frame, delta_period_s=board.delta_period_s, **changed
+        )
         self.session.configure(self._settings, self.now, board=settings)
         self.settle()
 

@@ -35,7 +35,9 @@ class Line:
         seed: int = 0,
     ) -> None:
         self.board = SimulatedBoard(board)
-        self.translation = Translation(OmniBotSettings(delta_frame=board.frame))
+        self.translation = Translation(
+            OmniBotSettings(delta_frame=board.frame, delta_period_s=board.delta_period_s)
+        )
         self.odometry = Odometry(settings or OdometrySettings())
         self.loses = loses
         self.now = 0.0

@@ -19,12 +19,10 @@ from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
 from omnibot_driver.core.omnibot.modes import Happening
 from omnibot_driver.core.omnibot.outbound import begins_with_a_letter, harmless, transmission
+from omnibot_driver.core.omnibot.schedule import TICK_S, Schedule
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.se2 import Pose
-
-TICK_S: Final = 0.01
-RATES_HZ: Final = (100.0, 25.0, 5.0)
 
 _STOP: Final = frames.encode(frames.STOP)
 STOP: Final = transmission(_STOP)
@@ -32,9 +30,10 @@ EMERGENCY_STOP: Final = transmission(frames.encode(frames.EMERGENCY_STOP))
 
 
 class OmniBot:
-    """One board on one line. ``settings`` may be replaced at any time."""
+    """One board on one line. ``settings`` may be replaced at any time, but not the delta period."""
 
     def __init__(self, settings: OmniBotSettings) -> None:
+        self._schedule = Schedule(settings.delta_period_s)
         self._translation = Translation(settings)
         self._statistics = DecoderStatistics()
         self._saturated = 0
@@ -95,7 +94,7 @@ class OmniBot:
     def figures(self) -> BoardFigures:
         """Over all connections."""
         return BoardFigures(
-            rates_hz=RATES_HZ,
+            rates_hz=self._schedule.rates_hz,
             faults=self._statistics.faults,
             discarded_bytes=self._statistics.discarded_bytes,
             saturated=self._saturated,

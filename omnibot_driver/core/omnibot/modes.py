@@ -14,9 +14,7 @@ from typing import Final
 from omnibot_driver.core.board import Mode
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.omnibot.frames import Frame, ImuFrame, PausedFrame
-
-IMU_FRAMES_ALONE: Final = 25
-"""IMU frames (100 Hz) without a delta (25 Hz) that make IMU-only mode: six deltas are missing."""
+from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 
 
 class Happening(Enum):
@@ -48,9 +46,9 @@ TRANSITIONS: Final[dict[Happening, dict[Mode, Mode]]] = {
 class ModeTracker:
     """Walks the table. Illegal requests raise RequestRefused and change nothing."""
 
-    def __init__(self) -> None:
+    def __init__(self, schedule: Schedule = USUAL) -> None:
         self.mode = Mode.UNKNOWN
-        self.imus_to_come = IMU_FRAMES_ALONE
+        self._imus_alone = self.imus_to_come = schedule.imus_alone
         """Before they tell anything."""
 
     def apply(self, happening: Happening) -> None:
@@ -61,7 +59,7 @@ class ModeTracker:
             raise RequestRefused(
                 f"the board is {self.mode.value}: {happening.value} would do nobody knows what"
             ) from None
-        self.imus_to_come = IMU_FRAMES_ALONE
+        self.imus_to_come = self._imus_alone
 
     def hear(self, frame: Frame) -> None:
         """What this frame tells of the mode."""
@@ -70,7 +68,7 @@ class ModeTracker:
         elif isinstance(frame, PausedFrame):
             self.apply(Happening.HEARD_PAUSED)
         elif self.mode is _N:
-            self.imus_to_come = IMU_FRAMES_ALONE
+            self.imus_to_come = self._imus_alone
         else:
             self.apply(Happening.HEARD_MOTION)
 

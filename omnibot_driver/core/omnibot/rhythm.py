@@ -2,15 +2,17 @@
 
 """The order in which a running board sends, and what it tells of bytes that made no frame.
 
-In nominal mode a delta follows every fourth IMU frame, and a pose every fifth delta; in IMU-only
-mode there are IMU frames alone. So the number of bytes between two frames tells which frames they
-were, also when a few of them are missing. It is soft knowledge: SEQ and arrival times correct it.
+In nominal mode a delta follows every fourth IMU frame, and a pose every fifth delta (with deltas at
+10 Hz every tenth, and every second); in IMU-only mode there are IMU frames alone. So the number of
+bytes between two frames tells which frames they were, also when a few of them are missing. It is
+soft knowledge: SEQ and arrival times correct it.
 """
 
+from functools import cache
 from typing import Final
 
 from omnibot_driver.core.omnibot.frames import DeltaFrame, Frame, ImuFrame, PoseFrame
-from omnibot_driver.core.omnibot.modes import IMU_FRAMES_ALONE
+from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 
 Kind = type[Frame]
 
@@ -32,15 +34,21 @@ class Cycle:
         }
 
 
-_DELTA_PERIOD: Final[tuple[Kind, ...]] = (*(ImuFrame,) * 4, DeltaFrame)
-NOMINAL: Final = Cycle(*_DELTA_PERIOD * 5, PoseFrame)
 IMU_ONLY: Final = Cycle(ImuFrame)
+
+
+@cache
+def _nominal(imus_per_delta: int, deltas_per_pose: int) -> Cycle:
+    delta_period: tuple[Kind, ...] = (*(ImuFrame,) * imus_per_delta, DeltaFrame)
+    return Cycle(*delta_period * deltas_per_pose, PoseFrame)
 
 
 class Rhythm:
     """Where in its cycle a board is; one for each stretch in which it runs."""
 
-    def __init__(self) -> None:
+    def __init__(self, schedule: Schedule = USUAL) -> None:
+        self._nominal = _nominal(schedule.imus_per_delta, schedule.deltas_per_pose)
+        self._imus_alone = schedule.imus_alone
         self._cycle = IMU_ONLY
         self._next = 0
         self._imus = self._lost = 0
@@ -59,8 +67,8 @@ class Rhythm:
         if kind is ImuFrame:
             self.hear_imus(1)
         else:
-            self._imus, self._cycle = 0, NOMINAL
-            self._next = NOMINAL.after[kind][self._next]
+            self._imus, self._cycle = 0, self._nominal
+            self._next = self._nominal.after[kind][self._next]
             if kind is PoseFrame:
                 return 0
         lost, self._lost = self._lost, 0
@@ -69,7 +77,7 @@ class Rhythm:
     def hear_imus(self, count: int) -> None:
         """So many IMU frames came in, with nothing between them."""
         self._imus += count
-        if self._imus >= IMU_FRAMES_ALONE:
+        if self._imus >= self._imus_alone:
             self._cycle, self._next = IMU_ONLY, 0
         after = self._cycle.after[ImuFrame]
         for _ in range(count):

@@ -2,18 +2,16 @@
 
 """The board's counters: how many deltas are missing, and whether it has begun to count anew.
 
-SEQ is one byte and wraps every 10.24 s; arrival times tell how often. A pose comes with every fifth
-delta and has a counter of its own, so it can tell of losses before the next delta does. This module
-knows nothing of what is in a frame.
+SEQ is one byte and wraps every 10.24 s at 25 Hz; arrival times tell how often. A pose comes with
+every fifth delta (every second one at 10 Hz) and has a counter of its own, so it can tell of losses
+before the next delta does. This module knows nothing of what is in a frame.
 """
 
 from typing import Final
 
+from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.values import value
 
-DELTA_PERIOD_S: Final = 0.04
-DELTAS_PER_POSE: Final = 5
-IMUS_PER_DELTA: Final = 4
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
@@ -34,14 +32,17 @@ class Step:
     """
 
     lost: int
-    duration_s: float | None = DELTA_PERIOD_S
+    duration_s: float | None = USUAL.delta_period_s
     restarted: bool = False
 
 
 class Sequence:
     """The counters of one board, over any number of connections."""
 
-    def __init__(self) -> None:
+    def __init__(self, schedule: Schedule = USUAL) -> None:
+        self._period_s = schedule.delta_period_s
+        self._per_pose = schedule.deltas_per_pose
+        self._imus_per_delta = schedule.imus_per_delta
         self._delta: int | None = None
         self._delta_at = 0.0
         self._pose: int | None = None
@@ -67,6 +68,7 @@ class Sequence:
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
         """A delta with this count came in, and so many IMU frames since the one before."""
         self._take_back(count, now)
+        period_s, per_pose = self._period_s, self._per_pose
         before, self._delta = self._delta, count
         before_at, self._delta_at = self._delta_at, now
         elapsed_s = now - before_at
@@ -74,31 +76,31 @@ class Sequence:
         reconnected, self._reconnected = self._reconnected, False
         told, self._told = self._told, 0
         if before is None:
-            return Step(0, None if paused else DELTA_PERIOD_S)
+            return Step(0, None if paused else period_s)
         lost = (count - before - 1) % WRAP
         if paused:
             return Step(0, None, restarted=count <= lost)
-        wraps = max(0, round((elapsed_s / DELTA_PERIOD_S - lost - 1) / WRAP))
+        wraps = max(0, round((elapsed_s / period_s - lost - 1) / WRAP))
         lost += wraps * WRAP
-        late_s = abs((lost + 1) * DELTA_PERIOD_S - elapsed_s)
-        from_zero = count * DELTA_PERIOD_S <= elapsed_s + EARLY_S
+        late_s = abs((lost + 1) * period_s - elapsed_s)
+        from_zero = count * period_s <= elapsed_s + EARLY_S
         if lost and late_s > LATE_S and (reconnected or from_zero):
             self._pose, self._left = None, (before, before_at, count)
             return Step(0, None, restarted=True)
-        latest_s = (lost + 1) * DELTA_PERIOD_S - (
-            DELTA_PERIOD_S / 2 if imus == IMUS_PER_DELTA else LATE_S
+        latest_s = (lost + 1) * period_s - (
+            period_s / 2 if imus == self._imus_per_delta else LATE_S
         )
         ahead = lost > told and elapsed_s < latest_s
-        goes_on = self._ahead is not None and 0 < (count - self._ahead) % WRAP <= DELTAS_PER_POSE
+        goes_on = self._ahead is not None and 0 < (count - self._ahead) % WRAP <= per_pose
         self._ahead = count if ahead and not goes_on else None
-        in_time = max(0, round(elapsed_s / DELTA_PERIOD_S) - 1)
+        in_time = max(0, round(elapsed_s / period_s) - 1)
         if self._ahead is not None:
             lost, self._delta = in_time, (before + in_time + 1) % WRAP
-        elif ahead and lost >= WRAP - DELTAS_PER_POSE:
+        elif ahead and lost >= WRAP - per_pose:
             lost = in_time  # no wrap: one that was false had been counted
         lost -= min(lost, told)
         self._since_pose += lost + 1
-        return Step(lost)
+        return Step(lost, period_s)
 
     def pose(self, count: int, now: float) -> Step:
         """A pose with this count came in: what is missing of the deltas that it includes."""
@@ -106,16 +108,16 @@ class Sequence:
         counted, self._since_pose = self._since_pose, 0
         if before is None or self._delta is None:
             return Step(0)
-        passed = (count - before) % WRAP * DELTAS_PER_POSE
+        passed = (count - before) % WRAP * self._per_pose
         self._regular = self._regular or 0 < passed == counted
         if not self._regular:
             return Step(0)
-        from_zero = abs(count * DELTAS_PER_POSE - self._delta) <= DELTAS_PER_POSE
-        goes_on = passed == DELTAS_PER_POSE or self._ahead is not None  # until a delta confirms it
-        if from_zero and not goes_on and abs(passed - counted) > 2 * DELTAS_PER_POSE:
+        from_zero = abs(count * self._per_pose - self._delta) <= self._per_pose
+        goes_on = passed == self._per_pose or self._ahead is not None  # until a delta confirms it
+        if from_zero and not goes_on and abs(passed - counted) > 2 * self._per_pose:
             return Step(0, None, restarted=True)
         missing = max(0, passed - counted)
-        if (self._told + missing) * DELTA_PERIOD_S > now - self._delta_at + DELTA_PERIOD_S:
+        if (self._told + missing) * self._period_s > now - self._delta_at + self._period_s:
             return Step(0)  # there was no time for so many
         self._told += missing
         return Step(missing)
@@ -125,6 +127,6 @@ class Sequence:
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left
-            on_time = abs((count - was) % WRAP * DELTA_PERIOD_S - (now - at)) <= LATE_S
-            if on_time and not 0 < (count - anew) % WRAP <= DELTAS_PER_POSE:
+            on_time = abs((count - was) % WRAP * self._period_s - (now - at)) <= LATE_S
+            if on_time and not 0 < (count - anew) % WRAP <= self._per_pose:
                 self._delta, self._delta_at = was, at

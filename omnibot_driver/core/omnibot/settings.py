@@ -16,7 +16,9 @@ class OmniBotSettings:
     ``baudrate``: at ten bits to the byte; ``linear_scale``: LSB per m/s; ``angular_scale``: LSB per
     rad/s; ``position_scale`` and ``heading_scale``: LSB per m and rad of a commanded pose;
     ``delta_frame``: whether deltas are differences of positions in the board's earth frame, motion
-    along its own axes, or (older firmware) encoder counts of the wheels A, B, C.
+    along its own axes, or (older firmware) encoder counts of the wheels A, B, C;
+    ``delta_period_s``: from one delta to the next, one of ``schedule.DELTA_PERIODS_S``, and the
+    same for as long as the board is there.
     """
 
     baudrate: int = 115200
@@ -28,5 +30,6 @@ class OmniBotSettings:
     base_radius_m: float = 0.143
     counts_per_revolution: int = 1560
     delta_frame: Literal["earth", "body", "wheel_counts"] = "earth"
+    delta_period_s: float = 0.04
     pose_byte_order: ByteOrder = "big"
     imu: ImuScale = field(default_factory=ImuScale)

@@ -2,8 +2,8 @@
 
 """From the frames of one line to readings: in SI units, each at its time, with what was lost.
 
-Source: the board's manual ver. 0.3. Units on the wire: deltas 0.1 mm and 0.1 mrad per 40 ms;
-poses mm and mrad.
+Source: the board's manual ver. 0.3. Units on the wire: deltas 0.1 mm and 0.1 mrad; poses mm and
+mrad.
 """
 
 import math
@@ -28,11 +28,11 @@ from omnibot_driver.core.omnibot.frames import (
 )
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
 from omnibot_driver.core.omnibot.rhythm import LENGTH, Rhythm
+from omnibot_driver.core.omnibot.schedule import Schedule
 from omnibot_driver.core.omnibot.sequence import Sequence
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
 from omnibot_driver.core.omnibot.suspicion import Suspicion
 
-NOMINAL_BYTES_PER_S: Final = 1700
 DELTA_LSB: Final = 1e-4
 """m, m, rad."""
 POSE_LSB_M: Final = 1e-3
@@ -42,19 +42,20 @@ POSE_LSB_RAD: Final = 1e-3
 class Translation:
     """What is made of the frames of a line; what comes most often, in ``lone``, at the least cost.
 
-    ``settings`` may be replaced at any time.
+    ``settings`` may be replaced at any time, but for ``delta_period_s``.
     """
 
     def __init__(self, settings: OmniBotSettings) -> None:
         self.settings = settings
         self.suspicion = Suspicion()
-        self._sequence = Sequence()
+        self._schedule = Schedule(settings.delta_period_s)
+        self._sequence = Sequence(self._schedule)
         self.connect()
 
     def connect(self) -> None:
         """A new line: no belief but in the board's counters."""
-        self.modes = ModeTracker()
-        self._rhythm = Rhythm()
+        self.modes = ModeTracker(self._schedule)
+        self._rhythm = Rhythm(self._schedule)
         self._sequence.reconnect()
         self._paused_count: int | None = None
         self._imus = 0
@@ -81,7 +82,7 @@ class Translation:
         readings = []
         for frame, length, before in zip(found, lengths, skipped, strict=True):
             left -= before + length
-            came_s = max(before_s, now - left / NOMINAL_BYTES_PER_S)
+            came_s = max(before_s, now - left / self._schedule.bytes_per_s)
             readings.append(self._read(frame, came_s, before))
         usual = self._paused_count is None and not any(skipped)
         self.lone_to_come = self._most_alone = self.modes.imus_to_come - 1 if usual else 0
@@ -131,7 +132,7 @@ class Translation:
             case PausedFrame(count):
                 self._paused_count = count
                 self._sequence.pause()
-                self._rhythm = Rhythm()
+                self._rhythm = Rhythm(self._schedule)
                 continues = paused_count is not None and count == (paused_count + 1) % 256
                 return PausedReading(continues)
 

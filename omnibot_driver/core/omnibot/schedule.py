@@ -1,0 +1,40 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How often a running board sends each kind of frame.
+
+The manual contradicts itself about deltas: 25 Hz in its frame table, 10 Hz in its mode list. All
+else follows from that. This module knows rates; it does not know what is in a frame.
+"""
+
+from typing import Final
+
+TICK_S: Final = 0.01
+"""Of the control loop; an IMU frame comes with each."""
+POSE_PERIOD_S: Final = 0.2
+DELTA_PERIODS_S: Final = (0.01, 0.02, 0.04, 0.05, 0.1, 0.2)
+"""Whole ticks, a whole number of them to a pose."""
+DELTAS_MISSING: Final = 6
+"""When so many are, the board is in IMU-only mode."""
+FEWEST_ALONE: Final = 25
+"""IMU frames that tell of it at least, should the board send deltas less often than it is said."""
+
+_IMU_BYTES_PER_S: Final = 1400
+_POSE_BYTES_PER_S: Final = 75
+_DELTA_BYTES: Final = 9
+
+
+class Schedule:
+    """``delta_period_s``: one of ``DELTA_PERIODS_S``."""
+
+    def __init__(self, delta_period_s: float = 0.04) -> None:
+        self.delta_period_s = delta_period_s
+        self.imus_per_delta = round(delta_period_s / TICK_S)
+        self.deltas_per_pose = round(POSE_PERIOD_S / delta_period_s)
+        self.imus_alone = max(FEWEST_ALONE, DELTAS_MISSING * self.imus_per_delta + 1)
+        """IMU frames without a delta that make IMU-only mode."""
+        self.bytes_per_s = _IMU_BYTES_PER_S + _DELTA_BYTES / delta_period_s + _POSE_BYTES_PER_S
+        self.rates_hz = (1.0 / TICK_S, 1.0 / delta_period_s, 1.0 / POSE_PERIOD_S)
+        """Of IMU frames, deltas and poses."""
+
+
+USUAL: Final = Schedule()
