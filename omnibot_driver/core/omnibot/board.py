@@ -57,6 +57,7 @@ class OmniBot:
             self._settings.pose_byte_order,
             ACCEL_COUNTS_PER_G[self._settings.imu.accel_range_g],
             10 / self._settings.baudrate,
+            self._schedule,
         )
         self._decoder.statistics = self._statistics
         self._translation.connect()

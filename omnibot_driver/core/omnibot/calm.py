@@ -151,6 +151,7 @@ def take_calm(
         return at, context
     frames, ends = walk.frames, walk.ends
     lightest, heaviest, far, fast = expectation.calm
+    per_delta, per_pose = expectation.imus_per_delta, expectation.deltas_per_pose
     back, slow = -far, -fast
     px, py, pz = last.accel
     pu, pv, pw = last.gyro
@@ -193,7 +194,7 @@ def take_calm(
                 walk.known.append((count + 1, (frame, seq, pose, imus + 1, deltas, shaken, turned)))
             last = frame
             imus += 1
-        elif kind == _DELTA_KIND and imus == 4:
+        elif kind == _DELTA_KIND and imus == per_delta:
             end = at + DELTA_LENGTH
             if end > size or seq is None:
                 break
@@ -212,7 +213,7 @@ def take_calm(
             frame.__class__ = DeltaFrame
             seq, imus, deltas = count, 0, deltas + 1
             turned = None if turned is None else turned + dtheta
-        elif kind == _POSE_KIND and deltas == 5 and imus == 0:
+        elif kind == _POSE_KIND and deltas == per_pose and imus == 0:
             end = at + POSE_LENGTH
             if end > size or pose is None or turned is None:
                 break

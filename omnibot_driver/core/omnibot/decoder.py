@@ -37,6 +37,7 @@ from omnibot_driver.core.omnibot.frames import (
 )
 from omnibot_driver.core.omnibot.lattice import Piece, read
 from omnibot_driver.core.omnibot.pauses import BYTE_S, GAP_S, IDLE_S, LATE_S, TICK_BYTES, Pauses
+from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 
 SPOKEN_AGAINST: Final = 3.0
 """A content of this cost waits for what follows."""
@@ -64,6 +65,7 @@ class FrameDecoder:
         pose_byte_order: ByteOrder = "big",
         accel_counts_per_g: float = 16384.0,
         byte_s: float = BYTE_S,
+        schedule: Schedule = USUAL,
     ) -> None:
         self.statistics = DecoderStatistics()
         self.skipped: list[int] = []
@@ -72,7 +74,7 @@ class FrameDecoder:
         """All that came was understood, and pauses stand where they should."""
         self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
-        self._expectation = Expectation(accel_counts_per_g)
+        self._expectation = Expectation(accel_counts_per_g, schedule)
         self._context = NOTHING_KNOWN
         self._held = bytearray()
         self._in_step = False
@@ -203,7 +205,7 @@ class FrameDecoder:
                 return self._believe_but_the_last(walk, found)
             if end == size and not closed and evidence.may_be_lent(frame, context):
                 parted = self._arrived < length  # what is sent at once begins after a pause
-                if not self._pauses.sharp or (parted and evidence.more_is_due(frame, context)):
+                if not self._pauses.sharp or (parted and expectation.more_is_due(frame, context)):
                     break
             walk.add(end, frame, context)
             context = after

@@ -22,6 +22,7 @@ from omnibot_driver.core.omnibot.frames import (
     PoseFrame,
     Words,
 )
+from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 
 # What the line does.
 ONE_BYTE: Final = 5.5
@@ -72,7 +73,7 @@ JUMP: Final = 2.5
 IMPOSSIBLE: Final = 2.0
 """A movement that no robot of this kind makes."""
 OFF_BEAT: Final = 1.0
-"""Not four IMU frames to a delta, or not five deltas to a pose."""
+"""Not as many IMU frames to a delta, or deltas to a pose, as the schedule has: four, and five."""
 
 CONTRADICTED: Final = 1.5
 """A pose that is turned otherwise than by the sum of the deltas since the one before."""
@@ -87,8 +88,8 @@ FARTHEST_POSE: Final = 1e7
 """Poses are in mm and mrad: beyond 10 km, or 1600 turns, a pose is other bytes misread."""
 LONGEST_STEP: Final = 2000.0
 """Between two poses: 10 m/s, or 10 rad/s, for 200 ms."""
-IMUS_ONLY: Final = 8
-"""So many IMU frames without a delta, and none is expected."""
+DELTAS_MISSED: Final = 2
+"""As many IMU frames as come to so many deltas, without any, and none is expected."""
 
 
 class Context(NamedTuple):
@@ -117,7 +118,9 @@ NOTHING_KNOWN: Final = Context()
 class Expectation:
     """Judges content by what came before; it learns how much the sensor's words scatter."""
 
-    def __init__(self, counts_per_g: float) -> None:
+    def __init__(self, counts_per_g: float, schedule: Schedule = USUAL) -> None:
+        self.imus_per_delta = schedule.imus_per_delta
+        self.deltas_per_pose = schedule.deltas_per_pose
         self._lightest = (0.5 * counts_per_g) ** 2
         self._heaviest = (2.5 * counts_per_g) ** 2
         self._accel_scatter = 300.0
@@ -164,8 +167,7 @@ class Expectation:
             return self._weigh_pose(frame, before)
         return 0.0, NOTHING_KNOWN
 
-    @staticmethod
-    def _weigh_delta(frame: DeltaFrame, before: Context) -> tuple[float, Context]:
+    def _weigh_delta(self, frame: DeltaFrame, before: Context) -> tuple[float, Context]:
         cost = 0.0
         if max(abs(frame.dx), abs(frame.dy), abs(frame.dtheta)) > LARGEST_DELTA:
             cost = IMPOSSIBLE
@@ -177,10 +179,9 @@ class Expectation:
             return cost, after
         if not next_one:
             return cost + JUMP, after
-        return (cost if imus == 4 else cost + OFF_BEAT), after
+        return (cost if imus == self.imus_per_delta else cost + OFF_BEAT), after
 
-    @staticmethod
-    def _weigh_pose(frame: PoseFrame, before: Context) -> tuple[float, Context]:
+    def _weigh_pose(self, frame: PoseFrame, before: Context) -> tuple[float, Context]:
         after = Context(before.imu, before.seq, frame, before.imus, 0, before.shaken, 0)
         x, y, theta = frame.x, frame.y, frame.theta
         if not (abs(x) < FARTHEST_POSE and abs(y) < FARTHEST_POSE and abs(theta) < FARTHEST_POSE):
@@ -195,7 +196,8 @@ class Expectation:
         turned = before.turned
         if turned is not None and abs(10.0 * (theta - last.theta) - turned) > ROUNDING:
             cost += CONTRADICTED
-        return (cost if before.deltas == 5 and before.imus == 0 else cost + OFF_BEAT), after
+        on_beat = before.deltas == self.deltas_per_pose and before.imus == 0
+        return (cost if on_beat else cost + OFF_BEAT), after
 
     def learn(self, frame: ImuFrame, last: ImuFrame) -> None:
         """Two frames in a row that were believed."""
@@ -210,6 +212,15 @@ class Expectation:
         lightest, heaviest, _, _ = self.calm
         self.calm = lightest, heaviest, ceil(self._accel_limit), ceil(self._gyro_limit)
 
+    def more_is_due(self, frame: Frame, before: Context) -> bool:
+        """The board may send another frame in the same tick, without a pause."""
+        if isinstance(frame, ImuFrame):
+            if before.seq is not None:
+                return before.imus >= self.imus_per_delta - 1
+            return before.imus < DELTAS_MISSED * self.imus_per_delta
+        last = before.deltas >= self.deltas_per_pose - 1
+        return isinstance(frame, DeltaFrame) and (before.pose is None or last)
+
 
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Its last byte may be the next header's. Not so if it is what the sensor said before."""
@@ -218,13 +229,6 @@ def may_be_lent(frame: Frame, before: Context) -> bool:
         said = before.imu is not None and frame.gyro[2] == before.imu.gyro[2]
         return lent and (frame.gyro[2] & 0xFF == 0xFF or not said)
     return not isinstance(frame, PausedFrame) and frame.seq in LENT
-
-
-def more_is_due(frame: Frame, before: Context) -> bool:
-    """The board may send another frame in the same tick, without a pause."""
-    if isinstance(frame, ImuFrame):
-        return before.imus >= 3 if before.seq is not None else before.imus < IMUS_ONLY
-    return isinstance(frame, DeltaFrame) and (before.pose is None or before.deltas >= 4)
 
 
 def _leaps(now: Words, before: Words, limit: float) -> int:
