@@ -10,8 +10,15 @@ from trip import earth
 
 from omnibot_driver.core.board import PoseReading
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings, PoseFrame
+from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S
 from omnibot_driver.core.omnibot.suspicion import MOST_DELTAS, Suspicion
-from omnibot_driver.simulator import BoardPose, BoardSettings, SimulatedBoard
+from omnibot_driver.simulator import (
+    BoardPose,
+    BoardSettings,
+    FaultyLine,
+    LineFaults,
+    SimulatedBoard,
+)
 
 DRIVE = bytes.fromhex("FF FE 01 00 15 00 0E 00 C8")
 """0.3 m/s ahead, 0.2 m/s to the left, 0.4 rad/s."""
@@ -42,6 +49,57 @@ def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str) -> None:
     told = advice(board, OmniBotSettings(delta_frame=read))
     assert told is not None
     assert f"`delta_frame` to {sent}" in told
+
+
+@pytest.mark.parametrize("sent_s", DELTA_PERIODS_S)
+@pytest.mark.parametrize("read_s", DELTA_PERIODS_S)
+def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> None:
+    """Within three seconds, and the right one is named; of the right one nothing is said."""
+    board = BoardSettings(running=True, delta_period_s=sent_s)
+    told = advice(board, OmniBotSettings(delta_period_s=read_s), 3.0)
+    if sent_s == read_s:
+        assert told is None
+    else:
+        assert told is not None
+        assert f"a delta every {sent_s:g} s, not every {read_s:g} s" in told
+        assert told.endswith(f"set the parameter `delta_period` to {sent_s:g}")
+
+
+@pytest.mark.parametrize("period_s", [0.04, 0.1])
+@pytest.mark.parametrize("lose", [0.001, 0.01, 0.05])
+def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float) -> None:
+    """However many IMU frames are missing: the arrival of the deltas says otherwise."""
+    sender = SimulatedBoard(BoardSettings(running=True, delta_period_s=period_s))
+    driver = OmniBot(OmniBotSettings(delta_period_s=period_s))
+    line = FaultyLine(LineFaults(lose=lose), 5)
+    for tick in range(6000):
+        driver.receive(line.carry(sender.step()), tick / 100)
+    assert driver.advice is None
+
+
+@pytest.mark.parametrize("lose", [0.001, 0.005])
+def test_a_wrong_period_is_noticed_on_a_bad_line_too(lose: float) -> None:
+    """A delta is a witness also where an IMU frame before it is missing."""
+    sender = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
+    driver = OmniBot(OmniBotSettings())
+    line = FaultyLine(LineFaults(lose=lose), 5)
+    for tick in range(6000):
+        driver.receive(line.carry(sender.step()), tick / 100)
+    assert driver.advice is not None
+    assert "`delta_period` to 0.1" in driver.advice
+
+
+@pytest.mark.parametrize("reads_s", [0.016, 0.1, 0.5, 1.0])
+def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: float) -> None:
+    """A busy computer, and an adapter that collects."""
+    sender, driver = SimulatedBoard(BoardSettings(running=True)), OmniBot(OmniBotSettings())
+    held, read_at = b"", 0.0
+    for tick in range(3000):
+        held += sender.step()
+        if tick / 100 >= read_at:
+            driver.receive(held, tick / 100)
+            held, read_at = b"", tick / 100 + reads_s
+    assert driver.advice is None
 
 
 @pytest.mark.parametrize("frame", ["earth", "body"])

@@ -47,8 +47,8 @@ class Translation:
 
     def __init__(self, settings: OmniBotSettings) -> None:
         self.settings = settings
-        self.suspicion = Suspicion()
         self._schedule = Schedule(settings.delta_period_s)
+        self.suspicion = Suspicion(self._schedule)
         self._sequence = Sequence(self._schedule)
         self.connect()
 
@@ -137,8 +137,8 @@ class Translation:
                 return PausedReading(continues)
 
     def _displacement(self, frame: DeltaFrame, now: float) -> DisplacementReading:
-        step = self._sequence.delta(frame.seq, now, imus=self._imus)
-        self._imus = 0
+        imus, self._imus = self._imus, 0
+        step = self._sequence.delta(frame.seq, now, imus=imus)
         dx, dy, dyaw = frame.dx * DELTA_LSB, frame.dy * DELTA_LSB, frame.dtheta * DELTA_LSB
         if self.settings.delta_frame == "wheel_counts":
             dx, dy, dyaw = self._rolled((frame.dx, frame.dy, frame.dtheta))
@@ -152,6 +152,7 @@ class Translation:
             restarted=step.restarted,
         )
         self.suspicion.displaced(displacement)
+        self.suspicion.spaced(displacement, imus, now)
         return displacement
 
     def _rolled(self, counts: Words) -> Vector3:
