@@ -15,7 +15,7 @@ VECTORS = [BY_NAME["gyro_bias"], BY_NAME["accel_bias"]]
 RANGED = [
     parameter for parameter in PARAMETERS if parameter.low is not None and parameter not in VECTORS
 ]
-FLOATS = [parameter for parameter in PARAMETERS if isinstance(parameter.default, float)]
+FLOATS = [parameter for parameter in RANGED if isinstance(parameter.default, float)]
 CHOICES = [parameter for parameter in PARAMETERS if parameter.choices]
 FRAMES = [parameter for parameter in PARAMETERS if parameter.name.endswith("_frame")]
 

@@ -43,6 +43,7 @@ PROMISED: dict[str, object] = {
     "enable_stamped_cmd_vel": False,
     "axis_signs": [1, 1, 1],
     "delta_frame": "earth",
+    "delta_period": 0.04,
     "pose_byte_order": "big",
     "odom_frame": "odom",
     "base_frame": "base_link",
@@ -85,7 +86,8 @@ def test_every_default_passes_its_own_check_and_is_explained(parameter: Paramete
     assert (parameter.low is None) == (parameter.high is None)
     if isinstance(parameter.default, float):
         assert parameter.unit
-        assert parameter.low is not None, "a number without limits lets NaN through"
+        limited = parameter.low is not None or parameter.choices
+        assert limited, "a number without limits lets NaN through"
 
 
 def test_names_are_unique() -> None:

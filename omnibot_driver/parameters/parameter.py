@@ -28,7 +28,7 @@ class Parameter:
     description: str
     low: float | None = None
     high: float | None = None
-    choices: tuple[int | str, ...] = ()
+    choices: tuple[int | float | str, ...] = ()
     fixed: bool = False
 
     @property

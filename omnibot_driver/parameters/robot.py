@@ -5,6 +5,7 @@
 from typing import Final
 
 from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, GYRO_COUNTS_PER_DPS
+from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S
 from omnibot_driver.parameters.parameter import Parameter
 
 ROBOT: Final = (
@@ -22,6 +23,15 @@ ROBOT: Final = (
         "What the board's odometry deltas are: differences of two positions in its earth frame,"
         " motion along its own axes, or (older firmware) counts of its wheels.",
         choices=("earth", "body", "wheel_counts"),
+        fixed=True,
+    ),
+    Parameter(
+        "delta_period",
+        0.04,
+        "s",
+        "Time from one of the board's odometry deltas to the next. The manual has 25 Hz in one"
+        " place, 10 Hz in another; the driver says so if the board keeps to another.",
+        choices=DELTA_PERIODS_S,
         fixed=True,
     ),
     Parameter(

@@ -29,6 +29,7 @@ def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
         base_radius_m=values["base_radius"],
         counts_per_revolution=values["counts_per_revolution"],
         delta_frame=values["delta_frame"],
+        delta_period_s=values["delta_period"],
         pose_byte_order=values["pose_byte_order"],
         imu=ImuScale(accel_range_g=values["accel_range"], gyro_range_dps=values["gyro_range"]),
     )

@@ -56,6 +56,7 @@ DECISIONS = {
     "counts_per_revolution",
     "axis_signs",
     "delta_frame",
+    "delta_period",
     "pose_byte_order",
     "accel_range",
     "gyro_range",

@@ -5,6 +5,7 @@
 import math
 import struct
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -80,6 +81,35 @@ def test_four_imu_messages_come_for_each_odometry(probe: Probe) -> None:
     probe.wait_for(lambda: stamp_s(imu[-1]) >= end_s)
     between = sum(begin_s < stamp_s(message) <= end_s for message in imu)
     assert between / 75 == pytest.approx(4.0, abs=0.15)
+
+
+@pytest.mark.parametrize("told_s", [0.1, 0.04])
+def test_a_board_at_10_hz_needs_its_delta_period(
+    start_board: Start, start_driver: Start, probe_of: Start, told_s: float
+) -> None:
+    """Then the twist is right; otherwise the driver says which value to set, and nothing else."""
+    board: PtyBoard = start_board(running=True, delta_period_s=0.1)
+    driver: Driver = start_driver(board.path, delta_period=told_s)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    odometry, commands = probe.listen(Odometry, "odom"), probe.publisher(Twist, "cmd_vel")
+    twist = Twist()
+    twist.linear.x = 0.3
+
+    def drives() -> bool:
+        commands.publish(twist)
+        return len(odometry) > 40
+
+    probe.wait_for_graph(drives)
+    told = "set the parameter `delta_period` to 0.1"
+    if told_s == 0.04:
+        driver.wait_for_line(told)
+        return
+    assert told not in driver.output
+    speeds = [message.twist.twist.linear.x for message in odometry[-10:]]
+    assert sum(speeds) / len(speeds) == pytest.approx(0.3, abs=0.02)
+    steps = [stamp_s(after) - stamp_s(before) for before, after in pairwise(odometry[-10:])]
+    assert sum(steps) / len(steps) == pytest.approx(0.1, abs=0.01)
 
 
 def test_odometry_moves_with_the_robot(probe: Probe, board: PtyBoard) -> None:
