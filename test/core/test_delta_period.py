@@ -9,15 +9,18 @@ import pytest
 from bench import Bench
 from line import DELTA, Line
 from robots import reconnect
+from streams import BYTE_S, TICK_S, frames_of
 
 from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.omnibot import FrameDecoder
+from omnibot_driver.core.omnibot.evidence import Context, Expectation
 from omnibot_driver.core.omnibot.frames import DeltaFrame, ImuFrame, PoseFrame
 from omnibot_driver.core.omnibot.modes import ModeTracker
 from omnibot_driver.core.omnibot.rhythm import Rhythm
 from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, Schedule
 from omnibot_driver.core.omnibot.sequence import Sequence
 from omnibot_driver.core.supervisor import Request
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 
 TEN_HZ_S = 0.1
 EVERY_PERIOD = pytest.mark.parametrize("period_s", DELTA_PERIODS_S)
@@ -66,6 +69,40 @@ def test_twist_pose_and_stamps_are_right_at_any_rate(period_s: float, frame: str
     assert figures.board.rates_hz == (100.0, pytest.approx(1 / period_s), 5.0)
     assert (figures.board.faults, figures.tally.lost_imu, figures.tally.gaps) == (0, 0, 0)
     assert bench.notices == []
+
+
+@EVERY_PERIOD
+def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s: float) -> None:
+    """Every frame of it, and none is thought odd for its place."""
+    board = SimulatedBoard(BoardSettings(running=True, delta_period_s=period_s))
+    ticks = [board.step() for _ in range(600)]
+    stream = b"".join(ticks)
+    expected = [frame for _, frame in frames_of(stream)]
+    in_ticks = [(data, number * TICK_S) for number, data in enumerate(ticks)]
+    in_bytes = [
+        (data[place : place + 1], at_s + place * BYTE_S)
+        for data, at_s in in_ticks
+        for place in range(len(data))
+    ]
+    for pieces in (in_ticks, in_bytes, [(stream, 0.0)]):
+        decoder, found = FrameDecoder(schedule=Schedule(period_s)), []
+        for data, at_s in pieces:
+            found += decoder.feed(data, at_s)
+        assert found + decoder.flush(100.0) == expected
+        assert decoder.statistics.faults == 0
+
+
+def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_10_hz() -> None:
+    """Four and five are not; at 25 Hz it is the other way round."""
+    delta, pose = DeltaFrame(0, 0, 0, 8), PoseFrame(0.0, 0.0, 0.0, 5)
+    last = PoseFrame(0.0, 0.0, 0.0, 4)
+    for schedule, right in ((Schedule(0.1), True), (Schedule(), False)):
+        expectation = Expectation(16384.0, schedule)
+        for imus, deltas, on_beat in ((10, 2, right), (4, 5, not right)):
+            before = Context(seq=7, pose=last, imus=imus, deltas=deltas, turned=0)
+            assert (expectation.weigh(delta, before)[0] == 0.0) is on_beat
+            after = before._replace(imus=0)
+            assert (expectation.weigh(pose, after)[0] == 0.0) is on_beat
 
 
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 9, 10, 11, 30, 60, 100, 300])
