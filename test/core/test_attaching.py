@@ -218,7 +218,7 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 
 
 def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
-    """Not before two of them agree, not after a long gap until the next, not while it is assumed."""
+    """Not before two of them agree, not after a long gap until the next, not while assumed."""
     odometry = Odometry(SETTINGS)
     assert not odometry.heading_known
     attach(odometry, heading(1.0))
