@@ -139,7 +139,7 @@ def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoar
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop")
     button.publish(Bool(data=True))
-    assert board.wait_for(lambda b: newest(b).kind == "estop", 20.0)
+    assert board.wait_for(lambda b: "estop" in [c.kind for c in list(b.commands)[-2:]], 20.0)
     probe.wait_for(lambda: active and active[-1].data)
     button.publish(Bool(data=False))
     with board.lock:
@@ -147,7 +147,8 @@ def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoar
     assert board.wait_for(lambda b: len(b.commands) > count + 10, 20.0)
     with board.lock:
         later = list(board.board.commands)[count + 1 :]
-    assert {command.kind for command in later} == {"estop"}
+    assert {command.kind for command in later} == {"estop", "wheels"}
+    assert not any(any(command.values) for command in later)
 
 
 def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
