@@ -235,6 +235,9 @@ class Diagnosis:
         elif tripped:
             level = Level.WARN
             message = "the motion monitor has stopped the robot: the log says what it saw"
+        elif not commands.monitored:
+            level = Level.WARN
+            message = "the motion monitor is off: set `motion_monitor` to true to have it back"
         elif refused:
             level, message = Level.WARN, f"lately: {refusals.last}"
         elif too_large:

@@ -32,7 +32,7 @@ NEVER: Final = math.inf
 
 class Driving:
     """``stream`` is what goes out; ``obeys``: whether the robot can be expected to do it;
-    ``interlock`` refuses motion after it did not.
+    ``interlock`` refuses motion after it did not; ``monitored``: whether that is looked after.
     """
 
     def __init__(
@@ -45,6 +45,7 @@ class Driving:
         control: ControlMethod,
         *,
         obeys: bool,
+        monitored: bool,
     ) -> None:
         self._stop = board.stop()
         self.stream = CommandStream(
@@ -55,7 +56,7 @@ class Driving:
         self.interlock = MotionInterlock()
         self._board, self._axis_signs = board, axis_signs
         self._monitor = MotionMonitor()
-        self._obeys = obeys
+        self._obeys, self._monitored = obeys, monitored
 
     def configure(self, limits: SpeedLimits, commands: CommandSettings, now: float) -> list[str]:
         """New settings, from the next command and frame on; sentences for the user.
@@ -83,6 +84,18 @@ class Driving:
             return [f"robot stopped, the current command does not fit the new scale: {error}"]
         return []
 
+    @property
+    def monitored(self) -> bool:
+        """Whether a robot that does not move as commanded is stopped."""
+        return self._monitored and self._obeys
+
+    @monitored.setter
+    def monitored(self, monitored: bool) -> None:
+        if monitored is not self._monitored:
+            self._monitored = monitored
+            self._monitor.begin()
+            self.interlock.start()
+
     def figures(self, now: float) -> CommandFigures:
         """Who commands, and how."""
         current = self.stream.current
@@ -91,6 +104,7 @@ class Driving:
             age_s=now - self.stream.commanded_at,
             limited=self._helm.limited,
             estop=self.stream.latched,
+            monitored=self.monitored or not self._obeys,
             trips=self.interlock.trips,
             interlock=self.interlock.reason(self.stream.settings.timeout_s),
         )
@@ -133,12 +147,12 @@ class Driving:
     ) -> list[str]:
         """Compare what the robot did with what was commanded; sentences for the user."""
         self.stream.proof.look(reading, now)
-        fault = self._check(reading, estimates, now) if self._obeys else None
+        fault = self._check(reading, estimates, now) if self.monitored else None
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
         """``count``: displacements so far that no robot can have made; sentences for the user."""
-        fault = self._monitor.count_refused(count, now) if self._obeys else None
+        fault = self._monitor.count_refused(count, now) if self.monitored else None
         return self._react_to(fault, now)
 
     def _check(

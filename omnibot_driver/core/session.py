@@ -56,6 +56,8 @@ class SessionSettings:
     odometry: OdometrySettings
     motion: MotionLimits = field(default_factory=MotionLimits)
     imu: ImuCorrection = field(default_factory=ImuCorrection)
+    motion_monitor: bool = True
+    """Whether a robot that does not move as commanded is stopped."""
 
 
 class Session:
@@ -89,6 +91,7 @@ class Session:
             axis_signs,
             control,
             obeys=obeys,
+            monitored=settings.motion_monitor,
         )
         self._commands = self._driving.stream
         self._heard_at = self._came_at = -math.inf
@@ -162,6 +165,7 @@ class Session:
         ``board``: new settings of the board's own, in which the present command is said as well.
         """
         self._notify(self._driving.configure(settings.limits, settings.commands, now))
+        self._driving.monitored = settings.motion_monitor
         if board is not None:
             self._board.settings = board
             self._notify(self._driving.encode_anew(now))

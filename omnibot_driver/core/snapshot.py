@@ -24,6 +24,7 @@ class LinkFigures:
 class CommandFigures:
     """``source``: the topic that commands, ``age_s`` old by now; None while nobody does.
 
+    ``monitored``: whether a robot that does not move as commanded is stopped;
     ``trips``: how often the motion monitor has stopped the robot; ``interlock``: what motion is
     refused until, in a sentence; empty while it is allowed.
     """
@@ -32,6 +33,7 @@ class CommandFigures:
     age_s: float = 0.0
     limited: int = 0
     estop: bool = False
+    monitored: bool = True
     trips: int = 0
     interlock: str = ""
 

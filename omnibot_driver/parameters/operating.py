@@ -138,6 +138,12 @@ COMMANDS: Final = (
         high=50.0,
     ),
     Parameter(
+        "motion_monitor",
+        True,
+        "",
+        "Stop a robot that moves otherwise than commanded, and refuse motion; off, it drives on.",
+    ),
+    Parameter(
         "linear_scale",
         70.0,
         "LSB/(m/s)",

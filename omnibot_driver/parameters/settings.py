@@ -48,6 +48,7 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
         commands=CommandSettings(
             timeout_s=values["cmd_vel_timeout"], rate_hz=values["command_rate"]
         ),
+        motion_monitor=values["motion_monitor"],
         odometry=OdometrySettings(
             noise=OdometryNoise(
                 wheel_drift=values["odom_wheel_drift"],

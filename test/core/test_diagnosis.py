@@ -109,6 +109,7 @@ FAULTS: list[tuple[Change, str, Level, str]] = [
     (lambda r: r.refuse("why"), "Commands", Level.WARN, "lately: why"),
     (lambda r: r.board(saturated=1), "Commands", Level.WARN, "lower the scales"),
     (lambda r: r.command(trips=1), "Commands", Level.WARN, "the motion monitor has stopped"),
+    (lambda r: r.command(monitored=False), "Commands", Level.WARN, "the motion monitor is off"),
     (lambda r: r.command(interlock="why"), "Commands", Level.ERROR, "motion is refused: why"),
     (lambda r: r.command(estop=True), "E-stop", Level.WARN, "~/estop (data: false)"),
     (lambda r: r.count(same_rate=100), "IMU", Level.ERROR, "always the same from the gyro"),

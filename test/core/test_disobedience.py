@@ -61,6 +61,18 @@ def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
     assert advice in notice
 
 
+def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
+    """As a calibration needs it, which measures what is wrong."""
+    bench = started(BoardSettings(running=True, **A_REVERSED))  # type: ignore[arg-type]
+    stopped_after_s(bench, SLOWLY)
+    bench.configure(motion_monitor=False)
+    assert try_to_drive(bench, 2.0) == 20
+    assert not bench.session.figures(bench.now).commands.monitored
+    bench.configure(motion_monitor=True)
+    assert stopped_after_s(bench, SLOWLY) <= 1.0
+    assert bench.session.figures(bench.now).commands.interlock
+
+
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) -> None:
     """It drives back to its origin, 3 m away; it gets 5 cm far."""

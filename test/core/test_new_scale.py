@@ -77,14 +77,14 @@ def test_a_ramp_goes_on_from_where_it_was() -> None:
         bench.drive(0.4)
         bench.run(0.04)
     before = int.from_bytes(last(bench)[3:5], "big")
-    bench.configure_board(linear_scale=140.0)
+    bench.configure_board(linear_scale=84.0)
     bench.run(0.01)
     after = int.from_bytes(last(bench)[3:5], "big")
-    assert 2 * before <= after <= 2 * (before + 1) + 1
+    assert 1.2 * (before - 0.5) - 0.5 <= after <= 1.2 * (before + 1.5) + 0.5
     for _ in range(20):
         bench.drive(0.4)
         bench.run(0.04)
-    assert last(bench) == bytes.fromhex("FF FE 01 00 38 00 00 00 00")
+    assert last(bench) == bytes.fromhex("FF FE 01 00 22 00 00 00 00")
 
 
 def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:

@@ -103,7 +103,7 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")
     terminal.type(" ")
-    assert board.wait_for(lambda b: newest(b)[0] == "estop", 20.0)
+    assert board.wait_for(lambda b: any(c.kind == "estop" for c in b.commands), 20.0)
     terminal.wait_for("LATCHED")
     terminal.type("R")
     terminal.wait_for("Release")

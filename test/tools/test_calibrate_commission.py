@@ -48,6 +48,7 @@ def test_the_whole_walk_finds_what_was_planted(
         code = robot.calibrate("commission", answer=User(robot.port, "0++"))
         said = told(capsys)
         assert code == 0, said
+        assert parameters_of(robot.driver)["motion_monitor"] is True
         assert "That cannot be: wheel A alone was commanded" in said
         assert "+y is reversed" in said
         assert "delta_frame is read at the start" in said

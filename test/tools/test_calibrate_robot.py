@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from calibrate_rig import BUSY_S, Rig
+from calibrate_rig import BUSY_S, Rig, parameters_of
 from driver_process import PATIENCE_S
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
@@ -117,6 +117,21 @@ def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> Non
     with pytest.raises(ToolError, match="does not move when told"):
         robot.drive(steady(SLOWLY, 10.0), BOUNDS)
     robot.set_parameters({"linear_scale": 70.0})
+
+
+def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
+    """It is off only while a motion is measured that it would stop."""
+    seen = []
+
+    def interrupt() -> None:
+        seen.append(robot.parameters["motion_monitor"])
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(Interrupted):
+        robot.drive(steady(SLOWLY, 10.0), BOUNDS, monitored=False, show=once(interrupt))
+    assert seen == [False]
+    assert parameters_of(rigged.driver)["motion_monitor"] is True
+    assert rigged.port.wait_for(stands, PATIENCE_S)
 
 
 def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(

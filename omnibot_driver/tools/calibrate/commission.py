@@ -242,7 +242,7 @@ class Walk:
             angular_acceleration=math.inf,
         )
         law = stairs(plan) if len(plan) > 1 else steady(plan[0][1], plan[0][0])
-        log: Log = self._robot.drive(law, bounds, topic=topic, obeys=obeys)
+        log: Log = self._robot.drive(law, bounds, topic=topic, obeys=obeys, monitored=False)
         return log
 
 

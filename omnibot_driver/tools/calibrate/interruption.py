@@ -7,7 +7,8 @@ Inside ROS an exception at any place would leave the executor half done.
 
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Self
 
@@ -24,7 +25,7 @@ class Interruption:
     """While it is entered, the signals are its own. Outside the main thread it hears nothing."""
 
     def __init__(self) -> None:
-        self._requested = self._asking = False
+        self._requested = self._asking = self._deferred = False
 
     def __enter__(self) -> Self:
         self._before = {}
@@ -43,8 +44,17 @@ class Interruption:
 
     def check(self) -> None:
         """Raises Interrupted once a signal has come."""
-        if self._requested:
+        if self._requested and not self._deferred:
             raise Interrupted("interrupted: the robot is told to stand still, nothing was written")
+
+    @contextmanager
+    def deferred(self) -> Iterator[None]:
+        """What is done here is done to its end; a signal counts afterwards."""
+        self._deferred = True
+        try:
+            yield
+        finally:
+            self._deferred = False
 
     def reading(self, read: Callable[[str], str]) -> Callable[[str], str]:
         """The same way of asking, but a signal ends it."""

@@ -10,7 +10,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from typing import Any, Final
 
@@ -109,13 +109,15 @@ class Robot(Listener):
         *,
         topic: Topic = "cmd_vel",
         obeys: bool = True,
+        monitored: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
         """Move as the law says, within the bounds, then stand still; what was heard meanwhile.
 
         ``show`` is told the seconds. Raises ToolError, with the robot told to stand still, on
         whatever is not as it should be: e-stop, lost data, another commander, no motion. Without
-        ``obeys`` the last of these is what is to be found out.
+        ``obeys`` the last of these is what is to be found out. Where it is how fast or which way
+        the robot moves, the driver's motion monitor must not stop it: ``monitored`` is false.
         """
         if self.parameters["control_method"] != "velocity":
             raise ToolError(
@@ -126,10 +128,11 @@ class Robot(Listener):
         self._foreign = None
         stands = False
         try:
-            try:
-                self._follow(law, bounds, topic, obeys, show)
-            finally:
-                stands = self._halt(topic)
+            with nullcontext() if monitored else self._unmonitored():
+                try:
+                    self._follow(law, bounds, topic, obeys, show)
+                finally:
+                    stands = self._halt(topic)
             self._require_sound()
         except ToolError as error:
             if stands:
@@ -138,6 +141,20 @@ class Robot(Listener):
         if not stands:
             raise ToolError(UNRULY)
         return self.log
+
+    @contextmanager
+    def _unmonitored(self) -> Iterator[None]:
+        """Without the driver's motion monitor, which stops a robot whose settings are wrong."""
+        before = {"motion_monitor": self.parameters["motion_monitor"]}
+        self.set_parameters({"motion_monitor": False})
+        try:
+            yield
+        except ToolError:
+            with self._interruption.deferred(), suppress(ToolError):
+                self.set_parameters(before)
+            raise
+        with self._interruption.deferred():
+            self.set_parameters(before)
 
     def _follow(
         self,
