@@ -22,6 +22,10 @@ STOP_UNSEEN: Final = (
     " 5 s each time; check by eye that the robot stands"
 )
 STOP_UNANSWERED: Final = "stop unconfirmed: the board is not responding"
+STOP_UNMEASURED: Final = (
+    "stop unconfirmed: no odometry frames come from the board, so Stop was sent for 5 s; check by"
+    " eye that the robot stands, and check cable and hub"
+)
 STOP_UNHEEDED: Final = (
     "stop unconfirmed: Stop was sent for 5 s and the robot still moves; if it is not being pushed,"
     " the board is not receiving: switch the motors off by hand and check the cable"
@@ -72,11 +76,16 @@ class Bulletin:
         self._told.add(sentence)
         return [sentence]
 
-    def unconfirmed(self, mode: Mode) -> list[str]:
-        """Stop was repeated for its whole time, and nothing showed that the robot stands."""
+    def unconfirmed(self, mode: Mode, *, measured: bool) -> list[str]:
+        """Stop was repeated for its whole time, and nothing showed that the robot stands.
+
+        ``measured``: displacements came meanwhile.
+        """
         if mode is Mode.IMU_ONLY:
             return self.once(STOP_UNSEEN)
-        return [STOP_UNANSWERED if mode is Mode.UNKNOWN else STOP_UNHEEDED]
+        if mode is Mode.UNKNOWN:
+            return [STOP_UNANSWERED]
+        return [STOP_UNHEEDED if measured else STOP_UNMEASURED]
 
     def standing(self, sentence: str) -> list[str]:
         """What holds now, empty for nothing; told when it begins to hold."""

@@ -360,7 +360,8 @@ class Session:
             data += due
         if self._commands.unconfirmed:
             self._commands.unconfirmed = False
-            self._notify(self._bulletin.unconfirmed(self._board.mode))
+            measured = self._commands.proof.measured
+            self._notify(self._bulletin.unconfirmed(self._board.mode, measured=measured))
         return data
 
     def take_events(self) -> list[Event]:

@@ -24,6 +24,7 @@ class StopProof:
     """``proved``: Stop went out, no motion since, and the robot has stood for ``STILL_S``.
 
     ``owed``: motion went out, and since then nothing has proved that the robot stands.
+    ``measured``: a displacement has come since Stop went out.
     """
 
     def __init__(self) -> None:
@@ -32,7 +33,7 @@ class StopProof:
 
     def begin(self) -> None:
         """Nothing is known of the robot."""
-        self.proved = False
+        self.proved = self.measured = False
         self._stopped_at = math.inf
         self._still_s = 0.0
 
@@ -53,6 +54,7 @@ class StopProof:
         """A displacement arrived."""
         if not reading.duration_s or now < self._stopped_at + UNDER_WAY_S:
             return
+        self.measured = True
         moves = (
             math.hypot(reading.dx_m, reading.dy_m) > STILL_MPS * reading.duration_s
             or abs(reading.dyaw_rad) > STILL_RADPS * reading.duration_s

@@ -3,10 +3,13 @@
 """When a robot counts as standing, by its displacements."""
 
 import pytest
+from bench import Bench
 from hypothesis import given
 from hypothesis import strategies as st
+from robots import driving
 
 from omnibot_driver.core.board import DisplacementReading
+from omnibot_driver.core.omnibot.frames import DELTA_HEADER
 from omnibot_driver.core.stop_proof import STILL_MPS, STILL_RADPS, StopProof
 
 PERIOD_S = 0.04
@@ -114,3 +117,35 @@ def test_whatever_came_before_standing_for_long_enough_proves_it(
     for number in range(4):
         proof.look(moved(speed_mps, rate_radps), 100.0 + number * PERIOD_S)
     assert proof.proved
+
+
+def without_deltas(bench: Bench) -> None:
+    """All of them are lost from now on; IMU frames and poses arrive."""
+    step = bench.board.step
+
+    def heard() -> bytes:
+        step()
+        sent = [each.data for each in bench.board.sent if each.tick == bench.board.tick]
+        return b"".join(data for data in sent if not data.startswith(DELTA_HEADER))
+
+    bench.board.step = heard  # type: ignore[method-assign]
+
+
+def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it() -> None:
+    """It stood, and was said to move, as all odometry frames were lost."""
+    bench = driving()
+    without_deltas(bench)
+    bench.run(8.0)
+    assert bench.still()
+    (said,) = (text for text in bench.notices if "unconfirmed" in text)
+    assert "no odometry frames come" in said
+
+
+def test_the_log_says_that_a_robot_moves_where_displacements_show_it() -> None:
+    """It does not hear Stop, and no motion monitor says so."""
+    bench = driving()
+    bench.configure(motion_monitor=False)
+    bench.hears = False
+    bench.run(8.0)
+    (said,) = (text for text in bench.notices if "unconfirmed" in text)
+    assert "still moves" in said
