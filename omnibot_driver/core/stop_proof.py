@@ -15,7 +15,10 @@ STILL_MPS: Final = 0.01
 STILL_RADPS: Final = 0.03
 """Above two encoder counts of a wheel in 40 ms, below the slowest linear command (0.014 m/s)."""
 STILL_S: Final = 0.1
-"""Three displacements of 40 ms: one alone may be damaged, or be from before the wheels turned."""
+"""Three displacements of 40 ms."""
+AT_LEAST: Final = 2
+"""Displacements, where one is as long: one alone may be damaged, or be from before the wheels
+turned."""
 UNDER_WAY_S: Final = 0.05
 """A displacement that arrives so soon after Stop went out may have ended before Stop arrived."""
 
@@ -35,7 +38,7 @@ class StopProof:
         """Nothing is known of the robot."""
         self.proved = self.measured = False
         self._stopped_at = math.inf
-        self._still_s = 0.0
+        self._still_s, self._still = 0.0, 0
 
     def moved(self) -> None:
         """A command to move went out."""
@@ -60,5 +63,6 @@ class StopProof:
             or abs(reading.dyaw_rad) > STILL_RADPS * reading.duration_s
         )
         self._still_s = 0.0 if moves else self._still_s + reading.duration_s
-        self.proved = self._still_s >= STILL_S
+        self._still = 0 if moves else self._still + 1
+        self.proved = self._still_s >= STILL_S and self._still >= AT_LEAST
         self.owed = self.owed and not self.proved

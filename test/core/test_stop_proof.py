@@ -46,6 +46,15 @@ def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof)
     assert shown(proof, 0.0, 0.0, 0.0)
 
 
+def test_one_displacement_alone_is_no_proof_however_long_it_is(proof: StopProof) -> None:
+    """Boards with a `delta_period` of 0.1 s send such."""
+    long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
+    proof.look(long, 10.1)
+    assert not proof.proved
+    proof.look(long, 10.2)
+    assert proof.proved
+
+
 def test_without_stop_standing_still_proves_nothing() -> None:
     """A command may be on its way to the wheels."""
     assert not shown(StopProof(), *[0.0] * 50)
