@@ -13,14 +13,17 @@ from collections.abc import Sequence
 from typing import Final
 
 from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.motion_envelope import dot, speed_of
+from omnibot_driver.core.motion_envelope import NOISE_MPS, NOISE_RADPS, dot, speed_of
 from omnibot_driver.core.setpoint_history import AT_REST
 
 MOST_M: Final = 0.6
 """More than the integrators hold at full effort is not made good."""
 FORGOTTEN_S: Final = 6.0
 HELD_PART: Final = 0.7
-"""A robot that does not reach this part of its set-points is held by something."""
+"""A robot that does not reach this part of its set-points is held by something..."""
+BACK_MPS: Final = 0.5 * NOISE_MPS
+BACK_RADPS: Final = 0.5 * NOISE_RADPS
+"""... but not one that goes the other way faster than this: that explains nothing."""
 LEVER_M: Final = 0.15
 """About the distance of the wheels from the centre: what a turn is worth at a rim."""
 
@@ -60,11 +63,13 @@ class WindUp:
             return
         if wanted := speed_of(current):
             along = dot(motion, current) / wanted if heading_known else speed_of(motion)
-            if along < HELD_PART * min(dot(each, current) for each in newest) / wanted:
+            least = min(dot(each, current) for each in newest) / wanted
+            if -BACK_MPS < along < HELD_PART * least:
                 lost_mps = wanted - max(0.0, along)
         if rate := current.yaw_rate_radps:
             along = math.copysign(motion.yaw_rate_radps, motion.yaw_rate_radps * rate)
-            if along < HELD_PART * min(each.yaw_rate_radps * rate for each in newest) / abs(rate):
+            least = min(each.yaw_rate_radps * rate for each in newest) / abs(rate)
+            if -BACK_RADPS < along < HELD_PART * least:
                 lost_mps += LEVER_M * (abs(rate) - max(0.0, along))
         if lost_mps:
             self.way_m = min(MOST_M, self.way_m + lost_mps * seconds)

@@ -78,6 +78,25 @@ def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
         assert drive.monitor.commanded == BodyTwist(*commanded)
 
 
+@pytest.mark.parametrize("time_constant_s", [0.1, 0.2, 0.3])
+@pytest.mark.parametrize("speed_mps", [0.1, 0.3, 0.5])
+def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
+    speed_mps: float, time_constant_s: float
+) -> None:
+    """Of the moment in which it does 0.05 m/s. It was taken for one that is held, whose controllers
+    wind up, and that explained its motion for up to 0.4 s."""
+    drive = Drive()
+    drive.command(speed_mps, 0.0, 0.0)
+    wrong_s = -time_constant_s * math.log(1.0 - 0.05 / speed_mps)
+    for step in range(1, 50):
+        since_s = step * PERIOD_S
+        part = 1.0 - math.exp(-(since_s - PERIOD_S / 2) / time_constant_s)
+        if found := drive.move((-part * speed_mps, 0.0, 0.0), PERIOD_S):
+            break
+    assert first(found)[1] is Fault.WRONG_WAY
+    assert since_s - wrong_s <= 0.3
+
+
 @pytest.mark.parametrize("motion", [(0.05, 0.0, 0.0), (0.0, -0.3, 0.0), (0.0, 0.0, 0.15)])
 def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_s(
     motion: Triple,
