@@ -134,6 +134,18 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
     assert rigged.port.wait_for(stands, PATIENCE_S)
 
 
+def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
+    """It stayed off until the driver was started again."""
+
+    def fail() -> None:
+        raise RuntimeError("a defect")
+
+    with pytest.raises(RuntimeError, match="a defect"):
+        robot.drive(steady(SLOWLY, 10.0), BOUNDS, monitored=False, show=once(fail))
+    assert parameters_of(rigged.driver)["motion_monitor"] is True
+    assert rigged.port.wait_for(stands, PATIENCE_S)
+
+
 def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
     robot: Robot, rigged: Rig
 ) -> None:

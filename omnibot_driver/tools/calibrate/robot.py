@@ -149,7 +149,7 @@ class Robot(Listener):
         self.set_parameters({"motion_monitor": False})
         try:
             yield
-        except ToolError:
+        except BaseException:  # after a defect of this program it must not stay off either
             with self._interruption.deferred(), suppress(ToolError):
                 self.set_parameters(before)
             raise
