@@ -182,7 +182,10 @@ class Driving:
             self.interlock.trip(now)
             seen = "" if fault is Fault.BEYOND_LIMITS else self._seen()
             until = self.interlock.until.value
-            return [f"{fault.value}{seen}; robot stopped: {ADVICE[fault]}. {until}"]
+            advice = ADVICE[fault]
+            if self._board.advice:
+                advice = f"{self._board.advice}; otherwise {advice}"
+            return [f"{fault.value}{seen}; robot stopped: {advice}. {until}"]
         if fault is Fault.UNCOMMANDED:
             self.stream.halt(now)
         return [fault.value] if self._monitor.is_news(fault) else []

@@ -60,7 +60,9 @@ class Fault(Enum):
 
 
 ADVICE: Final = {
-    Fault.WRONG_WAY: "check `control_method`, `axis_signs` and the wiring of the wheels",
+    Fault.WRONG_WAY: (
+        "check `control_method`, `axis_signs`, `delta_frame` and the wiring of the wheels"
+    ),
     Fault.WRONG_TURN: "check `control_method`, `axis_signs` and the wiring of the wheels",
     Fault.TOO_FAST: "check `control_method` and `linear_scale`",
     Fault.TURNS_TOO_FAST: (

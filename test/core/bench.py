@@ -3,7 +3,7 @@
 """A session and a simulated board on one workbench, wired to each other in simulated time."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 from omnibot_driver.core.commands import CommandSettings
 from omnibot_driver.core.events import Event, Notice
@@ -131,6 +131,10 @@ class Bench:
         )
         self.session.configure(self._settings, self.now, board=settings)
         self.settle()
+
+    def read_deltas_as(self, frame: Literal["earth", "body"]) -> None:
+        """Whatever frame the board sends them in."""
+        self.session.configure(self._settings, self.now, board=OmniBotSettings(delta_frame=frame))
 
     def written_since(self, mark: int) -> bytes:
         """What was written after the first ``mark`` writes."""

@@ -18,7 +18,7 @@ from robots import drive_on, driving, estop, push, standing
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.supervisor import Request
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator import BoardPose, BoardSettings, SimulatedBoard
 from omnibot_driver.simulator.motors import WheelGains
 
 WITHIN_S = 0.3
@@ -109,6 +109,28 @@ def test_the_log_gives_the_robots_axes_where_the_boards_are_others() -> None:
     stopped_after_s(bench, FORWARD)
     assert "commanded 0.50, 0.00 m/s" in bench.notices[0]
     assert "measured 1." in bench.notices[0]
+
+
+def test_a_wrong_delta_frame_is_among_what_to_check() -> None:
+    """The robot obeys, but its displacements are read in the other frame; it was not named."""
+    bench = Bench(BoardSettings(running=True, initial_pose=BoardPose(0.0, 0.0, 1571.0)))
+    bench.read_deltas_as("body")
+    bench.open()
+    bench.run(2.0)
+    try_to_drive(bench, 2.0)
+    (text,) = (text for text in bench.notices if "wrong direction" in text)
+    assert "`delta_frame`" in text
+
+
+def test_a_setting_that_the_boards_own_frames_contradict_is_what_to_check() -> None:
+    """Every velocity is too large where deltas come more rarely than the settings have it."""
+    bench = Bench(BoardSettings(running=True))
+    bench.board = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
+    bench.open()
+    bench.run(2.0)
+    try_to_drive(bench, 2.0)
+    (text,) = (text for text in bench.notices if "robot stopped" in text)
+    assert "set the parameter `delta_period` to 0.1; otherwise check `control_method`" in text
 
 
 def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
