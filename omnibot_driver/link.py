@@ -28,7 +28,7 @@ from omnibot_driver.outbox import Delivery, Outbox
 from omnibot_driver.port import Port
 from omnibot_driver.standstill import Standstill, boot_time_s
 
-JOIN_TIMEOUT_S: Final = 2.0
+JOIN_TIMEOUT_S: Final = 3.0
 """Longer than a guard takes to repeat Stop."""
 STANDS_WITHIN_S: Final = 0.5
 """So long an end waits until the robot is seen to stand; then the guard repeats Stop."""

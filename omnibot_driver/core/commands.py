@@ -15,7 +15,10 @@ from omnibot_driver.core.motion import Motion
 from omnibot_driver.core.stop_proof import StopProof
 
 PACE_S: Final = 0.01
-"""The board's control tick: new commands closer together than this would only fill its buffer."""
+"""The board's control tick: frames closer together than this would only fill its buffer."""
+MOTION_PACE_S: Final = 0.018
+"""Between two set-points. More of them would raise the share of time that a lost byte can take
+(docs/integrity.md); commands at 50 Hz are not slowed."""
 STOPPING_S: Final = 1.0
 """Stop is repeated for at least so long..."""
 UNPROVED_S: Final = 5.0
@@ -48,7 +51,7 @@ class CommandStream:
         self._expires_at = -math.inf
         self._stopping_since: float | None = None
         self._urgent = self._fresh = self._switching = False
-        self._said_at = self._fresh_at = self._stop_at = -math.inf
+        self._said_at = self._fresh_at = self._moved_at = self._stop_at = -math.inf
 
     def command(self, motion: Motion, now: float, *, expires_at: float) -> None:
         """The newest command replaces the current one; another authority's is stopped first."""
@@ -71,7 +74,7 @@ class CommandStream:
         """The line is new, and the board has heard nothing of it; a latched e-stop is said."""
         self.discard()
         self.proof.begin()
-        self._said_at = self._fresh_at = self._stop_at = -math.inf
+        self._said_at = self._fresh_at = self._moved_at = self._stop_at = -math.inf
         self._urgent = self.latched
 
     def halt(self, now: float) -> None:
@@ -113,6 +116,8 @@ class CommandStream:
             self._said_at = now
             if new:
                 self._fresh_at = now
+                is_motion = self.current and not self.current.stands and not self._switching
+                self._moved_at = now if is_motion else -math.inf
         self._fresh, self._urgent, self._switching = self._switching, False, False
         return data
 
@@ -127,12 +132,12 @@ class CommandStream:
             return -math.inf
         current = self.current
         if current is not None and self._fresh:
-            return self._fresh_at + PACE_S
+            return max(self._fresh_at + PACE_S, self._moved_at + MOTION_PACE_S)
         if self.latched or self._stopping_since is not None or (current and current.stands):
             return self._said_at + 1.0 / max(self.settings.rate_hz, STOP_RATE_HZ)
         if current is None:
             return math.inf
-        return self._said_at + (1.0 / self.settings.rate_hz if current.settled else PACE_S)
+        return self._said_at + (1.0 / self.settings.rate_hz if current.settled else MOTION_PACE_S)
 
     def _next(self, now: float) -> bytes:
         if self.latched:

@@ -56,7 +56,8 @@ class Driving:
         self.interlock = MotionInterlock()
         self._board, self._axis_signs = board, axis_signs
         self._monitor = MotionMonitor()
-        self._obeys, self._monitored = obeys, monitored
+        self._obeys = obeys
+        self.monitored = monitored
 
     def configure(self, limits: SpeedLimits, commands: CommandSettings, now: float) -> list[str]:
         """New settings, from the next command and frame on; sentences for the user.
@@ -84,15 +85,10 @@ class Driving:
             return [f"robot stopped, the current command does not fit the new scale: {error}"]
         return []
 
-    @property
-    def monitored(self) -> bool:
-        """Whether a robot that does not move as commanded is stopped."""
-        return self._monitored and self._obeys
-
-    @monitored.setter
-    def monitored(self, monitored: bool) -> None:
-        if monitored is not self._monitored:
-            self._monitored = monitored
+    def monitor(self, monitored: bool) -> None:
+        """Stop a robot that does not move as commanded, or let it drive."""
+        if monitored is not self.monitored:
+            self.monitored = monitored
             self._monitor.begin()
             self.interlock.start()
 
@@ -147,12 +143,12 @@ class Driving:
     ) -> list[str]:
         """Compare what the robot did with what was commanded; sentences for the user."""
         self.stream.proof.look(reading, now)
-        fault = self._check(reading, estimates, now) if self.monitored else None
+        fault = self._check(reading, estimates, now) if self.monitored and self._obeys else None
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
         """``count``: displacements so far that no robot can have made; sentences for the user."""
-        fault = self._monitor.count_refused(count, now) if self.monitored else None
+        fault = self._monitor.count_refused(count, now) if self.monitored and self._obeys else None
         return self._react_to(fault, now)
 
     def _check(

@@ -165,7 +165,7 @@ class Session:
         ``board``: new settings of the board's own, in which the present command is said as well.
         """
         self._notify(self._driving.configure(settings.limits, settings.commands, now))
-        self._driving.monitored = settings.motion_monitor
+        self._driving.monitor(settings.motion_monitor)
         if board is not None:
             self._board.settings = board
             self._notify(self._driving.encode_anew(now))

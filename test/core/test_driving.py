@@ -7,6 +7,7 @@ import itertools
 import pytest
 from bench import STOP, Bench, bare
 
+from omnibot_driver.core.commands import PACE_S
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.simulator import BoardSettings
@@ -44,9 +45,9 @@ def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
     bench.run(0.1)
     start = len(bench.written)
     bench.turn_wheels(10.0, 10.0, 10.0)
-    bench.run(0.01)
+    bench.run(0.02)
     bench.drive(0.3)
-    bench.run(0.01)
+    bench.run(0.02)
     assert [bare(data).hex(" ") for _, data in bench.written[start:]] == [
         "ff fe 02 00 00 00 00 00 00",
         "ff fe 02 00 14 00 14 00 14",
@@ -65,8 +66,8 @@ def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
     assert STOP not in [data for _, data in bench.written[start:]]
 
 
-def test_a_step_is_ramped_at_every_control_tick_with_its_direction_kept() -> None:
-    """1 m/s² to 0.3 and 0.4 m/s takes half a second; 70 LSB per m/s."""
+def test_a_step_is_ramped_with_its_direction_kept() -> None:
+    """1 m/s² to 0.3 and 0.4 m/s takes half a second; 70 LSB per m/s; the bench has 10 ms."""
     bench = running(limits=GENTLE)
     start, begun = len(bench.written), bench.now
     for _ in range(6):
@@ -74,9 +75,9 @@ def test_a_step_is_ramped_at_every_control_tick_with_its_direction_kept() -> Non
         bench.run(0.1)
     sent = velocities(bench, start)
     times = [at - begun for at, _ in sent]
-    assert times[:50] == pytest.approx([0.01 * n for n in range(50)])
-    for at, (vx, vy, yaw_rate) in sent[:50]:
-        speed = min(0.5, 1.0 * (at - begun + 0.01))
+    assert times[:25] == pytest.approx([0.02 * n for n in range(25)])
+    for at, (vx, vy, yaw_rate) in sent[:25]:
+        speed = min(0.5, 1.0 * (at - begun + PACE_S))
         assert (vx, vy) == pytest.approx((70 * 0.6 * speed, 70 * 0.8 * speed), abs=0.51)
         assert yaw_rate == 0
     assert sent[-1][1] == [21, 28, 0]
@@ -105,8 +106,8 @@ def test_turning_is_ramped_by_its_own_limit() -> None:
     bench.drive(0.0, 0.0, 0.5)
     bench.run(0.3)
     words = [yaw_rate for _, (_, _, yaw_rate) in velocities(bench, start)]
-    assert words[:3] == [10, 20, 30]
-    assert words[24] == words[-1] == 250
+    assert words[:3] == [10, 30, 50]  # a tick of the bench is 10 ms
+    assert words[13] == words[-1] == 250
 
 
 def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:

@@ -67,7 +67,9 @@ def estop_into_a_full_port(rig: Rig) -> None:
         answer = rig.probe.call(SetBool, "estop", data=True)
         rig.findings.expect("takes nothing" in answer.message, f"it said {answer.message!r}")
         obeyed = len(rig.line.board.commands)
-    assert rig.wait_for_board(lambda line: line.board.estopped), "no e-stop arrived"
+    assert rig.wait_for_board(
+        lambda line: any(each.kind == "estop" for each in list(line.board.commands)[obeyed:])
+    ), "no e-stop arrived"
     rig.expect_still(rig.line.tick, "the e-stop has arrived", 0.0)
     kinds = [command.kind for command in list(rig.line.board.commands)[obeyed:]]
     ours = kinds[next(n for n, kind in enumerate(kinds) if kind not in ("velocity", "reset")) :]
