@@ -167,7 +167,7 @@ def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None
     for example, (a, b, c) in wishes:
         wheels = example.word == "wheels"
         sent = BOARD.wheels((a, b, c)) if wheels else BOARD.velocity(BodyTwist(a, b, c))
-        assert bytes(8) + example.data == sent
+        assert bytes(4) + example.data == sent
 
 
 def test_the_false_frames_lie_at_their_offsets_and_do_not_deceive_the_decoder() -> None:

@@ -73,6 +73,11 @@ def ms(seconds: float) -> str:
     return f"{1e3 * seconds:.1f} ms" if seconds else "-"
 
 
+def share(score: Score) -> str:
+    """Of the time under way, that with a set-point nobody commanded."""
+    return f"{score.uncommanded_s / score.driving_s:.3%}" if score.driving_s else "-"
+
+
 def table(scores: Scores) -> tuple[list[str], bool]:
     """Rows of the tables, and whether every bound holds on every receiver."""
     lines = [
@@ -92,7 +97,7 @@ def table(scores: Scores) -> tuple[list[str], bool]:
             lines.append(
                 f"| | {receiver} | {none_of(score.strayed, score.trials)} |"
                 f" {none_of(score.overdue + score.for_good, score.trials)} |"
-                f" {score.uncommanded_s / score.driving_s:.3%} |"
+                f" {share(score)} |"
                 f" {one_in(score.long, score.frames)} | {ms(score.longest_s)} |"
                 f" {score.false_letters} |"
                 f" {'**missed**: ' + ', '.join(missed) if missed else 'holds'} |"
@@ -161,12 +166,13 @@ def _others(scores: Scores) -> Iterator[str]:
         score = over(scores, fault=fault)
         each = {name: over(scores, fault=fault, receiver=name) for name in RECEIVERS}
         most = max(each, key=lambda name: each[name].strayed)
-        share = max(score.uncommanded_s / score.driving_s for score in each.values())
+        shares = (one.uncommanded_s / one.driving_s for one in each.values() if one.driving_s)
+        most_of_time = max(shares, default=0.0)
         yield (
             f"| {fault} | {one_in(score.strayed, score.trials)}"
             f" ({one_in(each[most].strayed, each[most].trials)}: {most}) | {ms(score.stray_s)} |"
             f" {one_in(score.overdue, score.trials)} | {one_in(score.for_good, score.trials)} |"
-            f" {score.uncommanded_s / score.driving_s:.3%} ({share:.3%}) |"
+            f" {share(score)} ({most_of_time:.3%}) |"
             f" {one_in(score.long, score.frames)} | {ms(score.longest_s)} |"
             f" {score.false_letters} | {score.added_letters} | {score.false_estops} |"
         )

@@ -18,7 +18,7 @@ from omnibot_driver.core.limits import MAX_WORD, slow, to_nearest
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
 from omnibot_driver.core.omnibot.modes import Happening
-from omnibot_driver.core.omnibot.outbound import begins_with_a_letter, harmless, transmission
+from omnibot_driver.core.omnibot.outbound import begins_with_a_letter, harmless, motion, transmission
 from omnibot_driver.core.omnibot.schedule import TICK_S, Schedule
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
 from omnibot_driver.core.omnibot.translation import Translation
@@ -200,7 +200,7 @@ class OmniBot:
                 " one of these numbers into a command to start, pause or reset the board: choose"
                 " another goal, or call ~/reset, which begins a new frame where the robot stands"
             )
-        return transmission(frames.command(frames.VELOCITY_MODE, *harmless(counts)))
+        return motion(frames.command(frames.VELOCITY_MODE, *harmless(counts)))
 
     def _drive(self, mode: int, counts: Vector3) -> bytes:
         a, b, c = counts
@@ -208,4 +208,4 @@ class OmniBot:
             self._saturated += 1
             a, b, c = slow(counts, MAX_WORD)
         words = harmless((a, b, c))
-        return transmission(frames.command(mode, *words)) if any(words) else STOP
+        return motion(frames.command(mode, *words)) if any(words) else STOP
