@@ -34,6 +34,8 @@ STANDS_WITHIN_S: Final = 0.5
 """So long an end waits until the robot is seen to stand; then the guard repeats Stop."""
 UNGUARDED_S: Final = 1.5
 """So long where no guard does."""
+SILENCE_S: Final = 0.25
+"""So long it then waits, without a word, to see that the last Stop was no damaged one."""
 BACK_OFF: Final = 1.5
 LONGEST_WAIT_S: Final = 2.0
 WAITED: Final = "motion command refused: it waited while the driver stood still; send it again"
@@ -206,9 +208,13 @@ class Link:
         self._session.leave(now := time.monotonic())
         self._settle()
         alone = self._port is not None and self._keeper is None and not self._port.ends_with_us
-        end = now + (UNGUARDED_S if alone else STANDS_WITHIN_S)
+        self._await_standstill(now + (UNGUARDED_S if alone else STANDS_WITHIN_S))
+        if self._session.stands and self._session.fall_silent(now := time.monotonic()):
+            self._await_standstill(now + SILENCE_S)
+
+    def _await_standstill(self, until: float) -> None:
         while self._port is not None and self._write_error is None and not self._session.stands:
-            if (left_s := end - time.monotonic()) <= 0.0:
+            if (left_s := until - time.monotonic()) <= 0.0:
                 break
             self._changed.wait(left_s)
 
@@ -363,7 +369,7 @@ class Link:
             self._outbox.put(partial(self._deliver, events))
 
     def _write(self, data: bytes) -> None:
-        if self._port is None or self._write_error is not None:
+        if not data or self._port is None or self._write_error is not None:
             return
         try:
             self._port.write(data)

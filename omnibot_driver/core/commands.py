@@ -45,6 +45,8 @@ class CommandStream:
         self.current: Motion | None = None
         """The command that is being carried out."""
         self.commanded_at = -math.inf
+        self.quiet = False
+        """It has fallen silent, and nothing was commanded since."""
         self.unconfirmed = False
         """Stop was repeated for ``UNPROVED_S`` and a robot that was driven is not seen to stand."""
         self._stop, self._emergency_stop = stop, emergency_stop
@@ -80,8 +82,16 @@ class CommandStream:
     def halt(self, now: float) -> None:
         """Discard the command, Stop at once, and repeat it until the robot is seen to stand."""
         self.discard()
+        self.quiet = False
         self._stopping_since = now
         self._urgent = now - self._stop_at >= PACE_S
+
+    def fall_silent(self, now: float) -> None:
+        """Nothing goes out any more, and whether the last Stop arrived is to be seen anew."""
+        self.discard()
+        self.quiet = True
+        self.proof.begin()
+        self.proof.stopped(now)
 
     def latch(self) -> None:
         """Emergency stop and Stop at once, twice; then both in turn until the release."""

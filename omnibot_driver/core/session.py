@@ -332,6 +332,16 @@ class Session:
         self._leaving = True
         self._commands.halt(now)
 
+    def fall_silent(self, now: float) -> bool:
+        """Stop is not repeated any more: the last one may have been damaged, so it is proved anew.
+
+        Whether the board can show that.
+        """
+        if self._board.mode is not Mode.NOMINAL or self.estop_active:
+            return False
+        self._commands.fall_silent(now)
+        return True
+
     @property
     def stands(self) -> bool:
         """The board has shown that the robot stands, and no motion was commanded since."""
@@ -339,7 +349,8 @@ class Session:
 
     def farewell(self, on_exit: OnExit) -> bytes:
         """The last bytes to write before the port is closed."""
-        data = self._supervisor.farewell(on_exit)
+        proved = self._commands.quiet and self.stands
+        data = self._supervisor.farewell(on_exit, proved=proved)
         self._commands.discard()
         return data + (self._board.emergency_stop() if self.estop_active else b"")
 

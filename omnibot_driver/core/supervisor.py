@@ -202,9 +202,10 @@ class Supervisor:
         elif self.phase is Phase.STARTING and now - self._said_at >= START_RETRY_S:
             self._say(self._board.start(), now)
 
-    def farewell(self, on_exit: OnExit) -> bytes:
-        """The last bytes to the board: it is stopped in any case, and left so."""
-        return LAST_STOPS * self._board.stop() + self._last_request(on_exit)
+    def farewell(self, on_exit: OnExit, *, proved: bool) -> bytes:
+        """The last bytes to the board, which stops it unless it is ``proved`` to stand."""
+        stops = 0 if proved else LAST_STOPS
+        return stops * self._board.stop() + self._last_request(on_exit)
 
     def _last_request(self, on_exit: OnExit) -> bytes:
         settled = self.phase is Phase.SETTLED

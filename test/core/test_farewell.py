@@ -3,8 +3,8 @@
 """The last bytes before the port is closed: the robot is stopped, and left as it was asked for."""
 
 import pytest
-from bench import EMERGENCY_STOP, PAUSE, RESET, STOP, Bench
-from robots import paused, standing
+from bench import EMERGENCY_STOP, PAUSE, RESET, STOP, TICK_S, Bench
+from robots import driving, paused, standing
 
 from omnibot_driver.core.supervisor import Request
 from omnibot_driver.simulator import BoardMode
@@ -61,3 +61,43 @@ def test_a_farewell_under_estop_repeats_the_estop(bench: Bench) -> None:
     """The last thing the board hears is that it must not move."""
     bench.session.estop(True, bench.now)
     assert bench.session.farewell("stop") == 3 * STOP + EMERGENCY_STOP
+
+
+def left(bench: Bench) -> None:
+    """As the link does it, until the robot is seen to stand."""
+    bench.session.leave(bench.now)
+    bench.settle()
+    while not bench.session.stands:
+        bench.run(TICK_S)
+
+
+def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
+    """Then nothing more is said that the line could damage."""
+    bench = driving()
+    left(bench)
+    assert bench.session.fall_silent(bench.now)
+    start = len(bench.written)
+    assert not bench.session.stands
+    bench.run(0.2)
+    assert bench.session.stands
+    assert bench.written_since(start) == b""
+    assert bench.session.farewell("stop") == b""
+
+
+def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
+    """A byte was added within it."""
+    bench = driving()
+    left(bench)
+    bench.board.receive(bytes(8) + bytes.fromhex("FF FE 02 00 20 00 20 00 20"))
+    assert bench.session.fall_silent(bench.now)
+    bench.run(0.2)
+    assert not bench.session.stands
+    assert bench.session.farewell("stop") == 3 * STOP
+
+
+def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
+    """Its motors are off."""
+    bench = paused()
+    left(bench)
+    assert not bench.session.fall_silent(bench.now)
+    assert bench.session.stands

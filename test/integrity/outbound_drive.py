@@ -25,7 +25,7 @@ from omnibot_driver.core.odometry import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.core.supervisor import OnExit
-from omnibot_driver.link import STANDS_WITHIN_S
+from omnibot_driver.link import SILENCE_S, STANDS_WITHIN_S
 
 READ_S: Final = 0.002
 """What the board sends in a tick is read so long after it."""
@@ -146,21 +146,24 @@ class _Rehearsal:
         self._session.take_events()
 
     def _leave(self, changes: dict[int, Shown], shown: Shown, tick: int) -> None:
-        """As the link does: Stop until the robot is seen to stand, the farewell, or the guard."""
+        """As the link does: Stop until the robot is seen to stand, a last look, or the guard."""
         session, now = self._session, self._scene.exits_s
-        gives_up_s = now + STANDS_WITHIN_S
         session.leave(now)
         self._settle(now)
-        while not session.stands:
-            read_s = (tick + 1) * TICK_S + READ_S
-            now = min(read_s, max(now + CLOCK_S, session.wake_at), gives_up_s)
-            if now == gives_up_s:
+        for patience_s in (STANDS_WITHIN_S, SILENCE_S):
+            gives_up_s = now + patience_s
+            while not session.stands:
+                read_s = (tick + 1) * TICK_S + READ_S
+                now = min(read_s, max(now + CLOCK_S, session.wake_at), gives_up_s)
+                if now == gives_up_s:
+                    break
+                if now == read_s:
+                    tick += 1
+                    shown = changes.get(tick, shown)
+                    session.receive(self._teller.step(shown), now)
+                self._settle(now)
+            if not (session.stands and session.fall_silent(now)):
                 break
-            if now == read_s:
-                tick += 1
-                shown = changes.get(tick, shown)
-                session.receive(self._teller.step(shown), now)
-            self._settle(now)
         stands = session.stands
         self._writes.append(Write(now, session.farewell(self._scene.on_exit)))
         if not stands:

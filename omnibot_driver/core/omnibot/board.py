@@ -18,7 +18,12 @@ from omnibot_driver.core.limits import MAX_WORD, slow, to_nearest
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
 from omnibot_driver.core.omnibot.modes import Happening
-from omnibot_driver.core.omnibot.outbound import begins_with_a_letter, harmless, motion, transmission
+from omnibot_driver.core.omnibot.outbound import (
+    begins_with_a_letter,
+    harmless,
+    motion,
+    transmission,
+)
 from omnibot_driver.core.omnibot.schedule import TICK_S, Schedule
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
 from omnibot_driver.core.omnibot.translation import Translation
