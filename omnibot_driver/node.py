@@ -156,7 +156,7 @@ class OmniBotDriver(Node):
         self.create_subscription(
             Float32MultiArray, "wheel_cmd", self._obey("wheel_cmd", _wheels), 1
         )
-        obey = self._obey("cmd_pose", self._pose, may_be_old=lambda _goal: True)
+        obey = self._obey("cmd_pose", self._pose, may_be_old=messages.is_stamped)
         self.create_subscription(PoseStamped, "cmd_pose", obey, 1)
         self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
 

@@ -181,7 +181,10 @@ class Driving:
             advice = ADVICE[fault]
             if self._board.advice:
                 advice = f"{self._board.advice}; otherwise {advice}"
-            return [f"{fault.value}{seen}; robot stopped: {advice}. {until}"]
+            return [
+                f"{fault.value}{seen}; robot stopped: {advice}; if it comes and goes, check the"
+                f" cable to the board. {until}"
+            ]
         if fault is Fault.UNCOMMANDED:
             self.stream.halt(now)
         return [fault.value] if self._monitor.is_news(fault) else []
@@ -208,8 +211,11 @@ class Driving:
             for estimate in estimates
             if isinstance(estimate, OdometryEstimate)
         ):
-            why = "the robot drives away from it: does the board's switch stand on position?"
             self.interlock.trip(now)
+            why = (
+                "the robot drives away from it: does the board's switch stand on position?"
+                f" {self.interlock.until.value}"
+            )
         else:
             return []
         self.stream.halt(now)

@@ -17,8 +17,10 @@ RISING_S: Final = 0.16
 """A robot that is slower than all set-points of this time is held by something."""
 UNEXPLAINED_M: Final = 0.0035
 UNEXPLAINED_RAD: Final = 0.016
-LARGEST_PART: Final = 0.45
-"""Part of these limits that one displacement adds at the most: it takes three in a row."""
+LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
+"""Part of these limits that one displacement adds at the most: it takes three in a row, or two long
+ones."""
+LONG_S: Final = 0.06
 
 
 class FollowingError:
@@ -74,9 +76,11 @@ class FollowingError:
         elif self._wind_up.way_m and self._wind_up.pay(way_mps, turn_radps, seconds):
             self._way_m = self._turn_rad = 0.0
         else:
-            self._way_m = _sum(self._way_m, way_mps * seconds, UNEXPLAINED_M)
-            self._turn_rad = _sum(self._turn_rad, turn_radps * seconds, UNEXPLAINED_RAD)
+            part = LARGEST_PART_OF_A_LONG_ONE if seconds > LONG_S else LARGEST_PART
+            most_m, most_rad = part * UNEXPLAINED_M, part * UNEXPLAINED_RAD
+            self._way_m = _sum(self._way_m, way_mps * seconds, most_m)
+            self._turn_rad = _sum(self._turn_rad, turn_radps * seconds, most_rad)
 
 
-def _sum(before: float, outside: float, limit: float) -> float:
-    return before + min(outside, LARGEST_PART * limit) if outside > 0.0 else 0.0
+def _sum(before: float, outside: float, most: float) -> float:
+    return before + min(outside, most) if outside > 0.0 else 0.0

@@ -61,6 +61,18 @@ def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
     assert advice in notice
 
 
+@pytest.mark.parametrize(
+    ("board", "command"),
+    [(FAST, FORWARD), (FAST, SLOWLY), (A_REVERSED, SLOWLY), (ALL_REVERSED, TURN_SLOWLY)],
+)
+def test_with_a_displacement_every_0_1_s_two_of_them_are_enough(
+    board: dict[str, object], command: Triple
+) -> None:
+    """And the one that began before."""
+    bench = started(BoardSettings(running=True, delta_period_s=0.1, **board))  # type: ignore[arg-type]
+    assert stopped_after_s(bench, command) <= 0.4
+
+
 def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
     """As a calibration needs it, which measures what is wrong."""
     bench = started(BoardSettings(running=True, **A_REVERSED))  # type: ignore[arg-type]
