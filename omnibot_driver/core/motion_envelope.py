@@ -20,7 +20,8 @@ NOISE_MPS: Final = 0.02
 NOISE_RADPS: Final = 0.05
 """Encoder counts, rounding, a slope that a slow controller gives way to."""
 SIDEWAYS: Final = 0.1
-"""Part of a speed that may go in any direction: the heading is uncertain, wheels are not alike."""
+"""Part of a speed that may go in any direction: the heading is uncertain, wheels are not alike, a
+robot that stops overshoots. Of a yaw rate too."""
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.02
 """Turning of a robot that drives, and the reverse, by wheels that differ by some per cent."""
@@ -55,9 +56,10 @@ def outside(
     way_mps, rate = speed_of(motion) - STRETCH * fastest, motion.yaw_rate_radps
     if heading_known and fastest:
         way_mps = _outside_hull(motion, explained)
-    way_mps -= NOISE_MPS + SIDEWAYS * max(fastest, change) + SKEW_MPS_PER_RADPS * max(left, right)
-    turn_radps = max(rate - STRETCH * left, -rate - STRETCH * right)
-    turn_radps -= NOISE_RADPS + SKEW_RADPS_PER_MPS * fastest + CHANGING_RADPS_PER_MPS * change
+    turn_radps, fastest_turn = max(rate - STRETCH * left, -rate - STRETCH * right), max(left, right)
+    way_mps -= NOISE_MPS + SIDEWAYS * max(fastest, change) + SKEW_MPS_PER_RADPS * fastest_turn
+    turn_radps -= NOISE_RADPS + SIDEWAYS * fastest_turn
+    turn_radps -= SKEW_RADPS_PER_MPS * fastest + CHANGING_RADPS_PER_MPS * change
     return way_mps, turn_radps
 
 
