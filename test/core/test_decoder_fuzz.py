@@ -131,7 +131,7 @@ def work(
     def searching(search: lattice._Search, *of: Any) -> None:
         nonlocal done
         forward(search, *of)
-        done += len(search._data) + len(search._edges) * (1 + len(search._gaps))
+        done += len(search._data) + len(search._edges) * (1 + len(search._pauses.gaps))
 
     most = 0
     with monkeypatch.context() as patch:

@@ -35,8 +35,9 @@ from omnibot_driver.core.omnibot.frames import (
     decode_measured,
     measure,
 )
+from omnibot_driver.core.omnibot.late_reads import IDLE_S
 from omnibot_driver.core.omnibot.lattice import Piece, read
-from omnibot_driver.core.omnibot.pauses import BYTE_S, GAP_S, IDLE_S, LATE_S, TICK_BYTES, Pauses
+from omnibot_driver.core.omnibot.pauses import BYTE_S, LATE_S, TICK_BYTES, Pauses
 from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 
 SPOKEN_AGAINST: Final = 3.0
@@ -95,11 +96,9 @@ class FrameDecoder:
         if self.at_rest and self._take_whole(data, pause_s, found):
             return found
         pauses = self._pauses
-        if pause_s > GAP_S and len(data) <= TICK_BYTES:
-            if pause_s >= IDLE_S:
-                self._close(found)
-            else:
-                pauses.add(pause_s, len(data), len(self._held))
+        if pause_s >= IDLE_S and len(data) <= TICK_BYTES:
+            self._context = self._context.damaged() if self._held else NOTHING_KNOWN
+        pauses.read(pause_s, len(data), len(self._held), now)
         self._held += data
         self._settle(found, closed=False)
         self.at_rest = pauses.sharp and pauses.between and self._in_step and not self._held
@@ -129,6 +128,7 @@ class FrameDecoder:
         found: list[Frame] = []
         self.skipped = []
         self.at_rest = False
+        self._pauses.clear()
         self._close(found)
         return found
 
@@ -185,18 +185,23 @@ class FrameDecoder:
         order, context = self._pose_byte_order, self._context
         at, size, walk = 0, len(held), Walk(context)
         while at < size:
-            if not gaps or gaps[-1][0] <= at:  # no pause within what follows
+            paused = gaps and gaps[-1].first > at  # within what follows
+            if not paused:
                 at, context = take_calm(held, at, context, expectation, order, walk)
                 if at == size:
                     break
             length = measure(held, at)
             end = at + length
-            if gaps and self._pauses.within(at, end if length > 0 else size):
-                return self._believe_but_the_last(walk, found)
-            if length == INCOMPLETE and not closed:
+            silent = paused and self._pauses.silent_within(at, size)
+            if length == INCOMPLETE and not (closed or silent):
                 break
             if length <= 0:
                 return self._believe_but_the_last(walk, found)
+            if paused:
+                if self._pauses.undecided(held, at, end):
+                    break
+                if self._pauses.against(held, at, end):
+                    return self._believe_but_the_last(walk, found)
             frame = decode_measured(held[at:end], order)
             cost, after = expectation.weigh(frame, context)
             if cost >= SPOKEN_AGAINST and (
@@ -243,7 +248,7 @@ class FrameDecoder:
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
         """In doubt: take what is sure, drop what stays doubtful. Whether anything was settled."""
-        state = self._context, self._expectation, self._pauses.gaps, self._pose_byte_order
+        state = self._context, self._expectation, self._pauses, self._pose_byte_order
         pieces = read(stretch, *state, in_step=self._in_step, closed=closed)
         half = len(stretch) // 2 if len(stretch) == DOUBT_BYTES else 0
         at = 0

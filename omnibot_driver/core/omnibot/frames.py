@@ -155,6 +155,16 @@ def measure(data: bytes | bytearray, at: int) -> int:
     return length if at + length <= len(data) else INCOMPLETE
 
 
+def length_begun(data: bytes | bytearray, at: int) -> int:
+    """Length in bytes of the frame that this whole header begins; NO_FRAME if it is none."""
+    return _LENGTH_BY_TYPE.get(data[at + 1], NO_FRAME)
+
+
+def is_text(data: bytes | bytearray, at: int) -> bool:
+    """Whether a text begins here, if anything does."""
+    return data[at] == _TEXT_BEGIN
+
+
 def _measure_paused(data: bytes | bytearray, at: int) -> int:
     whole = _PAUSED.match(data, at)
     if whole is not None:

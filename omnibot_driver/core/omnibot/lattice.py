@@ -16,7 +16,6 @@ limit until nothing that matters is beyond it. The outcome is that of searching 
 """
 
 from bisect import bisect_left
-from collections.abc import Sequence
 from math import inf
 from typing import Final
 
@@ -30,6 +29,7 @@ from omnibot_driver.core.omnibot.frames import (
     decode_measured,
     measure,
 )
+from omnibot_driver.core.omnibot.pauses import Pauses
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
@@ -38,10 +38,6 @@ STEP: Final = 5.5
 """What the limit is above the bound at first; then twice that, and so on."""
 BEYOND: Final = 0.025
 """Half the grid of the prices: no sum is at the limit itself, so rounding decides nothing."""
-
-Gap = tuple[int, int, float]
-"""Somewhere from the first place on, and before the second, the line was idle; and the price of a
-frame around it."""
 
 _LENGTHS: Final = {0xFA: 14, 0xFB: 9, 0xFC: 15}
 _HEADERS: Final = tuple(bytes((0xFF, kind)) for kind in _LENGTHS)
@@ -93,7 +89,7 @@ def read(
     data: bytes,
     context: Context,
     expectation: Expectation,
-    gaps: Sequence[Gap],
+    pauses: Pauses,
     pose_byte_order: ByteOrder,
     *,
     in_step: bool,
@@ -103,7 +99,7 @@ def read(
 
     ``in_step``: a frame ended right before; ``closed``: nothing follows, ever.
     """
-    search = _Search(data, context, expectation, gaps, pose_byte_order)
+    search = _Search(data, context, expectation, pauses, pose_byte_order)
     search.run(in_step, closed)
     return search.pieces()
 
@@ -114,12 +110,12 @@ class _Search:
         data: bytes,
         context: Context,
         expectation: Expectation,
-        gaps: Sequence[Gap],
+        pauses: Pauses,
         pose_byte_order: ByteOrder,
     ) -> None:
         self._data = data
         self._expectation = expectation
-        self._gaps = gaps
+        self._pauses = pauses
         self._pose_byte_order = pose_byte_order
         # Node 2 n: in a bad run before byte n; 2 n + 1: at a boundary there; the last: the end.
         self._end = 2 * len(data) + 2
@@ -232,11 +228,7 @@ class _Search:
         self._edge(2 * at + 1, self._end, price + self._idle_within(at, len(self._data)))
 
     def _idle_within(self, start: int, end: int) -> float:
-        if not self._gaps:
-            return 0.0
-        return sum(
-            price for first, before, price in self._gaps if start < first < end and before <= end
-        )
+        return self._pauses.against(self._data, start, end) if self._pauses.gaps else 0.0
 
     def _edge(
         self,

@@ -3,19 +3,19 @@
 """Where the line was idle, and how far that may be trusted.
 
 A board sends a tick's frames at once, so a pause of its line stands between frames. An adapter that
-collects bytes makes pauses of its own, anywhere. Which of the two a pause is, only frames can tell:
-this module counts how often pauses stood where they should. It knows places and times; not what is
-in a frame, nor which frames are believed (``decoder``).
+collects bytes makes pauses of its own, anywhere, and so does a reader that is scheduled late
+(``late_reads``). Which of the first two a pause is, only frames can tell: this module counts how
+often pauses stood where they should. It knows places and times; not what is in a frame, nor which
+frames are believed (``decoder``).
 """
 
 from collections.abc import Sequence
+from math import inf
 from typing import Final
 
 from omnibot_driver.core.omnibot import evidence
-from omnibot_driver.core.omnibot.lattice import Gap
+from omnibot_driver.core.omnibot.late_reads import IDLE_S, Cause, Gap, Read, cause
 
-IDLE_S: Final = 0.1
-"""Longer than any adapter keeps a byte back (16 ms), and ten times the board's 10 ms tick."""
 LATE_S: Final = 0.011
 """While the board runs its line is never idle for longer, unless bytes were lost; an adapter that
 collects bytes for longer shows pauses of its own."""
@@ -40,6 +40,7 @@ class Pauses:
     def __init__(self, byte_s: float) -> None:
         self._byte_s = byte_s
         self.gaps: list[Gap] = []
+        self._reads: list[Read] = []
         self.doubt()
 
     def doubt(self) -> None:
@@ -47,17 +48,22 @@ class Pauses:
         self.sharp = self.between = self.certain = False
         self._sharp = self._between = 0
 
-    def add(self, pause_s: float, arrived: int, place: int) -> None:
-        """Before the bytes that arrived now, and are to be held from this place on."""
-        if pause_s - arrived * self._byte_s <= GAP_S:
-            return
+    def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
+        """So many bytes arrived now, to be held from this place on, so long after the last."""
+        if pause_s - arrived * self._byte_s > GAP_S and arrived <= TICK_BYTES:
+            self._add(pause_s, arrived, place)
+        if self.gaps:
+            self._reads.append(Read(place + arrived, now))
+
+    def _add(self, pause_s: float, arrived: int, place: int) -> None:
+        silent = pause_s >= IDLE_S
         sharp, between = self.sharp, self.between
         if pause_s > LATE_S:
-            sharp = sharp or between  # bytes were lost here, and hardly whole frames
+            sharp = sharp or between or silent  # bytes were lost here, and hardly whole frames
             self._trust(sharp=False, between=False)
         width = 1 if sharp else arrived
-        price = evidence.KNOWN_GAP if between else evidence.GAP
-        self.gaps.append((place, place + width, price))
+        price = evidence.KNOWN_GAP if between or silent else evidence.GAP
+        self.gaps.append(Gap(place, place + width, price, pause_s))
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
         """What came after this pause began with a frame and ended with one."""
@@ -68,24 +74,46 @@ class Pauses:
         """Do they end where frames begin? Then they are the line's, not the adapter's."""
         start = 0
         for end in ends:
-            for first, before, _ in self.gaps:
-                if start <= first < end:
-                    self._trust(sharp=first == start, between=first == start or end < before)
+            for gap in self.gaps:
+                if start <= gap.first < end:
+                    sharp = gap.first == start
+                    self._trust(sharp=sharp, between=sharp or end < gap.before)
             start = end
 
-    def within(self, start: int, end: int) -> bool:
-        """Whether the line was idle between the first and the last of these bytes."""
-        for first, before, _ in self.gaps:  # noqa: SIM110 - the call of a generator costs more
-            if start < first < end and before <= end:
-                return True
-        return False
+    def against(self, data: bytes | bytearray, start: int, end: int) -> float:
+        """What the pauses within these bytes cost, if they are taken for a frame."""
+        return sum(
+            gap.price
+            for gap in self.gaps
+            if gap.within(start, end)
+            and self._cause(gap, data, start, end) is not Cause.LATE_READER
+        )
+
+    def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
+        """Whether what follows may still tell why there was a pause within this frame."""
+        causes = [self._cause(gap, data, start, end) for gap in self.gaps if gap.within(start, end)]
+        return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes
+
+    def silent_within(self, start: int, end: int) -> bool:
+        """Whether nothing was read for long amid these bytes."""
+        return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def forget(self, count: int) -> None:
         """The first bytes are held no longer."""
-        if self.gaps and self.gaps[-1][0] < count:
-            self.gaps = []
-        elif self.gaps:
-            self.gaps = [(a - count, b - count, p) for a, b, p in self.gaps if a >= count]
+        self.gaps = [
+            gap._replace(first=gap.first - count, before=gap.before - count)
+            for gap in self.gaps
+            if gap.first >= count
+        ]
+        first = self.gaps[0].first + count if self.gaps else inf
+        self._reads = [Read(end - count, now) for end, now in self._reads if end > first]
+
+    def clear(self) -> None:
+        """Time tells nothing about the bytes held."""
+        self.gaps, self._reads = [], []
+
+    def _cause(self, gap: Gap, data: bytes | bytearray, start: int, end: int) -> Cause:
+        return cause(gap, self._reads, data, start, end, self._byte_s)
 
     def _trust(self, *, sharp: bool, between: bool) -> None:
         if sharp and between and self.certain:
