@@ -6,9 +6,13 @@ from dataclasses import dataclass
 from random import Random
 
 import parsers
-from carriage import CHUNKERS, FAULTS, GAPS_VISIBLE, receive
+from busy import READERS
+from carriage import CHUNKERS, FAULTS, GAPS_VISIBLE, Chunker, receive
 from judge import Score, judge
 from truth import SCENARIOS, generate
+
+CHUNKINGS: dict[str, Chunker] = {**CHUNKERS, **READERS}
+BUSY_FAULTS = ("none, starting anywhere", "1 byte in 1,000 lost", "1 byte in 100 lost")
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +25,7 @@ class Bound:
     one_wrong_in_visible: int | None
     one_wrong_in_hidden: int | None
     delivered: float
-    chunkers: tuple[str, ...] = tuple(CHUNKERS)
+    chunkers: tuple[str, ...] = tuple(CHUNKINGS)
 
     def one_wrong_in(self, chunker: str) -> int | None:
         """By whether the chunking carries the line's idle gaps."""
@@ -58,13 +62,18 @@ Scores = dict[tuple[str, str, str], Score]
 """By fault, chunking and scenario."""
 
 
+def chunkings(fault: str) -> dict[str, Chunker]:
+    """How streams with this fault are handed over: busy readers with some faults only."""
+    return CHUNKINGS if fault in BUSY_FAULTS else CHUNKERS
+
+
 def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
     """One stream, with every fault in every chunking."""
     truth = generate(SCENARIOS[scenario], seed, seconds)
     scores: Scores = {}
     for fault_name, fault in FAULTS.items():
         received = receive(truth, fault, Random(f"{scenario} {seed} {fault_name}"))
-        for chunker_name, chunker in CHUNKERS.items():
+        for chunker_name, chunker in chunkings(fault_name).items():
             chunks = chunker(received, Random(seed))
             feed, flush = getattr(parsers, parser)()
             score = judge(received, chunks, feed, flush)
@@ -89,6 +98,6 @@ def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
 def over_chunkers(scores: Scores, fault: str, scenario: str) -> Score:
     """The sum of all."""
     total = Score()
-    for chunker in CHUNKERS:
+    for chunker in chunkings(fault):
         total += scores[fault, chunker, scenario]
     return total

@@ -1,0 +1,111 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A busy computer: the line is as good as ever, and the reader is scheduled late.
+
+A read returns what is there when it is scheduled. So each of these takes the pieces in which an
+adapter hands bytes over, and says which read brings them when. Times in seconds.
+"""
+
+from bisect import bisect_right
+from collections.abc import Callable
+from random import Random
+
+from carriage import CHUNKERS, Chunker, Chunks, Received
+
+LATE_SHARE, LATE_S = 0.02, (0.002, 0.030)
+"""Of the reads, and by how much: beside a navigation stack on a small computer."""
+STALL_SHARE, STALL_S = 0.002, (0.001, 0.300)
+JITTER_S = 60e-6
+"""Mean of what any wake-up takes, exponentially distributed."""
+READ_S = 20e-6
+"""What a read takes that need not wait."""
+SEGMENT_BYTES = (300, 6000)
+"""After so many the line is mixed anew."""
+
+
+def delay_s(random: Random) -> float:
+    """How late one wake-up is."""
+    late_s = random.expovariate(1.0 / JITTER_S)
+    kind = random.random()
+    if kind < LATE_SHARE:
+        late_s += random.uniform(*LATE_S)
+    elif kind < LATE_SHARE + STALL_SHARE:
+        late_s += random.uniform(*STALL_S)
+    return late_s
+
+
+def read(pieces: Chunks, random: Random, most: Callable[[], int]) -> Chunks:
+    """A reader that takes what is there, but no more than ``most`` bytes at once."""
+    ends, times = zip(*pieces, strict=True)
+    chunks: Chunks = []
+    start, now = 0, 0.0
+    while start < ends[-1]:
+        piece = bisect_right(ends, start)  # the first that is not taken whole
+        now += READ_S
+        if times[piece] > now:
+            now = times[piece] + delay_s(random)
+        there = ends[bisect_right(times, now) - 1]
+        start = min(there, start + most())
+        chunks.append((start, now))
+    return chunks
+
+
+def few_bytes_straddling(received: Received, random: Random) -> Chunks:
+    """1 to 8 bytes, with the last of them, however long it takes to come."""
+    chunks, at = [], 0
+    while at < len(received.times_s):
+        at = min(len(received.times_s), at + random.randint(1, 8))
+        chunks.append((at, received.times_s[at - 1]))
+    return chunks
+
+
+def all_at_once(pieces: Chunker) -> Chunker:
+    """All that is there, however late."""
+    return lambda received, random: read(pieces(received, random), random, lambda: 1 << 30)
+
+
+def in_parts(received: Received, random: Random) -> Chunks:
+    """Single bytes; of what is there, 1 to 8 bytes at a time."""
+    pieces = CHUNKERS["single bytes"](received, random)
+    return read(pieces, random, lambda: random.randint(1, 8))
+
+
+def each_by_itself(received: Received, random: Random) -> Chunks:
+    """Pieces of 1 to 8 bytes, none of which waits for another: each may be late."""
+    chunks: Chunks = []
+    now = 0.0
+    for end, time in few_bytes_straddling(received, random):
+        now = max(now + READ_S, time + delay_s(random))
+        chunks.append((end, now))
+    return chunks
+
+
+def mixed(received: Received, random: Random) -> Chunks:
+    """Pieces of every kind, taken whole or in parts, now so, now otherwise."""
+    kinds = [*list(CHUNKERS.values())[:4], few_bytes_straddling]
+    pieces: Chunks = []
+    at, size = 0, len(received.data)
+    while at < size:
+        end = min(size, at + random.randint(*SEGMENT_BYTES))
+        part = Received(received.data[at:end], received.times_s[at:end], [], [], received.truth)
+        last_s = pieces[-1][1] if pieces else 0.0
+        pieces += [(at + n, max(time, last_s)) for n, time in random.choice(kinds)(part, random)]
+        at = end
+    largest = 1 << 30
+
+    def most() -> int:
+        nonlocal largest
+        if random.random() < STALL_SHARE:
+            largest = random.choice([1, 8, 32, 1 << 30, 1 << 30])
+        return random.randint(1, largest) if largest <= 8 else largest
+
+    return read(pieces, random, most)
+
+
+READERS: dict[str, Chunker] = {
+    "single bytes, late": all_at_once(CHUNKERS["single bytes"]),
+    "1-8 bytes, late": all_at_once(few_bytes_straddling),
+    "single bytes, late, in parts": in_parts,
+    "1-8 bytes, each late by itself": each_by_itself,
+    "all mixed": mixed,
+}
