@@ -27,6 +27,7 @@ from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 
 JITTER_S = 60e-6
 """Mean of the host's own delay at each read, exponentially distributed."""
+READ_S = 20e-6
 EPOCH_S = 100.0
 SETTLED_S = 2.0
 EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stall of 2 s": 2.0}
@@ -175,7 +176,7 @@ def _reads(
     """A host that wakes up a little late at every chunk, and once not for long."""
     at, now = 0, 0.0
     for number, (end, time) in enumerate(chunks):
-        now = max(now, time + random.expovariate(1.0 / JITTER_S))
+        now = max(now + READ_S, time + random.expovariate(1.0 / JITTER_S))
         if stalls_at <= now < stalls_at + stall_s:
             if number + 1 < len(chunks) and chunks[number + 1][1] < stalls_at + stall_s:
                 continue

@@ -210,7 +210,10 @@ class FrameDecoder:
                 return self._believe_but_the_last(walk, found)
             if end == size and not closed and evidence.may_be_lent(frame, context):
                 parted = self._arrived < length  # what is sent at once begins after a pause
-                if not self._pauses.sharp or (parted and expectation.more_is_due(frame, context)):
+                at_pace = self._pauses.at_pace  # else the next frame may have begun
+                if not self._pauses.sharp or (
+                    parted and (not at_pace or expectation.more_is_due(frame, context))
+                ):
                     break
             walk.add(end, frame, context)
             context = after

@@ -14,7 +14,7 @@ from math import inf
 from typing import Final
 
 from omnibot_driver.core.omnibot import evidence
-from omnibot_driver.core.omnibot.late_reads import IDLE_S, Cause, Gap, Read, cause
+from omnibot_driver.core.omnibot.late_reads import IDLE_S, PACE_S, Cause, Gap, Read, cause
 
 LATE_S: Final = 0.011
 """While the board runs its line is never idle for longer, unless bytes were lost; an adapter that
@@ -34,12 +34,14 @@ class Pauses:
 
     ``sharp``: as a rule, the first byte that comes after a pause begins a frame; ``between``: as a
     rule, a frame begins somewhere in what comes after it. ``certain``: both have held for so long
-    that once more changes nothing. ``byte_s``: how long the line takes for a byte.
+    that once more changes nothing. ``at_pace``: the last bytes came without a pause.
+    ``byte_s``: how long the line takes for a byte.
     """
 
     def __init__(self, byte_s: float) -> None:
         self._byte_s = byte_s
         self.gaps: list[Gap] = []
+        self.at_pace = False
         self._reads: list[Read] = []
         self.doubt()
 
@@ -50,7 +52,9 @@ class Pauses:
 
     def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
         """So many bytes arrived now, to be held from this place on, so long after the last."""
-        if pause_s - arrived * self._byte_s > GAP_S and arrived <= TICK_BYTES:
+        idle_s = pause_s - arrived * self._byte_s
+        self.at_pace = idle_s < PACE_S
+        if idle_s > GAP_S and arrived <= TICK_BYTES:
             self._add(pause_s, arrived, place)
         if self.gaps:
             self._reads.append(Read(place + arrived, now))
