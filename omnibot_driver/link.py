@@ -24,6 +24,7 @@ from omnibot_driver.core.session import Session
 from omnibot_driver.core.snapshot import LinkFigures, SessionFigures
 from omnibot_driver.core.supervisor import OnExit
 from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
+from omnibot_driver.kernel_counts import waited_s
 from omnibot_driver.outbox import Delivery, Outbox
 from omnibot_driver.port import Port
 from omnibot_driver.standstill import Standstill, boot_time_s
@@ -36,6 +37,8 @@ UNGUARDED_S: Final = 1.5
 """So long where no guard does."""
 SILENCE_S: Final = 0.25
 """So long it then waits, without a word, to see that the last Stop was no damaged one."""
+COUNT_EVERY_S: Final = 1.0
+"""The kernel is asked what it lost."""
 BACK_OFF: Final = 1.5
 LONGEST_WAIT_S: Final = 2.0
 WAITED: Final = "motion command refused: it waited while the driver stood still; send it again"
@@ -74,6 +77,8 @@ class Link:
         self._url = url
         self._trouble = ""
         self._opened = self._received = self._sent = 0
+        self._overruns: int | None = None
+        self._count_at = -math.inf
         self._open = partial(Port, url, baudrate)
         self._last_words = last_words
         self.reconnect_interval_s = self._wait_s = reconnect_interval_s
@@ -164,6 +169,8 @@ class Link:
                 opened=self._opened,
                 received_bytes=self._received,
                 sent_bytes=self._sent,
+                overruns=self._overruns,
+                waited_s=waited_s(self._threads[0].native_id or 0),
             )
             return link, self._session.figures(time.monotonic())
 
@@ -255,6 +262,7 @@ class Link:
             self._port, self._write_error, self._keeper = port, None, keeper
             self._trouble = ""
             self._opened += 1
+            self._overruns, self._count_at = None, -math.inf
             self._session.opened(time.monotonic())
             if notices:
                 self._outbox.put(partial(self._deliver, notices))
@@ -295,10 +303,20 @@ class Link:
             with self._lock:
                 self._wait_s = self.reconnect_interval_s
                 self._received += len(data)
+                self._count(port, now)
                 stopped = self._heed_standstill(boot_time_s())
                 if self._session.heed(now) or stopped:
                     self._settle()
             self._outbox.deliver()
+
+    def _count(self, port: Port, now: float) -> None:
+        """With the lock held: what the kernel lost, now and then."""
+        if now < self._count_at:
+            return
+        self._count_at = now + COUNT_EVERY_S
+        self._overruns = port.overruns
+        if self._overruns:
+            self._session.overran(self._overruns)
 
     def _detach(self, port: Port, *, comes_back: bool) -> None:
         """Whatever ended the reading, the robot is not left with a command to carry out."""

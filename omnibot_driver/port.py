@@ -22,6 +22,7 @@ from typing import Final
 import serial
 
 from omnibot_driver.core.errors import LinkError
+from omnibot_driver.kernel_counts import overruns
 
 READ_TIMEOUT_S: Final = 0.2
 """How soon a port that cannot be interrupted returns to look whether it is still wanted."""
@@ -78,6 +79,12 @@ class Port:
         """Nothing outside this process hears what is written."""
         return self._url.lower().startswith("sim://")
 
+    @property
+    def overruns(self) -> int | None:
+        """How often the kernel lost bytes since the port is open; None: it does not count."""
+        count = None if self.descriptor is None else overruns(self.descriptor)
+        return None if count is None else count - self._overruns_before
+
     def read(self) -> bytes:
         """All that has come in, waiting for the first byte; nothing after a while without one.
 
@@ -133,6 +140,7 @@ class Port:
         with contextlib.suppress(io.UnsupportedOperation):
             self.descriptor = self._serial.fileno()
         descriptor = self.descriptor
+        self._overruns_before = overruns(descriptor) or 0 if descriptor is not None else 0
         self._is_terminal = descriptor is not None and os.isatty(descriptor)
         if type(self._serial) is serial.Serial:  # what its URLs are made of may look at each read
             self._arrivals = select.poll()

@@ -27,6 +27,9 @@ LARGEST_SKEW_PPM: Final = 115.0
 SKEW_KNOWN_S: Final = 75.0
 """Arrivals count for so long; a skew that lasts less may be that of a computer that was busy."""
 
+BUSY_SHARE: Final = 0.1
+"""Of the time that the reader waits for the processor."""
+
 RUNNING: Final = ("nominal", "imu_only")
 
 
@@ -64,6 +67,7 @@ class Diagnosis:
         self._counts: dict[str, tuple[int, float]] = {}
         self._window: deque[tuple[float, SessionFigures]] = deque()
         self._skewed_since = math.inf
+        self._waits: deque[tuple[float, float]] = deque()
 
     def judge(
         self, link: LinkFigures, session: SessionFigures, refusals: Refusals, now: float
@@ -73,7 +77,7 @@ class Diagnosis:
         return [
             self._link(link, now),
             self._board(session, now),
-            self._stream(session, now),
+            self._stream(link, session, now),
             self._time(session, now),
             self._commands(session, refusals, now),
             self._estop(session),
@@ -112,6 +116,8 @@ class Diagnosis:
             "Reconnects": str(reconnects),
             "Bytes received": str(link.received_bytes),
             "Bytes sent": str(link.sent_bytes),
+            "Overruns": "not counted" if link.overruns is None else str(link.overruns),
+            "Reader waited (s)": "" if link.waited_s is None else f"{link.waited_s:.1f}",
         }
         return Status("Link", level, message, values)
 
@@ -135,11 +141,13 @@ class Diagnosis:
             message = "the board has restarted: unless you reset it, check its power supply"
         return Status("Board", level, message, {"Mode": session.state, "Restarts": str(restarts)})
 
-    def _stream(self, session: SessionFigures, now: float) -> Status:
+    def _stream(self, link: LinkFigures, session: SessionFigures, now: float) -> Status:
         tally, refused = session.tally, session.refused
         readings_refused = refused.imu + refused.displacements + refused.poses
         damaged = self._grew("faults", session.board.faults, now)
         lossy = self._grew("gaps", tally.gaps, now)
+        overran = self._grew("overruns", link.overruns or 0, now)
+        waiting = self._waiting_share(link, now)
         doubtful = self._grew("refused", readings_refused, now)
         rates = self._rates_hz()
         wanted = (
@@ -154,8 +162,17 @@ class Diagnosis:
         ):
             level = Level.WARN
             message = (
-                "rates are off: bytes are lost, or this computer is too busy to read them;"
+                f"rates are off: the reader waits {waiting:.0%} of the time for the processor;"
+                " this computer is too busy: reduce its load"
+                if waiting > BUSY_SHARE
+                else "rates are off: bytes are lost, or this computer is too busy to read them;"
                 " check cable, hub and load"
+            )
+        elif overran:
+            level = Level.WARN
+            message = (
+                "the serial port overran: bytes are lost in this computer, not on the line;"
+                " reduce its load"
             )
         elif damaged or lossy:
             level, message = Level.WARN, "bytes are lost on the line: check cable, hub and ground"
@@ -164,6 +181,11 @@ class Diagnosis:
             message = (
                 "readings that cannot be true were refused: the line changes bits, or a limit of"
                 " motion (fastest_…) is set too low"
+            )
+        elif waiting > BUSY_SHARE:
+            message = (
+                "complete, but read late: the reader waits"
+                f" {waiting:.0%} of the time for the processor"
             )
         names = ("IMU", "Odometry", "Pose")
         shown = rates or (math.nan,) * 3
@@ -183,6 +205,16 @@ class Diagnosis:
             "Poses refused": str(refused.poses),
         }
         return Status("Stream", level, message, values)
+
+    def _waiting_share(self, link: LinkFigures, now: float) -> float:
+        """Of the recent time that the reader was ready to run and did not."""
+        if link.waited_s is None:
+            return 0.0
+        self._waits.append((now, link.waited_s))
+        while now - self._waits[0][0] > RECENT_S:
+            self._waits.popleft()
+        since, before_s = self._waits[0]
+        return (link.waited_s - before_s) / (now - since) if now > since else 0.0
 
     @property
     def _span_s(self) -> float:

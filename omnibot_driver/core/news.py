@@ -52,14 +52,21 @@ class Bulletin:
 
     def __init__(self) -> None:
         self._lost, self._refused = News(), News()
+        self._overruns = 0
         self._told: set[str] = set()
         self._standing = ""
 
-    def counted(self, lost: int, refused: Refused, now: float) -> list[str]:
-        """What was lost and refused since it was last told."""
+    def counted(self, lost: int, overruns: int, refused: Refused, now: float) -> list[str]:
+        """What was lost and refused since it was last told. ``overruns``: of the port."""
         news = []
         if more := self._lost.since_told(lost, now):
-            news.append(f"odometry frames lost on the line: {more}; check cable and hub")
+            overrun, self._overruns = overruns > self._overruns, overruns
+            news.append(
+                f"odometry frames lost in this computer: {more}; the serial port overran: reduce"
+                " the load, or use another adapter"
+                if overrun
+                else f"odometry frames lost on the line: {more}; check cable and hub"
+            )
         total = refused.imu + refused.displacements + refused.poses
         if more := self._refused.since_told(total, now):
             news.append(

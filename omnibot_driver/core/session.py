@@ -99,6 +99,7 @@ class Session:
         self._last: Reading | None = None
         self._tell_at = -math.inf
         self._bulletin = Bulletin()
+        self._overruns = 0
         self._events: list[Event] = []
         self.shown = (self.state, self.estop_active)
         """As of the last ``take_events``: nothing that is only passed through amid an input."""
@@ -215,6 +216,10 @@ class Session:
             self._commands.proof.begin()
             self._commands.halt(now)
         return []
+
+    def overran(self, count: int) -> None:
+        """So often the port has lost bytes since it was opened: they never came to us."""
+        self._overruns = count
 
     def heed(self, now: float) -> bool:
         """What comes of the bytes that were heard last. False: nothing to write or to tell."""
@@ -422,7 +427,9 @@ class Session:
     def _tell(self, now: float) -> None:
         self._tell_at = now + TELL_EVERY_S
         bulletin, measuring, advice = self._bulletin, self._measuring, self._board.advice
-        news = bulletin.counted(measuring.tally.lost_displacements, measuring.refused, now)
+        news = bulletin.counted(
+            measuring.tally.lost_displacements, self._overruns, measuring.refused, now
+        )
         news += bulletin.standing(self._inertial.advice)
         if advice is not None:
             news += bulletin.once(advice)

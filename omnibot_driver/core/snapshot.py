@@ -11,13 +11,19 @@ from omnibot_driver.core.tally import Tally
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkFigures:
-    """``trouble``: why the port cannot be had, in a sentence; empty while it is open."""
+    """``trouble``: why the port cannot be had, in a sentence; empty while it is open.
+
+    ``overruns``: how often the kernel lost bytes since the port was opened; ``waited_s``: how long
+    the reader was ready to run and did not; None where that is not counted.
+    """
 
     port: str
     trouble: str = ""
     opened: int = 0
     received_bytes: int = 0
     sent_bytes: int = 0
+    overruns: int | None = None
+    waited_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

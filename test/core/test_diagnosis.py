@@ -100,6 +100,7 @@ FAULTS: list[tuple[Change, str, Level, str]] = [
     (lambda r: r.count(restarts=1), "Board", Level.WARN, "check its power supply"),
     (lambda r: r.board(faults=1), "Stream", Level.WARN, "check cable, hub and ground"),
     (lambda r: r.count(gaps=1), "Stream", Level.WARN, "check cable, hub and ground"),
+    (lambda r: r.connect(overruns=1), "Stream", Level.WARN, "in this computer, not on the line"),
     (lambda r: r.set(refused=Refused(0, 1, 0)), "Stream", Level.WARN, "set too low"),
     (lambda r: r.per_second.update(imu=80), "Stream", Level.WARN, "too busy"),
     (lambda r: r.per_second.update(imu=120), "Stream", Level.WARN, "too busy"),
@@ -130,7 +131,7 @@ def test_each_fault_alone_raises_its_own_status(
     assert said in robot.statuses[name].message
 
 
-HAPPENINGS = [FAULTS[number] for number in (0, 3, 4, 5, 6, 12, 13)]
+HAPPENINGS = [FAULTS[number] for number in (0, 3, 4, 5, 6, 7, 13, 14)]
 
 
 @pytest.mark.parametrize(("fault", "name", "level", "said"), HAPPENINGS)
@@ -144,6 +145,22 @@ def test_what_happened_is_told_for_a_while_and_then_forgotten(
     assert robot.troubles == {name: level}
     robot.seconds(3)
     assert not robot.troubles
+
+
+def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_bad() -> None:
+    """Nothing is lost by it; where the rates are off, that is why."""
+    robot = Robot()
+    for second in range(12):
+        robot.connect(waited_s=0.3 * second)
+        robot.seconds(1)
+    assert not robot.troubles
+    assert "read late: the reader waits 30%" in robot.statuses["Stream"].message
+    robot.per_second["imu"] = 60
+    for second in range(12, 24):
+        robot.connect(waited_s=0.3 * second)
+        robot.seconds(1)
+    assert robot.troubles["Stream"] is Level.WARN
+    assert "too busy: reduce its load" in robot.statuses["Stream"].message
 
 
 def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:

@@ -80,6 +80,19 @@ def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench)
         bench.run(0.4)
     losses = [text for text in bench.notices if "lost" in text]
     assert 1 <= len(losses) <= 2
+    assert "lost on the line" in losses[0]
+
+
+def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> None:
+    """The kernel counted an overrun."""
+    bench.run(0.4)
+    bench.session.overran(1)
+    bench.speaks = False
+    bench.run(0.08)
+    bench.speaks = True
+    bench.run(0.4)
+    (loss,) = [text for text in bench.notices if "lost" in text]
+    assert "in this computer" in loss
 
 
 def test_motion_during_a_pause_moves_the_pose_and_is_no_speed(bench: Bench) -> None:

@@ -17,6 +17,7 @@ from statistics import fmean
 
 sys.path.append(str(Path(__file__).parents[1] / "integrity"))
 
+from busy import READERS
 from carriage import CHUNKERS, Chunks, Received, receive
 from truth import SCENARIOS, TICK_S, Truth, generate
 
@@ -56,6 +57,8 @@ LINES: dict[str, Callable[[Received, Random], Chunks]] = {
     **CHUNKERS,
     "FTDI, timer restarted by data": ftdi_restarted,
 }
+BUSY = dict(READERS)
+"""Readers that are late by themselves: nothing is added."""
 
 
 @dataclass(slots=True)
@@ -132,8 +135,12 @@ def stamp(
     stamped = Stamped([time * (1.0 + skew) for time in sampled_s], restarted_s * (1.0 + skew))
     bot, clock = OmniBot(OmniBotSettings()), DeviceClock(TICK_S)
     tick, last_s = -1, -math.inf
-    chunks = LINES[line](received, random)
-    for data, now in _reads(received.data, chunks, random, EPOCH_S + seconds / 2, EVENTS_S[event]):
+    if line in BUSY:
+        reads = _as_read(received.data, BUSY[line](received, random))
+    else:
+        chunks = LINES[line](received, random)
+        reads = _reads(received.data, chunks, random, EPOCH_S + seconds / 2, EVENTS_S[event])
+    for data, now in reads:
         readings = bot.receive(data, now)
         stamps_s = clock.stamps(readings, now, bot.edge)
         for reading, stamp_s in zip(readings, stamps_s, strict=True):
@@ -168,6 +175,13 @@ def _one_after_the_other(before: Truth, after: Truth, begins_s: float) -> Truth:
             *((key, at + start, at + end) for key, start, end in after.frames),
         ],
     )
+
+
+def _as_read(data: bytes, chunks: Chunks) -> Iterator[tuple[bytes, float]]:
+    at = 0
+    for end, now in chunks:
+        yield data[at:end], now
+        at = end
 
 
 def _reads(

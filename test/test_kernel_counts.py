@@ -1,0 +1,40 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the kernel counts of ports and threads."""
+
+import fcntl
+import os
+import struct
+import threading
+
+import pytest
+
+from omnibot_driver.kernel_counts import TIOCGICOUNT, overruns, waited_s
+
+
+def test_a_pseudo_terminal_counts_no_overruns() -> None:
+    """Its writer waits instead."""
+    ours, theirs = os.openpty()
+    try:
+        assert overruns(theirs) is None
+    finally:
+        os.close(ours)
+        os.close(theirs)
+
+
+def test_overruns_of_the_chip_and_of_the_buffer_are_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    """``serial_icounter_struct`` of linux/serial.h: the eighth number, and the eleventh."""
+
+    def ioctl(_descriptor: int, request: int, _data: bytes) -> bytes:
+        assert request == TIOCGICOUNT
+        return struct.pack("20i", 1, 1, 1, 1, 500, 500, 7, 2, 7, 7, 3, *[0] * 9)
+
+    monkeypatch.setattr(fcntl, "ioctl", ioctl)
+    assert overruns(0) == 5
+
+
+def test_a_thread_has_waited_and_one_that_is_none_is_not_known() -> None:
+    """In seconds."""
+    waited = waited_s(threading.get_native_id())
+    assert waited is None or waited >= 0.0
+    assert waited_s(0) is None
