@@ -66,6 +66,10 @@ class DeviceClock:
         self._single_reads = 0
         """The last so many brought one sample each, so none waited for another."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
+        self._seen_at = -math.inf
+        """When a new tick was seen last. Soon after a late one come those that waited with it."""
+        self._awaited: Point | None = None
+        """The next tick, and by when it had not come, unless it was only not read yet."""
         self._cut_off: Point | None = None
         """What a cut sample tells of the line, if it was cut by the read and not by a loss."""
 
@@ -131,10 +135,9 @@ class DeviceClock:
         if not -self._calm_s <= lag_s <= self._calm_s:
             return None
         self._single_reads += 1
-        self._lags_s.append(lag_s)
-        self._seen_tick = tick
+        self._see(line, tick, lag_s, now)
         line.see((tick, arrival), cut=False)
-        line.not_before((tick + 1, now + edge.earliest_s))
+        self._awaited = tick + 1, now + edge.earliest_s
         self._stamp(tick, now, (now - self._stamp_s) / (readings + 1))
         return self._stamp_s
 
@@ -175,8 +178,14 @@ class DeviceClock:
             short = round(lag_s / period_s)
         elif len(lags_s) == BEAT_READS:
             self._settled = True
-            later_s = lag_s - max(lags_s)
-            if self._single_reads > BEAT_READS and 0.95 < later_s / period_s < 1.5:
+            *before_s, last_s = lags_s
+            at_once_s = lag_s - max(lags_s)
+            later_s = min(last_s, lag_s) - max(before_s)
+            if (
+                self._single_reads > BEAT_READS
+                and now - self._seen_at > period_s / 2
+                and (0.95 < at_once_s / period_s < 1.05 or 0.95 < later_s / period_s < 1.5)
+            ):
                 short = 1  # more at once were sooner kept waiting than lost
             elif min(lags_s) > period_s / 2:
                 short, counted = round(min(lags_s) / period_s), True
@@ -191,16 +200,27 @@ class DeviceClock:
                 self._displaced_tick = min(self._displaced_tick + short * counted, self._tick)
             tick += short
             lag_s -= short * line.slope_s
-        lags_s.append(lag_s)
-        self._seen_tick = tick
+        self._see(line, tick, lag_s, now)
         line.see((tick, arrival), cut=edge.cut)
         if edge.cut:
             self._cut_off = tick, now + edge.earliest_s
         else:
-            line.not_before((tick + 1, now + edge.earliest_s))
+            self._awaited = tick + 1, now + edge.earliest_s
         is_calm = self._settled and not edge.cut and abs(lag_s) <= self._calm_s
         self._calm = line if is_calm else None
         return short
+
+    def _see(self, line: TickLine, tick: int, lag_s: float, now: float) -> None:
+        """A new tick. One that comes right behind another had waited with it to be read."""
+        if now - self._seen_at < self._period_s / 2 and self._lags_s:
+            self._lags_s[-1] = lag_s
+            self._single_reads = 0
+        else:
+            self._lags_s.append(lag_s)
+            if self._awaited:
+                line.not_before(self._awaited)
+        self._awaited = None
+        self._seen_tick, self._seen_at = tick, now
 
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """The line's time, but no jump backwards, and forwards only little by little.

@@ -2,7 +2,8 @@
 
 """The timing report: prints the worst figures of each cell and writes them into docs/time.md.
 
-Arguments: ``--seconds`` of each stream and ``--seeds``. The seeds share out the skews.
+Arguments: ``--seconds`` of each stream and ``--seeds``; ``--readers``: the busy readers alone. The
+seeds share out the skews.
 """
 
 import argparse
@@ -12,10 +13,10 @@ from functools import partial
 from multiprocessing import Pool
 from pathlib import Path
 
-from stamping import EVENTS_S, LINES, SETTLED_S, spread, stamp
+from stamping import BUSY, EVENTS_S, LINES, SETTLED_S, spread, stamp
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "time.md"
-BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
+MARKS = "<!-- {}: begin -->", "<!-- {}: end -->"
 
 SKEWS = (-1e-4, -5e-5, 0.0, 5e-5, 1e-4)
 LOSSES = (0.0, 1e-3, 1e-2)
@@ -56,12 +57,30 @@ def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
     return lines
 
 
-def main() -> None:
-    """Run, print, write."""
-    arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("--seconds", type=float, default=30.0)
-    arguments.add_argument("--seeds", type=int, default=30)
-    chosen = arguments.parse_args()
+def measured(cells: list[Cell], seconds: float, seeds: int) -> dict[Cell, list[Figures]]:
+    """All streams of all cells, with all processors."""
+    jobs = [(cell, seed) for cell in cells for seed in range(seeds)]
+    found: dict[Cell, list[Figures]] = {cell: [] for cell in cells}
+    with Pool(os.cpu_count()) as pool:
+        for cell, figures in pool.imap_unordered(partial(one, seconds), jobs, chunksize=4):
+            found[cell].append(figures)
+            done = sum(map(len, found.values()))
+            print(f"\r{done} of {len(jobs)} streams", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    return found
+
+
+def publish(name: str, lines: list[str]) -> None:
+    """Print, and replace what the document has under this name."""
+    text = "\n".join(lines)
+    print(text)
+    begin, end = (mark.format(name) for mark in MARKS)
+    before, rest = DOCUMENT.read_text().split(begin)
+    DOCUMENT.write_text(f"{before}{begin}\n{text}\n{end}{rest.split(end)[1]}")
+
+
+def lines_and_events(seconds: float, seeds: int) -> None:
+    """A host that is prompt."""
     undisturbed, *events = EVENTS_S
     cells = [(line, n, mode, undisturbed) for line in LINES for n in LOSSES for mode in SCENARIOS]
     cells += [
@@ -71,14 +90,7 @@ def main() -> None:
         if line != BLOCKS
         for mode in SCENARIOS
     ]
-    jobs = [(cell, seed) for cell in cells for seed in range(chosen.seeds)]
-    found: dict[Cell, list[Figures]] = {cell: [] for cell in cells}
-    with Pool(os.cpu_count()) as pool:
-        for cell, figures in pool.imap_unordered(partial(one, chosen.seconds), jobs, chunksize=4):
-            found[cell].append(figures)
-            done = sum(map(len, found.values()))
-            print(f"\r{done} of {len(jobs)} streams", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
+    found = measured(cells, seconds, seeds)
     plain = {
         f"{line} | {loss:g} | {mode}": figures
         for (line, loss, mode, event), figures in found.items()
@@ -90,7 +102,7 @@ def main() -> None:
         if event != undisturbed
     }
     lines = [
-        f"{chosen.seeds} streams of {chosen.seconds:g} s in each cell; the worst, and the median:",
+        f"{seeds} streams of {seconds:g} s in each cell; the worst, and the median:",
         "",
         *table("line | bytes lost | mode", plain),
         "",
@@ -98,10 +110,32 @@ def main() -> None:
         "",
         *table("event | line | mode", disturbed),
     ]
-    text = "\n".join(lines)
-    print(text)
-    before, rest = DOCUMENT.read_text().split(BEGIN)
-    DOCUMENT.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}")
+    publish("figures", lines)
+
+
+def busy_readers(seconds: float, seeds: int) -> None:
+    """A host that is not."""
+    cells = [(line, n, mode, "none") for line in BUSY for n in LOSSES[:2] for mode in SCENARIOS]
+    found = measured(cells, seconds, seeds)
+    rows = {f"{line} | {n:g} | {mode}": figures for (line, n, mode, _), figures in found.items()}
+    lines = [
+        f"{seeds} streams of {seconds:g} s in each cell; the worst, and the median:",
+        "",
+        *table("reader | bytes lost | mode", rows),
+    ]
+    publish("readers", lines)
+
+
+def main() -> None:
+    """Run, print, write."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--seconds", type=float, default=30.0)
+    arguments.add_argument("--seeds", type=int, default=30)
+    arguments.add_argument("--readers", action="store_true")
+    chosen = arguments.parse_args()
+    if not chosen.readers:
+        lines_and_events(chosen.seconds, chosen.seeds)
+    busy_readers(chosen.seconds, chosen.seeds)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 """A part of the timing report."""
 
 import pytest
-from stamping import LINES, spread, stamp
+from stamping import BUSY, LINES, spread, stamp
 
 FRAME_S = 14 * 10 / 115200
 PROMPT = [line for line in LINES if "block" not in line]
@@ -54,3 +54,14 @@ def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_m
     for seed in range(10):
         stamped = stamp("FTDI", "IMU only, noisy gyro", 0.0, 0.0, seed, 4.0)
         assert max(abs(error - FRAME_S) for error in stamped.errors()) < 0.5e-3
+
+
+@pytest.mark.parametrize("reader", [name for name in BUSY if "parts" not in name])
+@pytest.mark.parametrize("scenario", ["driving", "IMU only, noisy gyro"])
+def test_a_reader_that_is_late_shifts_no_stamps(reader: str, scenario: str) -> None:
+    """As on the line undisturbed, but for a few that are a tick off where reads bring parts."""
+    for seed, skew in enumerate([1e-4, -1e-4]):
+        stamped = stamp(reader, scenario, 0.0, skew, seed, 15.0)
+        assert spread(stamped.errors()) < 0.5e-3
+        if reader in ("single bytes, late", "1-8 bytes, late"):
+            assert stamped.unevenness() < 0.2e-3
