@@ -20,6 +20,7 @@ from random import Random
 from typing import Any, Final
 
 import rclpy
+from busy_computer import LOOPS, PIECE, TICKS, PiecesRig, is_busy
 from cases import Case, survivable
 from endings import ENDINGS, terminal_is_closed
 from fuzz import fuzz
@@ -142,6 +143,17 @@ class Campaign:
                     for name, case in life.items():
                         self.run(rows[name], case, rig, again=False)
 
+    def busy_computer(self) -> None:
+        """Nothing is wrong with the line."""
+        row = self.row(
+            f"{LOOPS} busy loops for {TICKS // 100} s, the line in pieces of {PIECE} bytes"
+        )
+        for _ in range(ROUNDS):
+            with self.rig(PiecesRig) as rig:
+                assert isinstance(rig, PiecesRig)
+                self.run(row, is_busy, rig)
+                self.judge(rig, damaged_bytes=False)
+
     def random_input(self) -> None:
         row = self.row(f"{FUZZ:,} random messages and calls, 1,000 a second")
         with self.rig() as rig:
@@ -198,6 +210,7 @@ def main() -> int:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--minutes", type=float, help="a soak of random walks only")
     arguments.add_argument("--losses", action="store_true", help="stops on a lossy line only")
+    arguments.add_argument("--busy", action="store_true", help="a busy computer only")
     chosen = arguments.parse_args()
     minutes = chosen.minutes
     os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
@@ -207,16 +220,19 @@ def main() -> int:
         campaign.soak(minutes)
     elif chosen.losses:
         campaign.losses()
+    elif chosen.busy:
+        campaign.busy_computer()
     else:
         campaign.scripted()
         campaign.losses()
+        campaign.busy_computer()
         campaign.random_input()
         campaign.walks(f"random walks of {STEPS} faults", Rig, range(WALKS))
         campaign.walks(f"with goals: random walks of {STEPS} faults", GoalRig, range(GOAL_WALKS))
     rclpy.shutdown()
     table = campaign.table()
     print(f"\n{table}\n", *campaign.complaints, sep="\n")
-    if minutes is None and not chosen.losses:
+    if minutes is None and not (chosen.losses or chosen.busy):
         before, rest = DOCUMENT.read_text().split(BEGIN)
         DOCUMENT.write_text(f"{before}{BEGIN}\n{table}\n{END}{rest.split(END)[1]}")
     return 1 if campaign.complaints else 0

@@ -1,0 +1,109 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A busy computer: busy loops on every core, and an adapter that hands over four bytes at a time.
+
+The line is undamaged, so everything that the board sent is published, and nothing else; and nobody
+is told to look at the cable.
+"""
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Final
+
+from ports import Terminal
+from published import Key, imu_key, odom_key, same, sent_imu_key, sent_odom_key
+from rig import Rig
+
+LOOPS: Final = 4
+PIECE: Final = 4
+BYTE_S: Final = 10 / 115200
+TICKS: Final = 3000
+TRANSIT: Final = 200
+"""Frames that may be under way when the comparison begins."""
+REACH: Final = 200
+"""Of the frames sent; a message that is none of the next so many was never sent."""
+
+
+class PiecesTerminal(Terminal):
+    """A few bytes at a time, at the pace of the line."""
+
+    def _send(self, data: bytes) -> int:
+        sent = 0
+        for at in range(0, len(data), PIECE):
+            piece = data[at : at + PIECE]
+            time.sleep(len(piece) * BYTE_S)
+            sent += super()._send(piece)
+        return sent
+
+
+class PiecesRig(Rig):
+    """The board is behind such an adapter."""
+
+    def _make_terminal(self) -> Terminal:
+        return PiecesTerminal(self.line, self.port)  # type: ignore[arg-type]
+
+
+def _known(keys: Iterable[Key | None]) -> list[Key]:
+    return [key for key in keys if key is not None]
+
+
+@contextmanager
+def busy_loops() -> Iterator[None]:
+    """As processes, so the kernel shares the cores out among them and the driver."""
+    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(LOOPS)]
+    try:
+        yield
+    finally:
+        for loop in loops:
+            loop.kill()
+        for loop in loops:
+            loop.wait()
+
+
+def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
+    """Of what was published; and of what was sent between the first and the last message.
+
+    At constant speed many frames are alike, so each that may be the first message is tried.
+    """
+    starts = [n for n, key in enumerate(sent) if same(published[0], key)]
+    return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))
+
+
+def _compared(published: list[Key], sent: list[Key]) -> tuple[int, int]:
+    at, missing, wrong = -1, 0, 0
+    for key in published:
+        ahead = range(at + 1, min(len(sent), at + REACH))
+        place = next((n for n in ahead if same(key, sent[n])), None)
+        if place is None:
+            wrong += 1
+            continue
+        missing, at = missing + place - at - 1, place
+    return wrong, missing
+
+
+def is_busy(rig: PiecesRig, ticks: int = TICKS) -> None:
+    """While somebody drives."""
+    rig.drive()
+    before = max(0, len(rig.line.sent) - TRANSIT)
+    imu, odom, line = len(rig.imu), len(rig.odom), len(rig.driver.lines)
+    with busy_loops():
+        rig.wait_ticks(ticks)
+    rig.wait_ticks(100)
+    rig.hand.leave()
+    rig.expect_still(rig.line.tick, "after the busy time")
+    frames = rig.line.sent[before:]
+    for what, published, sent in (
+        ("Imu", map(imu_key, rig.imu[imu:]), map(sent_imu_key, frames)),
+        ("Odometry", map(odom_key, rig.odom[odom:]), map(sent_odom_key, frames)),
+    ):
+        wrong, missing = wrong_and_missing(_known(published), _known(sent))
+        rig.findings.wrong += wrong
+        rig.findings.expect(not wrong, f"{wrong} {what} messages were never sent")
+        rig.findings.expect(not missing, f"{missing} {what} messages are missing")
+    rig.findings.expect(len(rig.imu) - imu >= ticks, "fewer Imu messages than ticks")
+    rig.findings.expect(not rig.terminal.dropped, f"the kernel lost {rig.terminal.dropped} bytes")
+    blamed = [text for text in rig.driver.lines[line:] if "cable" in text]
+    rig.findings.expect(not blamed, f"the line is blamed: {blamed}")

@@ -1,0 +1,14 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A busy computer loses nothing of a good line; ``make faults`` has half a minute of it."""
+
+from pathlib import Path
+
+from busy_computer import PiecesRig, is_busy
+
+
+def test_a_busy_computer_loses_no_message(tmp_path: Path, lenience: dict[str, float]) -> None:
+    """Four busy loops, pieces of four bytes."""
+    with PiecesRig(tmp_path, **lenience) as rig:
+        is_busy(rig, ticks=500)
+        assert not rig.findings.take(), rig.driver.output
