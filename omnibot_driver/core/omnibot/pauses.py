@@ -10,7 +10,6 @@ frames are believed (``decoder``).
 """
 
 from collections.abc import Sequence
-from math import inf
 from typing import Final
 
 from omnibot_driver.core.omnibot import evidence
@@ -104,12 +103,15 @@ class Pauses:
 
     def forget(self, count: int) -> None:
         """The first bytes are held no longer."""
+        if not self.gaps or self.gaps[-1].first < count:
+            self.clear()
+            return
         self.gaps = [
             gap._replace(first=gap.first - count, before=gap.before - count)
             for gap in self.gaps
             if gap.first >= count
         ]
-        first = self.gaps[0].first + count if self.gaps else inf
+        first = self.gaps[0].first + count
         self._reads = [Read(end - count, now) for end, now in self._reads if end > first]
 
     def clear(self) -> None:
