@@ -22,11 +22,11 @@ from sensor_msgs.msg import Imu, JointState
 
 from omnibot_driver import messages
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.odometry import OdometryEstimate
-from omnibot_driver.core.se2 import Pose
-from omnibot_driver.core.uncertainty import Covariance
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.messages import MessageSettings, Wheels
 
 LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"

@@ -20,14 +20,14 @@ from typing import Final, TypeVar
 
 from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.events import Event, Notice
+from omnibot_driver.core.mode_manager import OnExit
+from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
 from omnibot_driver.core.session import Session
-from omnibot_driver.core.snapshot import LinkFigures, SessionFigures
-from omnibot_driver.core.supervisor import OnExit
 from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
 from omnibot_driver.kernel_counts import waited_s
 from omnibot_driver.outbox import Delivery, Outbox
 from omnibot_driver.port import Port
-from omnibot_driver.standstill import Standstill, boot_time_s
+from omnibot_driver.stall_detector import Standstill, boot_time_s
 
 JOIN_TIMEOUT_S: Final = 3.0
 """Longer than a guard takes to repeat Stop."""

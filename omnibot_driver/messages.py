@@ -28,13 +28,13 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Header, UInt8MultiArray
 
-from omnibot_driver.core.diagnosis import Status
+from omnibot_driver.core.commands.limits import require_finite
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
-from omnibot_driver.core.limits import require_finite
-from omnibot_driver.core.odometry import OdometryEstimate
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.reporting.diagnosis import Status
 
 UNMEASURED_VARIANCE: Final = 1e6
 """For z, roll and pitch, of which a planar odometry says nothing, and for a twist not known."""

@@ -23,9 +23,9 @@ from rclpy.publisher import Publisher
 from std_msgs.msg import Bool, Float32MultiArray
 
 from omnibot_driver import cdr, declaration, messages, parameters, selfcheck
-from omnibot_driver.core.diagnosis import Refusals
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.omnibot import OmniBot
+from omnibot_driver.core.reporting.diagnosis import Refusals
 from omnibot_driver.core.session import Session
 from omnibot_driver.diagnostics import Diagnostics
 from omnibot_driver.link import Link
@@ -33,7 +33,7 @@ from omnibot_driver.publishing import Publishing
 from omnibot_driver.recording import is_recording, open_recording
 from omnibot_driver.replay import Replay
 from omnibot_driver.services import Services
-from omnibot_driver.standstill import boot_time_ns
+from omnibot_driver.stall_detector import boot_time_ns
 from omnibot_driver.transit import Arrival, Transit
 
 LOOK_EVERY_S = WARN_EVERY_S = 2.0

@@ -23,10 +23,10 @@ from std_msgs.msg import Bool, String, UInt8MultiArray
 from omnibot_driver import messages, selfcheck
 from omnibot_driver.cdr import Messages, Serializer, difference
 from omnibot_driver.core.events import Event, Notice, StateChanged
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.mode_manager import RequestDone
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.session import Session
-from omnibot_driver.core.supervisor import RequestDone
 from omnibot_driver.transforms import transform_publisher
 
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

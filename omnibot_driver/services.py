@@ -15,8 +15,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver import calibration
 from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.mode_manager import Request, RequestDone
 from omnibot_driver.core.session import DISCONNECTED, Session
-from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.link import Link
 from omnibot_driver.replay import Replay
 

@@ -6,11 +6,11 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from omnibot_driver.core.commands import CommandSettings
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.stream import CommandSettings
 from omnibot_driver.core.events import Event
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.limits import SpeedLimits
-from omnibot_driver.core.odometry import OdometrySettings
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link

@@ -15,11 +15,11 @@ from rosbags.typesys import Stores, get_typestore
 from omnibot_driver import cdr, parameters
 from omnibot_driver.cdr import Messages, Serializer, difference
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.odometry import OdometryEstimate
-from omnibot_driver.core.se2 import Pose
-from omnibot_driver.core.uncertainty import Covariance
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.messages import MessageSettings, Wheels
 
 numbers = st.floats(allow_nan=False, allow_infinity=False, width=32)

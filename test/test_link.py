@@ -13,11 +13,11 @@ from random import Random
 import pytest
 from listener import EMERGENCY_STOP, PATIENCE_S, STOP, Listener, kinds, link_to, session
 
-from omnibot_driver import standstill
+from omnibot_driver import stall_detector
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Event, Notice
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.session import Session
 from omnibot_driver.keeper import BEAT_S, Keeper
 from omnibot_driver.port import Port
@@ -179,7 +179,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whoever holds the lock keeps the pacer from passing; what is sent later is obeyed."""
-    monkeypatch.setattr("omnibot_driver.standstill.SETTLE_S", 0.0)
+    monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
@@ -214,9 +214,9 @@ def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.M
     """No thread misses a beat by the steady clock; the robot is stopped all the same."""
     suspended_s = 0.0
     monkeypatch.setattr(
-        "omnibot_driver.link.boot_time_s", lambda: standstill.boot_time_s() + suspended_s
+        "omnibot_driver.link.boot_time_s", lambda: stall_detector.boot_time_s() + suspended_s
     )
-    monkeypatch.setattr("omnibot_driver.standstill.SETTLE_S", 0.0)
+    monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()

@@ -19,7 +19,7 @@ from listener import (
 )
 from terminal import Terminal
 
-from omnibot_driver.core.inertial import ImuEstimate
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.session import Session
 from omnibot_driver.link import Link
 

@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver import messages, parameters
-from omnibot_driver.core.diagnosis import Level, Status
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
-from omnibot_driver.core.odometry import OdometryEstimate
-from omnibot_driver.core.se2 import Pose
-from omnibot_driver.core.uncertainty import Covariance
+from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.reporting.diagnosis import Level, Status
 
 SETTINGS = messages.MessageSettings.from_parameters(parameters.check_all({}))
 PREFIXED = messages.MessageSettings.from_parameters(

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver.core.errors import ParameterError
-from omnibot_driver.core.plausibility import MotionLimits
+from omnibot_driver.core.measurement.outlier_filter import MotionLimits
 from omnibot_driver.parameters import (
     BY_NAME,
     PARAMETERS,

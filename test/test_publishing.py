@@ -18,14 +18,14 @@ from rclpy.time import Time
 from sensor_msgs.msg import Imu, JointState
 
 from omnibot_driver import parameters
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.omnibot import OmniBot, PausedFrame
 from omnibot_driver.core.omnibot.frames import Frame
 from omnibot_driver.core.omnibot.modes import ModeTracker
-from omnibot_driver.core.se2 import Pose
 from omnibot_driver.core.session import Session
-from omnibot_driver.core.uncertainty import Covariance
 from omnibot_driver.messages import MessageSettings
 from omnibot_driver.publishing import Publishing
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard

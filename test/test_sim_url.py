@@ -10,8 +10,8 @@ from listener import PATIENCE_S, Listener, link_to, session
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.events import Notice
-from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.port import Port
 from omnibot_driver.simulator import SimulatedBoard
 from omnibot_driver.simulator.motors import TICK_S

@@ -16,13 +16,13 @@ import pytest
 
 from omnibot_driver import parameters
 from omnibot_driver.cdr import LITTLE_ENDIAN, Serializer, twist
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.omnibot import FrameDecoder, OmniBot
-from omnibot_driver.core.se2 import Pose
 from omnibot_driver.core.session import Session
-from omnibot_driver.core.uncertainty import Covariance
 from omnibot_driver.messages import UNTURNED, MessageSettings, turned
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 

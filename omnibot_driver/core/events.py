@@ -4,9 +4,9 @@
 
 from dataclasses import dataclass
 
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.odometry import OdometryEstimate
-from omnibot_driver.core.supervisor import RequestDone
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.mode_manager import RequestDone
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,22 +21,22 @@ from omnibot_driver.core.board import (
     Reading,
     Vector3,
 )
-from omnibot_driver.core.commands import CommandSettings
-from omnibot_driver.core.driving import Driving, Wish
+from omnibot_driver.core.commands.interlocks import why_not_calibrate, why_not_drive
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.pipeline import Driving, Wish
+from omnibot_driver.core.commands.shaping import ControlMethod
+from omnibot_driver.core.commands.stream import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import Event, Notice, StateChanged
-from omnibot_driver.core.helm import ControlMethod
-from omnibot_driver.core.inertial import ImuCorrection, ImuEstimate
-from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.limits import SpeedLimits
-from omnibot_driver.core.measuring import Measured, Measuring
-from omnibot_driver.core.news import HEADING_ASSUMED, Bulletin, why_silent
-from omnibot_driver.core.odometry import OdometrySettings
-from omnibot_driver.core.permission import why_not_calibrate, why_not_drive
-from omnibot_driver.core.plausibility import MotionLimits, Refused
-from omnibot_driver.core.se2 import Pose, Signs
-from omnibot_driver.core.snapshot import SessionFigures
-from omnibot_driver.core.supervisor import CLOSED, OnExit, Phase, Request, Supervisor
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose, Signs
+from omnibot_driver.core.imu.bias_correction import ImuCorrection, ImuEstimate
+from omnibot_driver.core.measurement.outlier_filter import MotionLimits, Refused
+from omnibot_driver.core.measurement.pipeline import Measured, Measuring
+from omnibot_driver.core.mode_manager import CLOSED, OnExit, Phase, Request, Supervisor
+from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.reporting.figures import SessionFigures
+from omnibot_driver.core.reporting.notices import HEADING_ASSUMED, Bulletin, why_silent
 
 SILENCE_S: Final = 1.5
 """The board says something at least once a second; after this it is not known to be there."""

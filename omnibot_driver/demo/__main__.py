@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Final
 
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.demo.dashboard import Dashboard
 from omnibot_driver.demo.display import HEADING, Drive, introduce, report
 from omnibot_driver.demo.program import PATIENCE_S, DemoFailed, Program

@@ -4,7 +4,7 @@
 
 from typing import Final
 
-from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, GYRO_COUNTS_PER_DPS
+from omnibot_driver.core.imu.scale import ACCEL_COUNTS_PER_G, GYRO_COUNTS_PER_DPS
 from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S
 from omnibot_driver.parameters.parameter import Parameter
 

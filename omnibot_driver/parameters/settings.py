@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from omnibot_driver.core.board import Vector3
-from omnibot_driver.core.commands import CommandSettings
-from omnibot_driver.core.imu import STANDARD_GRAVITY, ImuScale
-from omnibot_driver.core.inertial import ImuCorrection
-from omnibot_driver.core.limits import SpeedLimits
-from omnibot_driver.core.odometry import OdometrySettings
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.stream import CommandSettings
+from omnibot_driver.core.imu.bias_correction import ImuCorrection
+from omnibot_driver.core.imu.scale import STANDARD_GRAVITY, ImuScale
+from omnibot_driver.core.measurement.outlier_filter import MotionLimits
+from omnibot_driver.core.odometry.covariance import OdometryNoise
+from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBotSettings
-from omnibot_driver.core.plausibility import MotionLimits
 from omnibot_driver.core.session import SessionSettings
-from omnibot_driver.core.uncertainty import OdometryNoise
 
 
 def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:

@@ -21,13 +21,13 @@ from sensor_msgs.msg import Imu, JointState
 
 from omnibot_driver import parameters
 from omnibot_driver.cdr import Serializer
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.odometry import OdometryEstimate
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, OmniBot
-from omnibot_driver.core.se2 import Pose
 from omnibot_driver.core.session import Session
-from omnibot_driver.core.uncertainty import Covariance
 from omnibot_driver.messages import UNTURNED, MessageSettings, turned
 
 MPS2_PER_COUNT = 9.80665 / 16384

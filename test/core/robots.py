@@ -2,7 +2,7 @@
 
 """Robots at the beginning of a test: on the workbench, standing or driving."""
 
-from bench import Bench
+from session_bench import Bench
 
 from omnibot_driver.simulator import BoardSettings
 

@@ -7,12 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from random import Random
 
-from omnibot_driver.core.omnibot import (
-    FrameDecoder,
-    ImuFrame,
-    decode,
-    encode,
-)
+from omnibot_driver.core.omnibot import FrameDecoder, ImuFrame, decode, encode
 from omnibot_driver.core.omnibot.frames import CommandFrame, Frame
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 

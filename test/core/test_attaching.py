@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import axis_signs, headings, small_moves
-from trip import (
+from synthetic_board import (
     PERIOD_S,
     SETTINGS,
     Trip,
@@ -22,9 +22,9 @@ from trip import (
 )
 
 from omnibot_driver.core.board import PoseReading
-from omnibot_driver.core.odometry import Odometry
-from omnibot_driver.core.se2 import Pose
-from omnibot_driver.core.uncertainty import Covariance
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.odometry.estimator import Odometry
 
 # Heading
 

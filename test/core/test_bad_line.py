@@ -7,12 +7,12 @@ import struct
 from collections import deque
 
 import pytest
-from bench import TICK_S, Bench
+from session_bench import TICK_S, Bench
 
-from omnibot_driver.core.imu import ImuScale
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.odometry import OdometryEstimate
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.imu.scale import ImuScale
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.simulator import BoardPose, BoardSettings, FaultyLine, LineFaults
 
 

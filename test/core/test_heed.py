@@ -8,10 +8,10 @@ import pytest
 
 from omnibot_driver import parameters
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.kinematics import BodyTwist
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.mode_manager import Request, RequestDone
 from omnibot_driver.core.omnibot import OmniBot
 from omnibot_driver.core.session import Session
-from omnibot_driver.core.supervisor import Request, RequestDone
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 
 TICK_S = 0.01

@@ -6,20 +6,20 @@ import math
 import struct
 
 import pytest
-from line import DELTA, POSE, TEXT, loses_nothing
-from underway import (
+from lossy_drives import (
     PERIOD_S,
     attached,
     line,
     lose,
     settled,
 )
+from lossy_odometry import DELTA, POSE, TEXT, loses_nothing
 
 from omnibot_driver.core.board import DisplacementReading, PoseReading
-from omnibot_driver.core.odometry import Odometry, OdometrySettings
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.odometry.estimator import Odometry, OdometrySettings
 from omnibot_driver.core.omnibot import DeltaFrame, ImuFrame, OmniBot, OmniBotSettings, encode
 from omnibot_driver.core.omnibot.translation import Translation
-from omnibot_driver.core.se2 import Pose
 
 # Pauses and restarts
 

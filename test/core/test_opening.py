@@ -3,11 +3,11 @@
 """A line that is opened, and a board that is found on it: zeros, Stop, S, and the state by name."""
 
 import pytest
-from bench import OPENING, START, Bench
 from robots import standing
+from session_bench import OPENING, START, Bench
 
-from omnibot_driver.core.inertial import ImuEstimate
-from omnibot_driver.core.supervisor import Request
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.mode_manager import Request
 from omnibot_driver.simulator import BoardSettings
 
 

@@ -3,11 +3,11 @@
 """Pausing a board whose P is a toggle: never the wrong way, and believed only when it is shown."""
 
 import pytest
-from bench import PAUSE, STOP, Bench
 from robots import drive_on, paused, standing
+from session_bench import PAUSE, STOP, Bench
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.supervisor import Request, RequestDone
+from omnibot_driver.core.mode_manager import Request, RequestDone
 from omnibot_driver.simulator import BoardMode
 
 

@@ -7,12 +7,12 @@ from collections import deque
 from dataclasses import dataclass
 from random import Random
 
-from bench import EMERGENCY_STOP, PAUSE, STOP, TICK_S, ZEROS, Bench
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from session_bench import EMERGENCY_STOP, PAUSE, STOP, TICK_S, ZEROS, Bench
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.supervisor import Request, RequestDone
+from omnibot_driver.core.mode_manager import Request, RequestDone
 from omnibot_driver.simulator import BoardMode, BoardSettings
 
 RUNNING = ("nominal", "imu_only")

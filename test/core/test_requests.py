@@ -5,12 +5,12 @@
 import itertools
 
 import pytest
-from bench import OPENING, RESET, START, STOP, Bench
 from robots import drive_on, driving, paused, standing
+from session_bench import OPENING, RESET, START, STOP, Bench
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import StateChanged
-from omnibot_driver.core.supervisor import Request, RequestDone
+from omnibot_driver.core.mode_manager import Request, RequestDone
 from omnibot_driver.simulator import BoardMode
 
 

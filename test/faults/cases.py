@@ -14,11 +14,11 @@ from typing import Final, TypeVar
 from breakable_line import Damage, cut, gaining, late, losing, losing_bursts, noise
 from driver_process import Driver
 from geometry_msgs.msg import Twist
+from hostile_clients import UNKIND
 from rig import TICK_S, Rig
 from std_msgs.msg import Bool, Float32MultiArray
 from std_srvs.srv import SetBool, Trigger
 from stuck import TERMINAL
-from unkind import UNKIND
 
 R = TypeVar("R", bound=Rig, contravariant=True)
 Case = Callable[[R], object]

@@ -6,7 +6,7 @@ import socket
 from pathlib import Path
 from typing import Any
 
-from hands import Hand, Navigator
+from commander import Hand, Navigator
 from ports import Server
 from rig import Rig
 

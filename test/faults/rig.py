@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from breakable_line import TICK_S, BreakableLine
+from commander import Hand, Stick
 from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import PATIENCE_S, Driver
-from hands import Hand, Stick
 from nav_msgs.msg import Odometry
 from ports import Server, Terminal
 from probe import Probe

@@ -10,8 +10,7 @@ its command until Stop is on the wire; shortest and longest over all phases of t
 
 from collections.abc import Callable
 
-from bench import STOP, TICK_S, Bench
-from disobeying import (
+from disobedient_robots import (
     PERIOD_S,
     SLOWLY,
     Triple,
@@ -21,6 +20,7 @@ from disobeying import (
     started,
     stopped_after_s,
 )
+from session_bench import STOP, TICK_S, Bench
 
 from omnibot_driver.simulator import BoardSettings
 

@@ -17,14 +17,14 @@ from outbound_teller import TICK_S, Shown, Teller
 from outbound_words import is_motion, parse
 
 from omnibot_driver import guard
-from omnibot_driver.core.commands import CommandSettings
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.shaping import ControlMethod
+from omnibot_driver.core.commands.stream import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.helm import ControlMethod
-from omnibot_driver.core.limits import SpeedLimits
-from omnibot_driver.core.odometry import OdometrySettings
+from omnibot_driver.core.mode_manager import OnExit
+from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.session import Session, SessionSettings
-from omnibot_driver.core.supervisor import OnExit
 from omnibot_driver.link import SILENCE_S, STANDS_WITHIN_S
 
 READ_S: Final = 0.002

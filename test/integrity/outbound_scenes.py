@@ -15,11 +15,11 @@ from typing import Final
 from outbound_drive import Scene, Wish
 from outbound_teller import ANGULAR_SCALE, Shown
 
-from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.limits import SpeedLimits
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.mode_manager import Request
 from omnibot_driver.core.session import Session
-from omnibot_driver.core.supervisor import Request
 
 FROM_S: Final = 0.3
 """The board runs and is known to run by then."""

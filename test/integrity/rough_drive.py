@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Final
 
-from bench import TICK_S, Bench
+from session_bench import TICK_S, Bench
 
+from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Notice
-from omnibot_driver.core.limits import SpeedLimits
 from omnibot_driver.simulator import BoardSettings
 from omnibot_driver.simulator.motors import MotorConstants, WheelGains
 

@@ -1,7 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
 """The decoder's short cuts change nothing: neither its quick loop for calm frames, nor the way of
-an IMU frame that comes alone, nor what the lattice leaves out."""
+an IMU frame that comes alone, nor what the trellis leaves out."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -24,13 +24,13 @@ from omnibot_driver.core.omnibot import (
     OmniBotSettings,
     decoder,
     encode,
-    lattice,
+    trellis,
 )
-from omnibot_driver.core.omnibot.bounds import least_costs
-from omnibot_driver.core.omnibot.calm import Walk, take_calm
+from omnibot_driver.core.omnibot.cost_model import NOTHING_KNOWN, Expectation
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics
-from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Expectation
+from omnibot_driver.core.omnibot.fast_path import Walk, take_calm
 from omnibot_driver.core.omnibot.frames import Frame, decode_measured, measure
+from omnibot_driver.core.omnibot.lower_bound import least_costs
 
 SECONDS = 6.0
 Outcome = list[tuple[list[Frame], list[int], DecoderStatistics, bytes | None]]
@@ -44,8 +44,8 @@ def outcome(chunks: Chunks, *, quick: bool) -> Outcome:
     with pytest.MonkeyPatch.context() as patch:
         if not quick:
             patch.setattr(decoder, "take_calm", lambda _held, at, context, *_: (at, context))
-            patch.setattr(lattice, "least_costs", lambda data: [0.0] * (2 * len(data) + 3))
-            patch.setattr(lattice, "STEP", inf)
+            patch.setattr(trellis, "least_costs", lambda data: [0.0] * (2 * len(data) + 3))
+            patch.setattr(trellis, "STEP", inf)
         tested = FrameDecoder()
         found: Outcome = []
         for data, now in chunks:
@@ -193,15 +193,15 @@ def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None
 def test_most_of_the_lattice_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Or they would compare one full search with another."""
     edges = {True: 0, False: 0}
-    pieces = lattice._Search.pieces
+    pieces = trellis._Search.pieces
     chunks = chunks_of("driving", "1 byte in 100 lost", "4096-byte blocks", 1)
     for quick in edges:
 
-        def count(search: lattice._Search, quick: bool = quick) -> Sequence[lattice.Piece]:
+        def count(search: trellis._Search, quick: bool = quick) -> Sequence[trellis.Piece]:
             edges[quick] += len(search._edges)
             return pieces(search)
 
-        monkeypatch.setattr(lattice._Search, "pieces", count)
+        monkeypatch.setattr(trellis._Search, "pieces", count)
         outcome(chunks, quick=quick)
     assert 0 < edges[True] < 0.4 * edges[False]
 
@@ -211,10 +211,10 @@ def test_most_of_the_lattice_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
     """Nor does the bound fall, along any edge, by more than the edge costs."""
     least = least_costs(data)
-    search = lattice._Search(data, NOTHING_KNOWN, Expectation(16384.0), [], "big")
+    search = trellis._Search(data, NOTHING_KNOWN, Expectation(16384.0), [], "big")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lattice, "least_costs", lambda data: [0.0] * (2 * len(data) + 3))
-        patch.setattr(lattice, "STEP", inf)
+        patch.setattr(trellis, "least_costs", lambda data: [0.0] * (2 * len(data) + 3))
+        patch.setattr(trellis, "STEP", inf)
         search.run(in_step=False, closed=False)
     for start, end, price, _, _ in search._edges:
         assert least[start] <= price + least[end] + 1e-9

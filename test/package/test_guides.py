@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
 from omnibot_driver.parameters import BY_NAME
 
 ROOT = Path(__file__).parents[2]
@@ -82,7 +82,7 @@ def test_every_state_is_explained() -> None:
 
 def test_every_status_of_the_diagnostics_has_its_row() -> None:
     """In the order in which they are published."""
-    code = (ROOT / "omnibot_driver/core/diagnosis.py").read_text()
+    code = (ROOT / "omnibot_driver/core/reporting/diagnosis.py").read_text()
     names = dict.fromkeys(re.findall(r'Status\(\s*"([\w-]+)"', code))
     rows = re.findall(r"^\| ([\w-]+) \|", DIAGNOSTICS.read_text(), re.MULTILINE)
     assert rows[:1] == ["Status"]

@@ -160,7 +160,7 @@ def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, pr
 
 def test_colcon_test_runs_the_tests(sources: Path, workspace: Path) -> None:
     """It looks for pytest in setup.py, and without it passes having run nothing."""
-    one = ["test/core/test_modes.py", " --maxfail=1"]
+    one = ["test/core/omnibot/test_modes.py", " --maxfail=1"]
     colcon = [sys.executable, "-m", "colcon"]
     run([*colcon, "test", "--base-paths", sources, "--pytest-args", *one], workspace)
     summary = run([*colcon, "test-result", "--all"], workspace)

@@ -22,7 +22,7 @@ from rclpy.qos import QoSProfile
 from rosbags.rosbag2 import StoragePlugin
 from std_srvs.srv import SetBool
 
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.demo.square import steer
 from omnibot_driver.tools.report.__main__ import main as report
 

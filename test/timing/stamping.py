@@ -22,9 +22,9 @@ from carriage import CHUNKERS, Chunks, Received, receive
 from truth import SCENARIOS, TICK_S, Truth, generate
 
 from omnibot_driver.core.board import ImuReading, PausedReading
-from omnibot_driver.core.device_clock import DeviceClock
-from omnibot_driver.core.imu import ImuScale
+from omnibot_driver.core.imu.scale import ImuScale
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.timing.device_clock import DeviceClock
 
 JITTER_S = 60e-6
 """Mean of the host's own delay at each read, exponentially distributed."""

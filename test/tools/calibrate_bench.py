@@ -5,9 +5,9 @@
 from collections.abc import Callable
 from typing import Any
 
-from bench import TICK_S, Bench
+from session_bench import TICK_S, Bench
 
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.simulator import BoardSettings
 from omnibot_driver.tools.calibrate.log import Log

@@ -5,7 +5,7 @@
 import math
 from collections.abc import Callable
 
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.simulator import SimulatedBoard
 
 

@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from surveyor import Surveyor
 
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.tools.calibrate import geometry
 from omnibot_driver.tools.calibrate.arguments import command_line

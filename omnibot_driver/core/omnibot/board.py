@@ -11,10 +11,11 @@ it. What the board says is told in ``translation``.
 from typing import Final
 
 from omnibot_driver.core.board import BoardFigures, Edge, Mode, Reading, Vector3
+from omnibot_driver.core.commands.limits import MAX_WORD, slow, to_nearest
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.imu import ACCEL_COUNTS_PER_G, gravity_advice
-from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
-from omnibot_driver.core.limits import MAX_WORD, slow, to_nearest
+from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.imu.scale import ACCEL_COUNTS_PER_G, gravity_advice
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
 from omnibot_driver.core.omnibot.modes import Happening
@@ -27,7 +28,6 @@ from omnibot_driver.core.omnibot.outbound import (
 from omnibot_driver.core.omnibot.schedule import TICK_S, Schedule
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
 from omnibot_driver.core.omnibot.translation import Translation
-from omnibot_driver.core.se2 import Pose
 
 _STOP: Final = frames.encode(frames.STOP)
 STOP: Final = transmission(_STOP)

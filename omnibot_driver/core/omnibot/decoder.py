@@ -8,9 +8,9 @@ a header alone proves nothing. A frame is believed for what stands around it, in
 * *In step* (the byte before it ended a believed frame) a frame comes out with its last byte while
   nothing speaks against it: what follows in hand begins like a frame, its content is no leap, the
   line was not idle within it, and its last byte is not one that the next header may have lent.
-* *In doubt* all readings of the bytes in hand compete (``lattice``), priced by all the evidence
-  (``evidence``). A frame of the cheapest reading comes out when every reading without it is clearly
-  dearer; where two are close, nothing is said. A doubt waits for ``DOUBT_BYTES`` at the most.
+* *In doubt* all readings of the bytes in hand compete (``trellis``), priced by all the evidence
+  (``cost_model``). A frame of the cheapest reading comes out when every reading without it is
+  clearly dearer; where two are close, nothing is said. A doubt waits for ``DOUBT_BYTES``.
 
 This module reads no clock and never raises on input. It holds less than ``DOUBT_BYTES`` between
 calls, and looks at each byte a bounded number of times.
@@ -21,9 +21,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from omnibot_driver.core.omnibot import evidence
-from omnibot_driver.core.omnibot.calm import Walk, goes_on, take_calm, take_lone
-from omnibot_driver.core.omnibot.evidence import NOTHING_KNOWN, Context, Expectation
+from omnibot_driver.core.omnibot import cost_model
+from omnibot_driver.core.omnibot.cost_model import NOTHING_KNOWN, Context, Expectation
+from omnibot_driver.core.omnibot.fast_path import Walk, goes_on, take_calm, take_lone
 from omnibot_driver.core.omnibot.frames import (
     IMU_LENGTH,
     INCOMPLETE,
@@ -35,10 +35,10 @@ from omnibot_driver.core.omnibot.frames import (
     decode_measured,
     measure,
 )
+from omnibot_driver.core.omnibot.gaps import BYTE_S, LATE_S, TICK_BYTES, Pauses
 from omnibot_driver.core.omnibot.late_reads import IDLE_S
-from omnibot_driver.core.omnibot.lattice import Piece, read
-from omnibot_driver.core.omnibot.pauses import BYTE_S, LATE_S, TICK_BYTES, Pauses
 from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
+from omnibot_driver.core.omnibot.trellis import Piece, read
 
 SPOKEN_AGAINST: Final = 3.0
 """A content of this cost waits for what follows."""
@@ -205,10 +205,10 @@ class FrameDecoder:
             frame = decode_measured(held[at:end], order)
             cost, after = expectation.weigh(frame, context)
             if cost >= SPOKEN_AGAINST and (
-                cost >= evidence.LOOK_ALIKE or not goes_on(held, end, closed=closed)
+                cost >= cost_model.LOOK_ALIKE or not goes_on(held, end, closed=closed)
             ):
                 return self._believe_but_the_last(walk, found)
-            if end == size and not closed and evidence.may_be_lent(frame, context):
+            if end == size and not closed and cost_model.may_be_lent(frame, context):
                 parted = self._arrived < length  # what is sent at once begins after a pause
                 at_pace = self._pauses.at_pace  # else the next frame may have begun
                 if not self._pauses.sharp or (
@@ -289,7 +289,11 @@ class FrameDecoder:
                 or type(piece.frame) is PausedFrame
             )
             sure = proved and piece.sure
-            if piece.end == size and not closed and evidence.may_be_lent(piece.frame, piece.before):
+            if (
+                piece.end == size
+                and not closed
+                and cost_model.may_be_lent(piece.frame, piece.before)
+            ):
                 return
             if not (sure or closed or number < settled_before or piece.end <= until):
                 return

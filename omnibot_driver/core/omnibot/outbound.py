@@ -33,7 +33,7 @@ import re
 import struct
 from typing import Final
 
-from omnibot_driver.core.limits import MAX_WORD, to_nearest
+from omnibot_driver.core.commands.limits import MAX_WORD, to_nearest
 from omnibot_driver.core.omnibot.frames import (
     COMMAND_HEADER,
     FORCE_START,

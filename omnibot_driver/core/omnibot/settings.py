@@ -5,7 +5,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from omnibot_driver.core.imu import ImuScale
+from omnibot_driver.core.imu.scale import ImuScale
 from omnibot_driver.core.omnibot.frames import ByteOrder
 
 

@@ -17,7 +17,8 @@ from omnibot_driver.core.board import (
     Reading,
     Vector3,
 )
-from omnibot_driver.core.kinematics import OmniKinematics
+from omnibot_driver.core.geometry.kinematics import OmniKinematics
+from omnibot_driver.core.omnibot.frame_schedule import LENGTH, Rhythm
 from omnibot_driver.core.omnibot.frames import (
     DeltaFrame,
     Frame,
@@ -26,12 +27,11 @@ from omnibot_driver.core.omnibot.frames import (
     PoseFrame,
     Words,
 )
+from omnibot_driver.core.omnibot.misconfiguration import Suspicion
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
-from omnibot_driver.core.omnibot.rhythm import LENGTH, Rhythm
 from omnibot_driver.core.omnibot.schedule import Schedule
 from omnibot_driver.core.omnibot.sequence import Sequence
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
-from omnibot_driver.core.omnibot.suspicion import Suspicion
 
 DELTA_LSB: Final = 1e-4
 """m, m, rad."""

@@ -6,7 +6,7 @@ import argparse
 import math
 from typing import Final
 
-from omnibot_driver.core.imu import STANDARD_GRAVITY
+from omnibot_driver.core.imu.scale import STANDARD_GRAVITY
 from omnibot_driver.tools.calibrate.seen import WHEELS
 
 PARTS: Final = ("board", "wheels", "imu")

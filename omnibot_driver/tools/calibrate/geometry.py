@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.geometry_figure import draw

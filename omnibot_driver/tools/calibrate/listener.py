@@ -14,7 +14,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, String
 
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.tools.calibrate.client import FOUND_WITHIN_S, Client
 from omnibot_driver.tools.calibrate.interruption import Interruption
 from omnibot_driver.tools.calibrate.log import Log

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from omnibot_driver.core.imu import STANDARD_GRAVITY
+from omnibot_driver.core.imu.scale import STANDARD_GRAVITY
 from omnibot_driver.tools.calibrate.log import Imu
 from omnibot_driver.tools.calibrate.seen import Contradiction
 

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from omnibot_driver.core.gyro_calibration import Look
+from omnibot_driver.core.imu.gyro_calibration import Look
 from omnibot_driver.tools.calibrate.allan import Allan, Noise, allan, noise
 from omnibot_driver.tools.calibrate.log import Column, Imu, Log
 from omnibot_driver.tools.needs import ToolError

@@ -9,7 +9,7 @@ equations call positive), -1 clockwise, 0 still.
 from collections.abc import Sequence
 from typing import Final
 
-from omnibot_driver.core.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
 
 Pattern = tuple[int, int, int]
 

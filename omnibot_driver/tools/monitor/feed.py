@@ -29,8 +29,8 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
 
-from omnibot_driver.core.diagnosis import Status
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.reporting.diagnosis import Status
 from omnibot_driver.messages import UNMEASURED_VARIANCE
 from omnibot_driver.tools.monitor.model import (
     DIAGNOSTICS_TOPIC,

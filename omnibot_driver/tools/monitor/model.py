@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.board import Vector3
-from omnibot_driver.core.diagnosis import RUNNING, Level, Status
-from omnibot_driver.core.kinematics import BodyTwist
-from omnibot_driver.core.se2 import Pose
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.reporting.diagnosis import RUNNING, Level, Status
 from omnibot_driver.tools.monitor.rates import Rate
 
 IMU_TOPIC: Final = "imu/data_raw"

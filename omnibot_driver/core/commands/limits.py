@@ -1,0 +1,126 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How fast is allowed, and what fits a word on the wire; every limit keeps the direction.
+
+Pure arithmetic on finite numbers; ``require_finite`` is where others are turned away.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+
+MAX_WORD: Final = 32767
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedLimits:
+    """The fastest that is commanded: m/s as a vector, rad/s of yaw, rad/s of the fastest wheel.
+
+    ``linear_mps2``, ``angular_radps2``: how fast a base velocity is changed; 0 is at once.
+    """
+
+    linear_mps: float = 0.5
+    angular_radps: float = 0.5
+    wheel_radps: float = 17.0
+    linear_mps2: float = 0.0
+    angular_radps2: float = 0.0
+
+    def stricter_than(self, other: "SpeedLimits") -> bool:
+        """Whether anything is to go more slowly."""
+        return (
+            self.linear_mps < other.linear_mps
+            or self.angular_radps < other.angular_radps
+            or self.wheel_radps < other.wheel_radps
+        )
+
+    def allow(self, twist: BodyTwist) -> bool:
+        """Whether it is below them, as NaN and infinity never are."""
+        return (
+            twist.vx_mps * twist.vx_mps + twist.vy_mps * twist.vy_mps
+            < self.linear_mps * self.linear_mps
+            and abs(twist.yaw_rate_radps) < self.angular_radps
+        )
+
+    def twist(self, wanted: BodyTwist) -> BodyTwist:
+        """The linear velocity shortened in its own direction, the yaw rate clamped."""
+        vx, vy = shorten((wanted.vx_mps, wanted.vy_mps), self.linear_mps)
+        yaw_rate = max(-self.angular_radps, min(self.angular_radps, wanted.yaw_rate_radps))
+        return BodyTwist(vx, vy, yaw_rate)
+
+    def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
+        """The velocity after ``duration_s`` on the straight way to what is wanted."""
+        vx, vy = _step(
+            (now.vx_mps, now.vy_mps),
+            (wanted.vx_mps, wanted.vy_mps),
+            self.linear_mps2 * duration_s if self.linear_mps2 else math.inf,
+        )
+        (yaw_rate,) = _step(
+            (now.yaw_rate_radps,),
+            (wanted.yaw_rate_radps,),
+            self.angular_radps2 * duration_s if self.angular_radps2 else math.inf,
+        )
+        return BodyTwist(vx, vy, yaw_rate)
+
+    def wheels(self, wanted_radps: Sequence[float]) -> tuple[float, float, float]:
+        """All three wheels slowed alike until the fastest is within its limit."""
+        a, b, c = slow(wanted_radps, self.wheel_radps)
+        return a, b, c
+
+
+def require_finite(what: str, values: Sequence[float]) -> None:
+    """Raises CommandRefused, naming ``what``, when a value is NaN or infinite."""
+    if not all(map(math.isfinite, values)):
+        numbers = ", ".join(f"{value:g}" for value in values)
+        raise CommandRefused(
+            f"{what} refused: ({numbers}) is not finite and counts as no command: mend the sender"
+        )
+
+
+def require_timely(what: str, age_s: float, longest_s: float) -> None:
+    """Raises CommandRefused for what was sent too long ago, or as far in the future."""
+    if abs(age_s) <= longest_s:
+        return
+    if age_s > 0.0:
+        wrong = f"it is {age_s:.2f} s old and worth nothing after {longest_s:g} s (cmd_vel_timeout)"
+    else:
+        wrong = f"its stamp is {-age_s:.2f} s in the future"
+    raise CommandRefused(
+        f"{what} refused: {wrong}: check the network and that both clocks agree (NTP,"
+        " use_sim_time), or leave the stamp at zero"
+    )
+
+
+def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
+    """The vector with a Euclidean length of at most ``limit``, however large it is."""
+    largest = max(map(abs, vector))
+    if largest == 0.0:
+        return tuple(vector)
+    unit_length = math.hypot(*(value / largest for value in vector))
+    return _scale(vector, limit / largest / unit_length)
+
+
+def slow(values: Sequence[float], limit: float) -> tuple[float, ...]:
+    """The values scaled together until the largest magnitude is at most ``limit``."""
+    largest = max(map(abs, values))
+    return tuple(values) if largest <= limit else _scale(values, limit / largest)
+
+
+def to_nearest(count: float) -> int:
+    """The nearest whole count; halves away from zero, so that both signs are alike."""
+    return int(count + 0.5) if count > 0.0 else int(count - 0.5)
+
+
+def _step(now: Sequence[float], wanted: Sequence[float], longest: float) -> tuple[float, ...]:
+    """From one vector towards another, by no more than ``longest``."""
+    way = tuple(there - here for here, there in zip(now, wanted, strict=True))
+    if math.hypot(*way) <= longest:
+        return tuple(wanted)
+    return tuple(here + part for here, part in zip(now, shorten(way, longest), strict=True))
+
+
+def _scale(values: Sequence[float], factor: float) -> tuple[float, ...]:
+    return tuple(value * factor for value in values) if factor < 1.0 else tuple(values)

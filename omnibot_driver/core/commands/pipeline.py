@@ -1,0 +1,222 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Motion commands, from a wish to what comes of it: when each expires, and whether the robot obeys.
+
+Composes the helm, the command stream and the motion monitor with its interlock. Knows no modes and
+no requests: whether a robot may be driven now is decided elsewhere.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from omnibot_driver.core.board import Board, DisplacementReading
+from omnibot_driver.core.commands.limits import SpeedLimits, require_timely
+from omnibot_driver.core.commands.motion_interlock import MotionInterlock
+from omnibot_driver.core.commands.set_points import GoalMotion, Motion
+from omnibot_driver.core.commands.shaping import ControlMethod, Helm
+from omnibot_driver.core.commands.stream import PACE_S, CommandSettings, CommandStream
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose, Signs
+from omnibot_driver.core.measurement.pipeline import Estimate
+from omnibot_driver.core.motion_monitor.monitor import ADVICE, Fault, MotionMonitor
+from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
+from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
+from omnibot_driver.core.reporting.figures import CommandFigures
+
+Wish = tuple[Motion, float]
+"""A motion that may be commanded, and when it expires."""
+NEVER: Final = math.inf
+
+
+class Driving:
+    """``stream`` is what goes out; ``obeys``: whether the robot can be expected to do it;
+    ``interlock`` refuses motion after it did not; ``monitored``: whether that is looked after.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        odometry: Odometry,
+        limits: SpeedLimits,
+        commands: CommandSettings,
+        axis_signs: Signs,
+        control: ControlMethod,
+        *,
+        obeys: bool,
+        monitored: bool,
+    ) -> None:
+        self._stop = board.stop()
+        self.stream = CommandStream(
+            commands, stop=self._stop, emergency_stop=board.emergency_stop()
+        )
+        self._odometry = odometry
+        self._helm = Helm(board, odometry, limits, axis_signs, control)
+        self.interlock = MotionInterlock()
+        self._board, self._axis_signs = board, axis_signs
+        self._monitor = MotionMonitor()
+        self._obeys = obeys
+        self.monitored = monitored
+
+    def configure(self, limits: SpeedLimits, commands: CommandSettings, now: float) -> list[str]:
+        """New settings, from the next command and frame on; sentences for the user.
+
+        What was commanded under looser ones ends.
+        """
+        stricter = commands.timeout_s < self.stream.settings.timeout_s or limits.stricter_than(
+            self._helm.limits
+        )
+        self._helm.limits, self.stream.settings = limits, commands
+        current = self.stream.current
+        if not stricter or current is None or current.stands or isinstance(current, GoalMotion):
+            return []
+        self.stream.halt(now)
+        return ["the robot is stopped, as its limits are stricter now: command it anew"]
+
+    def encode_anew(self, now: float) -> list[str]:
+        """The board's settings have changed: the command that is repeated is said in them."""
+        if self.stream.current is None:
+            return []
+        try:
+            self.stream.current.encode_anew(self._stop)
+        except CommandRefused as error:
+            self.stream.halt(now)
+            return [f"robot stopped, the current command does not fit the new scale: {error}"]
+        return []
+
+    def monitor(self, monitored: bool) -> None:
+        """Stop a robot that does not move as commanded, or let it drive."""
+        if monitored is not self.monitored:
+            self.monitored = monitored
+            self._monitor.begin()
+            self.interlock.start()
+
+    def figures(self, now: float) -> CommandFigures:
+        """Who commands, and how."""
+        current = self.stream.current
+        return CommandFigures(
+            source=current.authority.value if current else None,
+            age_s=now - self.stream.commanded_at,
+            limited=self._helm.limited,
+            estop=self.stream.latched,
+            monitored=self.monitored or not self._obeys,
+            trips=self.interlock.trips,
+            interlock=self.interlock.reason(self.stream.settings.timeout_s),
+        )
+
+    def begin(self) -> None:
+        """What was commanded and seen has nothing to do with what comes."""
+        self.stream.discard()
+        self._monitor.begin()
+
+    def release(self, now: float) -> None:
+        """End the e-stop."""
+        self.stream.release(now)
+        self._monitor.release()
+
+    def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Wish:
+        """Drive the body. Raises CommandRefused, as all wishes do."""
+        timeout_s = self.stream.settings.timeout_s
+        expires_at = now + timeout_s
+        if age_s:
+            require_timely("cmd_vel", age_s, timeout_s)
+            expires_at -= max(0.0, age_s)
+        motion = self._helm.base(twist, before=self.stream.current, since=now - PACE_S)
+        return motion, expires_at
+
+    def wheels(self, rates_radps: Sequence[float], now: float) -> Wish:
+        """Turn wheels A, B, C."""
+        return self._helm.wheels(rates_radps), now + self.stream.settings.timeout_s
+
+    def pose(self, goal: Pose) -> Wish:
+        """Drive to a pose in the odometry frame."""
+        return self._helm.pose(goal), NEVER
+
+    def wrote(self, data: bytes, now: float) -> None:
+        """The stream said this."""
+        goal = isinstance(self.stream.current, GoalMotion)
+        self._monitor.set_point(None if goal else self._board.meaning(data), now)
+
+    def look(
+        self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
+    ) -> list[str]:
+        """Compare what the robot did with what was commanded; sentences for the user."""
+        self.stream.proof.look(reading, now)
+        fault = self._check(reading, estimates, now) if self.monitored and self._obeys else None
+        return self._react_to(fault, now) + self.check_goal(estimates, now)
+
+    def count_refused(self, count: int, now: float) -> list[str]:
+        """``count``: displacements so far that no robot can have made; sentences for the user."""
+        fault = self._monitor.count_refused(count, now) if self.monitored and self._obeys else None
+        return self._react_to(fault, now)
+
+    def _check(
+        self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
+    ) -> Fault | None:
+        """What the newest estimate, or else the bare displacement, shows."""
+        seconds = reading.duration_s
+        if not seconds or reading.restarted:
+            self._monitor.begin()
+            return None
+        if self.stream.current is None:
+            self._monitor.set_point(AT_REST, now)
+        newest = estimates[-1] if estimates else None
+        if isinstance(newest, OdometryEstimate) and newest.rolling is not None:
+            known = reading.frame == "body" or self._odometry.heading_known
+            return self._monitor.check(newest.rolling, seconds, newest.stamp_s, heading_known=known)
+        motion = Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad).over(seconds)
+        known = reading.frame == "body"
+        return self._monitor.check(motion, seconds, now, heading_known=known)
+
+    def _react_to(self, fault: Fault | None, now: float) -> list[str]:
+        """Stop a robot that moves otherwise than commanded; say what is wrong."""
+        if fault is None:
+            return []
+        if fault in ADVICE:
+            self.stream.halt(now)
+            self.interlock.trip(now)
+            seen = "" if fault is Fault.BEYOND_LIMITS else self._seen()
+            until = self.interlock.until.value
+            advice = ADVICE[fault]
+            if self._board.advice:
+                advice = f"{self._board.advice}; otherwise {advice}"
+            return [
+                f"{fault.value}{seen}; robot stopped: {advice}; if it comes and goes, check the"
+                f" cable to the board. {until}"
+            ]
+        if fault is Fault.UNCOMMANDED:
+            self.stream.halt(now)
+        return [fault.value] if self._monitor.is_news(fault) else []
+
+    def _seen(self) -> str:
+        """What was commanded and what was measured, in REP-103's axes."""
+        x, y, yaw = self._axis_signs
+        commanded, measured = (
+            f"{x * twist.vx_mps:.2f}, {y * twist.vy_mps:.2f} m/s, {yaw * twist.yaw_rate_radps:.2f}"
+            " rad/s"
+            for twist in (self._monitor.commanded, self._monitor.measured)
+        )
+        return f" (commanded {commanded}; measured {measured})"
+
+    def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
+        """Drop a goal that is another place by now, or that the robot drives away from."""
+        goal = self.stream.current
+        if not isinstance(goal, GoalMotion):
+            return []
+        if goal.alignment != self._odometry.alignments:
+            why = "odom begins anew"
+        elif any(
+            goal.is_left_by(estimate.pose)
+            for estimate in estimates
+            if isinstance(estimate, OdometryEstimate)
+        ):
+            self.interlock.trip(now)
+            why = (
+                "the robot drives away from it: does the board's switch stand on position?"
+                f" {self.interlock.until.value}"
+            )
+        else:
+            return []
+        self.stream.halt(now)
+        return [f"the goal of cmd_pose is discarded: {why}"]

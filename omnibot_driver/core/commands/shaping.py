@@ -1,0 +1,105 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From wishes to motions: checked, limited, in the board's own axes and frame.
+
+Knows what may be wished for and where the board's switch stands; not what mode the board is in, nor
+when anything is sent.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Literal
+
+from omnibot_driver.core.board import Board, Mode
+from omnibot_driver.core.commands.limits import SpeedLimits, require_finite
+from omnibot_driver.core.commands.set_points import (
+    Authority,
+    BaseMotion,
+    GoalMotion,
+    Motion,
+    SteadyMotion,
+)
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose, Signs
+from omnibot_driver.core.odometry.estimator import Odometry
+
+ControlMethod = Literal["velocity", "position"]
+
+
+class Helm:
+    """``limits`` may be replaced at any time. Every method raises CommandRefused."""
+
+    def __init__(
+        self,
+        board: Board,
+        odometry: Odometry,
+        limits: SpeedLimits,
+        axis_signs: Signs,
+        control: ControlMethod,
+    ) -> None:
+        self.limits = limits
+        self._board, self._odometry = board, odometry
+        self._stop = board.stop()
+        self._axis_signs, self._control = axis_signs, control
+        self.limited = 0
+        """Wishes that went beyond the limits."""
+
+    def base(self, twist: BodyTwist, *, before: Motion | None, since: float) -> Motion:
+        """Drive the body, from what was commanded ``before``."""
+        if self._control == "position":
+            raise self._at_odds(Authority.BASE)
+        limited = twist
+        if not self.limits.allow(twist):
+            require_finite("cmd_vel", (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps))
+            limited = self.limits.twist(twist)
+            self.limited += limited != twist
+        x, y, yaw = self._axis_signs
+        return BaseMotion(
+            BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps),
+            self.limits,
+            self._board.velocity,
+            stop=self._stop,
+            before=before,
+            since=since,
+        )
+
+    def wheels(self, rates_radps: Sequence[float]) -> Motion:
+        """Turn the wheels A, B, C."""
+        if self._control == "position":
+            raise self._at_odds(Authority.WHEELS)
+        if len(rates_radps) != 3:
+            raise CommandRefused(
+                f"wheel_cmd refused: it has {len(rates_radps)} values; send exactly 3,"
+                " the rates of wheels A, B, C in rad/s"
+            )
+        require_finite("wheel_cmd", rates_radps)
+        limited = self.limits.wheels(rates_radps)
+        self.limited += limited != tuple(rates_radps)
+        frame = self._board.wheels(limited)
+        return SteadyMotion(
+            Authority.WHEELS,
+            frame,
+            stands=frame == self._stop,
+            encode=partial(self._board.wheels, limited),
+        )
+
+    def pose(self, goal: Pose) -> Motion:
+        """Drive to a pose in the odometry frame and stay there."""
+        if self._control != "position":
+            raise self._at_odds(Authority.POSE)
+        require_finite("cmd_pose", (goal.x_m, goal.y_m, goal.yaw_rad))
+        place = self._odometry.in_board_frame(goal)
+        if place is None or self._board.mode is Mode.IMU_ONLY:
+            raise CommandRefused(
+                "cmd_pose refused: where the board believes to be is not known; this needs its"
+                " poses (nominal mode) and `use_board_pose`. After a restart, wait a second"
+            )
+        encode = partial(self._board.drive_to, place)
+        return GoalMotion(goal, encode, self._odometry.alignments)
+
+    def _at_odds(self, authority: Authority) -> CommandRefused:
+        return CommandRefused(
+            f"{authority.value} refused: the parameter `control_method` is '{self._control}';"
+            " it must say where the board's switch stands"
+        )

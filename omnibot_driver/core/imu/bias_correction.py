@@ -1,0 +1,73 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the IMU measured, without its biases; and what it says of itself while the robot stands."""
+
+from dataclasses import dataclass
+
+from omnibot_driver.core.board import Board, DisplacementReading, ImuReading, Vector3
+from omnibot_driver.core.imu.gyro_calibration import GyroCalibration
+from omnibot_driver.core.reporting.figures import ImuFigures
+from omnibot_driver.core.values import value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImuCorrection:
+    """Biases in rad/s and m/s², and whether standstills may refine the gyro's."""
+
+    gyro_bias: Vector3 = (0.0, 0.0, 0.0)
+    accel_bias: Vector3 = (0.0, 0.0, 0.0)
+    auto_gyro_bias: bool = False
+
+
+@value(frozen=True, slots=True)
+class ImuEstimate:
+    """At ``stamp_s``: specific force in m/s², angular velocity in rad/s, in the sensor's axes."""
+
+    stamp_s: float
+    specific_force: Vector3
+    angular_velocity: Vector3
+
+
+class Inertial:
+    """``calibration`` is for whoever asks for one."""
+
+    def __init__(self, board: Board, correction: ImuCorrection) -> None:
+        self._board = board
+        self._correction = correction
+        self.calibration = GyroCalibration(correction.gyro_bias, refine=correction.auto_gyro_bias)
+
+    def configure(self, correction: ImuCorrection) -> None:
+        """A bias that was set otherwise replaces what was found; one that was not, does not."""
+        if correction.gyro_bias != self._correction.gyro_bias:
+            self.calibration.bias = correction.gyro_bias
+        self.calibration.refine = correction.auto_gyro_bias
+        self._correction = correction
+
+    def estimate(self, reading: ImuReading, stamp_s: float) -> ImuEstimate:
+        """The reading without biases."""
+        (x, y, z), (bias_x, bias_y, bias_z) = reading.specific_force, self._correction.accel_bias
+        force = x - bias_x, y - bias_y, z - bias_z
+        (u, v, w) = rate = reading.angular_velocity
+        self.calibration.hear(rate, force, stamp_s)
+        bias_u, bias_v, bias_w = self.calibration.bias
+        return ImuEstimate(stamp_s, force, (u - bias_u, v - bias_v, w - bias_w))
+
+    def displaced(self, reading: DisplacementReading) -> None:
+        """What the wheels tell of rest and motion."""
+        self.calibration.displaced(reading.dx_m, reading.dy_m, reading.dyaw_rad)
+
+    @property
+    def advice(self) -> str:
+        """Which setting gravity contradicts, in a sentence; empty while all is well."""
+        gravity_mps2 = self.calibration.gravity_mps2
+        return "" if gravity_mps2 is None else self._board.gravity_advice(gravity_mps2)
+
+    @property
+    def figures(self) -> ImuFigures:
+        """For whoever looks after the sensor."""
+        return ImuFigures(
+            bias_radps=self.calibration.bias,
+            gravity_mps2=self.calibration.gravity_mps2,
+            noise_radps=self.calibration.noise,
+            advice=self.advice,
+        )

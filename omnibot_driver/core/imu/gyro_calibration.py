@@ -1,0 +1,188 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The gyro's bias: measured on request, refined at standstill, never learnt from motion.
+
+A gyro at rest reads its bias and noise. Whether the robot is at rest is told by three witnesses:
+the wheels (displacements that add up to nothing), the gyro (readings that hardly vary) and the
+accelerometer (likewise). A steady turn without wheels is seen by none of them, so what comes out
+must also be a bias that the sensor may have. By the way the length of gravity is found.
+
+This module knows readings and times. It reads no clock, and does not know when one should measure.
+"""
+
+import math
+from collections.abc import Sequence
+from statistics import fmean
+from typing import Final
+
+from omnibot_driver.core.board import Vector3
+from omnibot_driver.core.mode_manager import RequestDone
+
+MEASURE_S: Final = 2.0
+BLOCK_S: Final = 1.0
+"""Length of a look at a robot that nobody asked to stand still."""
+GAP_S: Final = 0.2
+"""After a longer time without readings a look begins anew."""
+ANSWER_WITHIN_S: Final = 4.0
+"""Leaves a second of the five that a service has for writing a file."""
+
+STILL_RADPS: Final = 0.01
+STILL_MPS2: Final = 0.3
+"""Ten times the noise of one reading, rms: a robot that is touched shows more."""
+STILL_M: Final = 0.002
+STILL_RAD: Final = 0.002
+"""Wheels that stand may say one count to and fro."""
+LARGEST_BIAS_RADPS: Final = math.radians(20.0)
+"""MPU-6050 product specification, section 6.1: initial zero-rate output."""
+REFINEMENT: Final = 0.05
+"""Part of the way to what one block says: half the way in a quarter of a minute."""
+
+
+class Look:
+    """What was seen of the robot since ``began_s``."""
+
+    def __init__(self) -> None:
+        self.rates: list[Vector3] = []
+        self.forces: list[Vector3] = []
+        self.began_s = self.last_s = math.nan
+        self.displacements = 0
+        self._x_m = self._y_m = self._yaw_rad = 0.0
+
+    def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
+        """A reading of the IMU."""
+        if not self.rates:
+            self.began_s = stamp_s
+        self.last_s = stamp_s
+        self.rates.append(rate)
+        self.forces.append(force)
+
+    def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
+        """A displacement, in whichever axes."""
+        self.displacements += 1
+        self._x_m += dx_m
+        self._y_m += dy_m
+        self._yaw_rad += dyaw_rad
+
+    @property
+    def length_s(self) -> float:
+        """From the first reading to the last."""
+        return self.last_s - self.began_s if self.rates else 0.0
+
+    @property
+    def rolled(self) -> bool:
+        """Whether the wheels tell of motion."""
+        return math.hypot(self._x_m, self._y_m) > STILL_M or abs(self._yaw_rad) > STILL_RAD
+
+    @property
+    def motion(self) -> str:
+        """What speaks against rest, in words; empty if nothing does."""
+        shaken_radps, shaken_mps2 = max(deviation(self.rates)), max(deviation(self.forces))
+        bias_radps = max(map(abs, mean(self.rates)))
+        if self.rolled:
+            return "its wheels turn"
+        if shaken_radps > STILL_RADPS:
+            return f"its gyro varies by {shaken_radps:.3f} rad/s"
+        if shaken_mps2 > STILL_MPS2:
+            return f"its accelerometer varies by {shaken_mps2:.2f} m/s²"
+        if bias_radps > LARGEST_BIAS_RADPS:
+            return f"its gyro reads {bias_radps:.2f} rad/s, which is turning and no bias"
+        return ""
+
+
+class GyroCalibration:
+    """``bias`` is what the gyro reads at rest, in rad/s; ``refine``: whether standstills mend it.
+
+    ``answers`` has a RequestDone for every measurement that came to an end.
+    """
+
+    def __init__(self, bias: Vector3, *, refine: bool) -> None:
+        self.bias = bias
+        self.refine = refine
+        self.answers: list[RequestDone] = []
+        self.gravity_mps2: float | None = None
+        """Mean specific force when the robot last stood still."""
+        self.noise: Vector3 | None = None
+        """Standard deviation of the gyro's readings then."""
+        self._look = Look()
+        self._token: object = None
+        self.wake_at = math.inf
+        """When ``tick`` has something to do."""
+
+    @property
+    def measuring(self) -> bool:
+        """Whether an answer is owed."""
+        return self.wake_at < math.inf
+
+    def measure(self, token: object, now: float) -> None:
+        """Find the bias from the next two seconds; the answer comes in ``answers``."""
+        self._look = Look()
+        self._token, self.wake_at = token, now + ANSWER_WITHIN_S
+
+    def give_up(self, reason: str) -> None:
+        """A measurement under way has failed, and this is why and what to do."""
+        if self.measuring:
+            self._answer(False, f"the gyro's bias stays as it was: {reason}")
+
+    def tick(self, now: float) -> None:
+        """Give up what is overdue."""
+        if now >= self.wake_at:
+            self.give_up("no two seconds of readings came without a gap; see ~/state, call again")
+
+    def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
+        """A reading of the IMU, as the sensor gave it, but for the accelerometer's bias."""
+        look = self._look
+        if stamp_s - look.last_s > GAP_S:
+            look = self._look = Look()
+        look.hear(rate, force, stamp_s)
+        length_s = stamp_s - look.began_s
+        if length_s >= BLOCK_S and (length_s >= MEASURE_S or not self.measuring):
+            self._conclude()
+
+    def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
+        """The wheels told so much."""
+        self._look.displaced(dx_m, dy_m, dyaw_rad)
+
+    def _conclude(self) -> None:
+        look, self._look = self._look, Look()
+        if motion := look.motion:
+            self.give_up(f"the robot moves ({motion}); let it stand still for 2 s and call again")
+            return
+        self.gravity_mps2 = math.hypot(*mean(look.forces))
+        self.noise = deviation(look.rates)
+        if self.measuring:
+            self.bias = mean(look.rates)
+            self._answer(
+                True,
+                f"gyro bias {_numbers(self.bias)} rad/s, noise {_numbers(self.noise)} rad/s rms,"
+                f" from {len(look.rates)} readings",
+            )
+        elif self.refine and look.displacements:
+            x, y, z = (
+                known + REFINEMENT * (seen - known)
+                for known, seen in zip(self.bias, mean(look.rates), strict=True)
+            )
+            self.bias = x, y, z
+
+    def _answer(self, success: bool, message: str) -> None:
+        self.answers.append(RequestDone(self._token, success, message))
+        self._token, self.wake_at = None, math.inf
+
+
+def mean(vectors: Sequence[Vector3]) -> Vector3:
+    """Of at least one, axis by axis."""
+    x, y, z = map(fmean, zip(*vectors, strict=True))
+    return x, y, z
+
+
+def deviation(vectors: Sequence[Vector3]) -> Vector3:
+    """Standard deviation of at least one, axis by axis."""
+    n = len(vectors)
+    x, y, z = (
+        math.dist(axis, (middle,) * n) / math.sqrt(n)
+        for axis, middle in zip(zip(*vectors, strict=True), mean(vectors), strict=True)
+    )
+    return x, y, z
+
+
+def _numbers(vector: Vector3) -> str:
+    return "(" + ", ".join(f"{value:.5f}" for value in vector) + ")"

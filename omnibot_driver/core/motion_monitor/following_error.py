@@ -1,0 +1,86 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a robot moves outside of its envelope without a break: its unexplained way.
+
+One displacement decides nothing, as it may be damaged, and a jerk is over before it adds up. Knows
+velocities in the board's own axes, and times; not what an error means.
+"""
+
+from typing import Final
+
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.motion_monitor.envelope import on_the_way, outside
+from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, SetpointHistory
+from omnibot_driver.core.motion_monitor.wind_up import WindUp
+
+RISING_S: Final = 0.16
+"""A robot that is slower than all set-points of this time is held by something."""
+UNEXPLAINED_M: Final = 0.0035
+UNEXPLAINED_RAD: Final = 0.016
+LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
+"""Part of these limits that one displacement adds at the most: it takes three in a row, or two long
+ones."""
+LONG_S: Final = 0.06
+
+
+class FollowingError:
+    """``outside``: whether the robot was outside of the envelope by the last displacement."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """What was seen so far says nothing of what comes."""
+        self._wind_up = WindUp()
+        self._stands = True
+        self.outside = False
+        self._way_m = self._turn_rad = 0.0
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether it has been so for too far, driving or turning."""
+        return self.way_exceeded or self._turn_rad > UNEXPLAINED_RAD
+
+    @property
+    def way_exceeded(self) -> bool:
+        """Whether it has driven so too far."""
+        return self._way_m > UNEXPLAINED_M
+
+    def update(
+        self,
+        motion: BodyTwist,
+        seconds: float,
+        history: SetpointHistory,
+        begun_s: float,
+        *,
+        heading_known: bool,
+    ) -> None:
+        """``motion`` from ``begun_s`` on, for so long.
+
+        Where the heading is not known, only the length of the linear velocity counts.
+        """
+        newest = history.since(begun_s - RISING_S)
+        way_mps = turn_radps = 0.0
+        if not (heading_known and on_the_way(motion, newest)):
+            explained = history.explained(begun_s)
+            way_mps, turn_radps = outside(motion, explained, heading_known=heading_known)
+        stood, self._stands = self._stands, newest[0] is AT_REST
+        if self._stands is not stood:
+            self._way_m = self._turn_rad = 0.0
+        self.outside = way_mps > 0.0 or turn_radps > 0.0
+        if not self.outside:
+            self._way_m = self._turn_rad = 0.0
+            self._wind_up.follow(motion, seconds, newest, heading_known=heading_known)
+        elif self._stands and self.exceeded:
+            self._wind_up.carry(motion, seconds)
+        elif self._wind_up.way_m and self._wind_up.pay(way_mps, turn_radps, seconds):
+            self._way_m = self._turn_rad = 0.0
+        else:
+            part = LARGEST_PART_OF_A_LONG_ONE if seconds > LONG_S else LARGEST_PART
+            most_m, most_rad = part * UNEXPLAINED_M, part * UNEXPLAINED_RAD
+            self._way_m = _sum(self._way_m, way_mps * seconds, most_m)
+            self._turn_rad = _sum(self._turn_rad, turn_radps * seconds, most_rad)
+
+
+def _sum(before: float, outside: float, most: float) -> float:
+    return before + min(outside, most) if outside > 0.0 else 0.0

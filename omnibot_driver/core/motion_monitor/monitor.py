@@ -1,0 +1,211 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Whether the robot moves as it is commanded, by its displacements against its set-points.
+
+All velocities are in the board's own axes; time is that of its displacements. This module knows
+neither bytes nor how a robot is stopped. docs/safety.md has the thresholds, and the reasons.
+"""
+
+import math
+from enum import Enum
+from typing import Final
+
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.motion_monitor.envelope import dot, speed_of
+from omnibot_driver.core.motion_monitor.following_error import FollowingError
+from omnibot_driver.core.motion_monitor.set_point_history import (
+    AT_REST,
+    Setpoint,
+    SetpointHistory,
+    Velocity,
+)
+
+LAG_S: Final = 0.4
+"""A robot whose last set-point was so long ago is not driven any more."""
+
+PLAIN_MPS: Final = 0.05
+PLAIN_RADPS: Final = 0.15
+"""A robot that is commanded to move faster than this is seen to move."""
+MOVING_MPS: Final = 0.02
+MOVING_RADPS: Final = 0.05
+BLOCKED_S: Final = 1.0
+
+STOOD_S: Final = 0.5
+"""A robot that has stood for so long has obeyed: what it does next is something else."""
+STOPS_S: Final = 5.0
+"""A stop is repeated for so long by itself while the robot moves."""
+
+REFUSED_IN_A_ROW: Final = 4
+COSINE_60: Final = 0.5
+
+
+class Fault(Enum):
+    """What is wrong, as the beginning of a sentence."""
+
+    WRONG_WAY = "robot moves in the wrong direction"
+    WRONG_TURN = "robot turns in the wrong direction"
+    TOO_FAST = "robot moves faster than commanded"
+    TURNS_TOO_FAST = "robot turns faster than commanded"
+    BEYOND_LIMITS = (
+        "robot is faster than `fastest_linear_speed` or `fastest_angular_speed`, which it was not"
+        " to exceed even when pushed"
+    )
+    UNCOMMANDED = (
+        "robot is moving without a command: Stop is sent. If it is not being pushed, call ~/pause"
+        " or switch the motors off by hand, and check the cable"
+    )
+    BLOCKED = (
+        "robot is commanded and does not move: check motor power, whether the wheels are blocked,"
+        " and that `control_method` says where the board's switch stands"
+    )
+    HELD_BY_ESTOP = (
+        "the e-stop is released and the robot is commanded, but it does not move: the board may"
+        " hold the stop itself; call ~/reset"
+    )
+
+
+ADVICE: Final = {
+    Fault.WRONG_WAY: (
+        "check `control_method`, `axis_signs`, `delta_frame` and the wiring of the wheels"
+    ),
+    Fault.WRONG_TURN: "check `control_method`, `axis_signs` and the wiring of the wheels",
+    Fault.TOO_FAST: "check `control_method` and `linear_scale`",
+    Fault.TURNS_TOO_FAST: (
+        "check `control_method` and `angular_scale` (for wheel_cmd, `linear_scale`)"
+    ),
+    Fault.BEYOND_LIMITS: "check `control_method`, `linear_scale` and `angular_scale`",
+}
+"""For each fault of a robot that is driven, and must be stopped."""
+
+
+class MotionMonitor:
+    """``commanded``, ``measured``: what the last fault rests on."""
+
+    def __init__(self) -> None:
+        self.commanded = self.measured = AT_REST
+        self._history = SetpointHistory()
+        self._error = FollowingError()
+        self._released = False
+        self._told: set[Fault] = set()
+        self._refused = self._refused_before = 0
+        self.begin()
+
+    def begin(self) -> None:
+        """What was commanded and seen so far says nothing of what comes."""
+        self._history.clear()
+        self._error.reset()
+        self._has_stood = False
+        self._stood_s = self._moved_s = self._blocked_s = self._stop_again_s = 0.0
+
+    def set_point(self, setpoint: Setpoint, now: float) -> None:
+        """This is commanded from now on; None: a goal, the way to which is the board's own."""
+        if setpoint is self._history.current:
+            return
+        if setpoint is not None and not setpoint.faster_than(0.0, 0.0):
+            setpoint = AT_REST
+        self._history.add(setpoint, now)
+        if setpoint is not AT_REST:
+            self._has_stood = False
+
+    def release(self) -> None:
+        """The e-stop is released; the robot has not moved since."""
+        self._released = True
+
+    def is_news(self, fault: Fault) -> bool:
+        """Once, until the robot has obeyed again."""
+        told, self._told = self._told, self._told | {fault}
+        return fault not in told
+
+    def count_refused(self, count: int, now: float) -> Fault | None:
+        """``count``: displacements, since the driver began, that no robot can have made."""
+        self._refused = count
+        if count < self._refused_before + REFUSED_IN_A_ROW:
+            return None
+        self._refused_before = count
+        driven = self._history.current is None or self._history.driven(now - LAG_S)
+        return self._blame(Fault.BEYOND_LIMITS, now) if driven else Fault.UNCOMMANDED
+
+    def check(
+        self, motion: BodyTwist, seconds: float, stamp_s: float, *, heading_known: bool
+    ) -> Fault | None:
+        """What the displacement that ended at ``stamp_s`` shows: ``motion`` for so long.
+
+        Where the heading is not known, only the length of the linear velocity counts.
+        """
+        self._refused_before = self._refused
+        begun_s, current = stamp_s - seconds, self._history.current
+        if current is None or not self._history.known(begun_s):
+            self._error.reset()
+            return None
+        error = self._error
+        error.update(motion, seconds, self._history, begun_s, heading_known=heading_known)
+        if current is AT_REST and not self._history.driven(begun_s - LAG_S):
+            return self._unbidden(seconds, begins=error.exceeded)
+        self._stood_s = self._moved_s = self._stop_again_s = 0.0
+        if error.exceeded:
+            self.commanded, self.measured = current, motion
+            explained = self._history.explained(begun_s)
+            return self._blame(self._name(explained, heading_known=heading_known), stamp_s)
+        if error.outside:
+            return None
+        return self._blocked(motion, seconds, heading_known=heading_known)
+
+    def _blame(self, fault: Fault, now: float) -> Fault:
+        """The robot is going to be stopped: how it rolls out is no other fault."""
+        self._error.reset()
+        self._history.add(None, now)
+        return fault
+
+    def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
+        """Whether any of these has about the direction of the measured motion."""
+        x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
+        if not self._error.way_exceeded:
+            right = any(yaw * rate > 0.0 for _, _, yaw in explained)
+            return Fault.TURNS_TOO_FAST if right else Fault.WRONG_TURN
+        right = any(
+            vx * x + vy * y > COSINE_60 * math.hypot(vx, vy) * math.hypot(x, y)
+            for vx, vy, _ in explained
+        )
+        return Fault.TOO_FAST if right or not heading_known else Fault.WRONG_WAY
+
+    def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
+        """A robot that is to stand moves: the times at which Stop is said again.
+
+        For one that has stood since it was commanded, and so may be pushed, these get rarer.
+        """
+        if not self._error.outside:
+            self._stood_s += seconds
+            if self._stood_s >= STOOD_S:
+                self._has_stood = True
+                self._moved_s = self._stop_again_s = 0.0
+            return None
+        self._stood_s = 0.0
+        if not (begins or self._stop_again_s):
+            return None
+        self._moved_s += seconds
+        if self._moved_s < self._stop_again_s:
+            return None
+        self._stop_again_s = STOPS_S + (self._moved_s if not self._has_stood else 2 * self._moved_s)
+        return Fault.UNCOMMANDED
+
+    def _blocked(self, motion: BodyTwist, seconds: float, *, heading_known: bool) -> Fault | None:
+        """A robot that is driven and does not get anywhere; one that does has obeyed."""
+        current = self._history.current
+        assert current is not None
+        wanted, turning = speed_of(current), current.yaw_rate_radps
+        if wanted <= PLAIN_MPS and abs(turning) <= PLAIN_RADPS:
+            self._blocked_s = 0.0
+            return None
+        along = dot(motion, current) if heading_known else speed_of(motion) * wanted
+        if (wanted > PLAIN_MPS and along > MOVING_MPS * wanted) or (
+            abs(turning) > PLAIN_RADPS
+            and motion.yaw_rate_radps * turning > MOVING_RADPS * abs(turning)
+        ):
+            self._blocked_s = 0.0
+            self._released, self._told = False, set()
+            return None
+        self._blocked_s += seconds
+        if self._blocked_s < BLOCKED_S:
+            return None
+        self._blocked_s = 0.0
+        return Fault.HELD_BY_ESTOP if self._released else Fault.BLOCKED

@@ -1,0 +1,187 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How far the odometry may be off: what it does not know, kept apart by where it comes from.
+
+* What the wheels do not tell: the slip of every metre (a random walk), and wheels that are larger
+  or smaller than believed or slip all the time (the same error in every turn of a wheel, so it
+  grows with the way itself, and a way back undoes it).
+* ``gap`` is the motion that nobody reported; a pose of the board tells it after all.
+* What is known to be wrong and still being put right counts in full.
+
+Knows covariances and the wheels' geometry; no time, no frames, no board.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+from omnibot_driver.core.geometry.kinematics import OmniKinematics
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.values import value
+
+INITIAL_VARIANCE: Final = 1e-6
+"""(1 mm)² and (1 mrad)²: about the resolution of the board's own poses."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometryNoise:
+    """How uncertainty grows. Each wheel goes wrong by itself, and the body with it.
+
+    ``wheel_drift``: standard deviation in m of a random walk after 1 m of rim; ``wheel_scale``: of
+    a wheel's relative size error; ``wheel_slip``: the mean part of the way that slip takes from all
+    wheels alike; ``unheard_mps2``, ``unheard_radps2``: acceleration of a robot that nobody hears.
+    """
+
+    wheel_drift: float = 0.0035
+    wheel_scale: float = 0.01
+    wheel_slip: float = 0.02
+    base_radius_m: float = 0.143
+    unheard_mps2: float = 1.0
+    unheard_radps2: float = 5.0
+
+
+@value(frozen=True, slots=True)
+class Covariance:
+    """Of (x, y, yaw) in the odometry frame: m², m·rad, rad²; symmetric."""
+
+    xx: float = INITIAL_VARIANCE
+    xy: float = 0.0
+    x_yaw: float = 0.0
+    yy: float = INITIAL_VARIANCE
+    y_yaw: float = 0.0
+    yaw_yaw: float = INITIAL_VARIANCE
+
+    @classmethod
+    def diagonal(cls, m2: float, rad2: float) -> "Covariance":
+        """Of independent errors."""
+        return cls(m2, 0.0, 0.0, m2, 0.0, rad2)
+
+    def __add__(self, other: "Covariance") -> "Covariance":
+        """Of the sum of two independent errors."""
+        return Covariance(
+            self.xx + other.xx,
+            self.xy + other.xy,
+            self.x_yaw + other.x_yaw,
+            self.yy + other.yy,
+            self.y_yaw + other.y_yaw,
+            self.yaw_yaw + other.yaw_yaw,
+        )
+
+    def with_errors(self, errors: Iterable[tuple[float, float, float, float]]) -> "Covariance":
+        """And of independent errors along lines in (x, y, yaw), each with a variance along its
+        own."""
+        xx = xy = x_yaw = yy = y_yaw = yaw_yaw = 0.0
+        for variance, x, y, yaw in errors:
+            along_x, along_y = variance * x, variance * y
+            xx += along_x * x
+            xy += along_x * y
+            x_yaw += along_x * yaw
+            yy += along_y * y
+            y_yaw += along_y * yaw
+            yaw_yaw += variance * yaw * yaw
+        return Covariance(
+            self.xx + xx,
+            self.xy + xy,
+            self.x_yaw + x_yaw,
+            self.yy + yy,
+            self.y_yaw + y_yaw,
+            self.yaw_yaw + yaw_yaw,
+        )
+
+    def carried(self, dx_m: float, dy_m: float) -> "Covariance":
+        """After a displacement given in the odometry frame: a wrong yaw makes a wrong way."""
+        return Covariance(
+            xx=self.xx - 2 * dy_m * self.x_yaw + dy_m * dy_m * self.yaw_yaw,
+            xy=self.xy + dx_m * self.x_yaw - dy_m * self.y_yaw - dx_m * dy_m * self.yaw_yaw,
+            x_yaw=self.x_yaw - dy_m * self.yaw_yaw,
+            yy=self.yy + 2 * dx_m * self.y_yaw + dx_m * dx_m * self.yaw_yaw,
+            y_yaw=self.y_yaw + dx_m * self.yaw_yaw,
+            yaw_yaw=self.yaw_yaw,
+        )
+
+
+NOTHING: Final = Covariance.diagonal(0.0, 0.0)
+
+
+class Uncertainty:
+    """``noise`` may be replaced at any time."""
+
+    def __init__(self, noise: OdometryNoise) -> None:
+        self.noise = noise
+        self.gap = NOTHING
+        self._walk = Covariance()
+        self._levers = [(0.0, 0.0, 0.0)] * 3
+        """What the pose is off by, in m, m, rad, per relative size error of wheel A, B, C."""
+
+    def move(self, heading_rad: float, tangent: Pose) -> None:
+        """The body moved along this tangent from this heading.
+
+        In plain numbers: with a Pose for each it would be a third of all an odometry message costs.
+        """
+        if not (tangent.x_m or tangent.y_m or tangent.yaw_rad):
+            return
+        heading_rad += tangent.yaw_rad / 2
+        cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+        dx_m = cos * tangent.x_m - sin * tangent.y_m
+        dy_m = sin * tangent.x_m + cos * tangent.y_m
+        wheels, alone = _wheels(self.noise.base_radius_m)
+        drift = self.noise.wheel_drift * self.noise.wheel_drift
+        levers, errors = [], []
+        for (lever_x_m, lever_y_m, lever_rad), rim_m, part in zip(
+            self._levers, wheels.wheel_rates(tangent.over(1.0)), alone, strict=True
+        ):
+            x_m = cos * part.x_m - sin * part.y_m
+            y_m = sin * part.x_m + cos * part.y_m
+            lever = (
+                lever_x_m - dy_m * lever_rad + rim_m * x_m,
+                lever_y_m + dx_m * lever_rad + rim_m * y_m,
+                lever_rad + rim_m * part.yaw_rad,
+            )
+            levers.append(lever)
+            errors.append((drift * abs(rim_m), x_m, y_m, part.yaw_rad))
+        self._levers = levers
+        self._walk = self._walk.carried(dx_m, dy_m).with_errors(errors)
+        if self.gap is not NOTHING:
+            self.gap = self.gap.carried(dx_m, dy_m)
+
+    def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
+        """Nobody reported the motion of this time; the speeds before and after it are known.
+
+        A robot that speeds up and brakes again meanwhile is a quarter of a·t² away from the even
+        way, and never further than its speed allows.
+        """
+        square = duration_s * duration_s / 4
+        self.gap += Covariance.diagonal(
+            min(self.noise.unheard_mps2 * square, fastest_mps * duration_s) ** 2,
+            min(self.noise.unheard_radps2 * square, fastest_radps * duration_s) ** 2,
+        )
+
+    def settle(self) -> None:
+        """The motion in all gaps is known now."""
+        self.gap = NOTHING
+
+    def give_up(self) -> None:
+        """The motion in all gaps will never be known."""
+        self._walk, self.gap = self._walk + self.gap, NOTHING
+
+    def total(self, open_error: Pose) -> Covariance:
+        """Of a pose that is known to be off by ``open_error`` and otherwise at its best."""
+        noise, (a, b, c) = self.noise, self._levers
+        scale = noise.wheel_scale * noise.wheel_scale
+        slip = noise.wheel_slip * noise.wheel_slip
+        alike = a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]
+        wrong = open_error.x_m, open_error.y_m, open_error.yaw_rad
+        known = self._walk if self.gap is NOTHING else self._walk + self.gap
+        return known.with_errors(
+            ((scale, *a), (scale, *b), (scale, *c), (slip, *alike), (1.0, *wrong))
+        )
+
+
+@cache
+def _wheels(base_radius_m: float) -> tuple[OmniKinematics, tuple[Pose, ...]]:
+    """Whose rates are rim speeds; and what a metre of rim of A, B, C alone does to the body."""
+    wheels = OmniKinematics(wheel_radius_m=1.0, base_radius_m=base_radius_m)
+    alone = map(wheels.body_twist, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    return wheels, tuple(Pose(twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps) for twist in alone)

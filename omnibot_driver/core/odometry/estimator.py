@@ -1,0 +1,309 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From displacements and the board's own poses to pose, twist and covariance.
+
+One idea: ``_board`` is where the board believes to be, told by displacements at once and by its
+poses for certain; the follower's target is the same place in the odometry frame. Both always move
+together, by the same tangent in the body's axes, so motion that was lost on the line is found again
+with the next pose. This module knows SE(2); it knows no bytes, no clock and no ROS.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Final
+
+from omnibot_driver.core.board import DisplacementReading, PoseReading
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose, Signs, roll, unroll
+from omnibot_driver.core.odometry.covariance import NOTHING, Covariance, OdometryNoise
+from omnibot_driver.core.odometry.gap_interpolation import Bridge
+from omnibot_driver.core.odometry.pending_displacements import Backlog, advanced
+from omnibot_driver.core.odometry.pose_gate import Belief, expected
+from omnibot_driver.core.odometry.pose_tracker import Track
+from omnibot_driver.core.values import value
+
+LONGEST_WAIT_S: Final = 1.0
+"""Board time without any pose after which heading 0 is assumed."""
+LONG_GAP_S: Final = 1.0
+"""After more lost board time the next ones wait for the pose, which tells what was lost."""
+POSE_DUE_S: Final = 0.24
+"""Board time within which a pose comes, unless it is lost as well."""
+WELL_KNOWN_RAD: Final = 0.15
+"""Standard deviation of a heading that open gaps have made uncertain."""
+UNKNOWN_S: Final = 0.5
+"""Time in which a robot rolls out: what may be unreported where nobody knows how long it was."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometrySettings:
+    """``fastest_mps``, ``fastest_radps``: what the robot can never exceed, pushed by hand too.
+
+    Without ``use_board_pose`` a pose tells nothing but the heading to begin with, which earth
+    displacements mean nothing without. ``linear_scale``, ``angular_scale``: true way and turn over
+    those that the board tells, which knows its wheels by their nominal sizes.
+    """
+
+    noise: OdometryNoise = field(default_factory=OdometryNoise)
+    use_board_pose: bool = True
+    fastest_mps: float = 2.0
+    fastest_radps: float = 8.0
+    linear_scale: float = 1.0
+    angular_scale: float = 1.0
+
+
+@value(frozen=True, slots=True)
+class OdometryEstimate:
+    """At ``stamp_s``: pose and covariance in the odometry frame, twist in the body's.
+
+    ``twist`` is None where the time that the displacement took is not known. ``rolled`` is what
+    the wheels have made of the robot since the driver began, as one tangent in the board's own
+    axes; ``rolling`` its rate.
+    """
+
+    stamp_s: float
+    pose: Pose
+    twist: BodyTwist | None
+    covariance: Covariance
+    rolled: Pose = field(default_factory=Pose)
+    rolling: BodyTwist | None = None
+
+
+class Odometry:
+    """``axis_signs`` turn x, y and yaw of the board's body axes into REP-103's; the board's earth
+    frame and heading are its own affair and keep its signs.
+    """
+
+    def __init__(self, settings: OdometrySettings, axis_signs: Signs = (1, 1, 1)) -> None:
+        self.heading_assumed = False
+        """True once a board sent no pose and its heading had to be taken for 0."""
+        self.alignments = 0
+        """How often the odometry frame has come to lie otherwise in the board's."""
+        self._track = Track(axis_signs)
+        self.configure(settings)
+        self._board: Pose | None = None
+        self._belief = Belief()
+        self._restarted: Pose | None = None
+        self._backlog = Backlog()
+        self._bridge = Bridge()
+        self._last_stamp_s: float | None = None
+        self.reset()
+
+    @property
+    def refused_poses(self) -> int:
+        """Poses that are not possible, or that the next one did not confirm."""
+        return self._belief.refused
+
+    def configure(self, settings: OdometrySettings) -> None:
+        """From the next displacement on."""
+        self._settings = settings
+        self._track.configure(
+            settings.noise,
+            scale=(settings.linear_scale, settings.angular_scale),
+            fastest=(settings.fastest_mps, settings.fastest_radps),
+        )
+
+    def reset(self) -> list[OdometryEstimate]:
+        """The odometry frame begins where the robot stands; the estimates that were still due."""
+        self.alignments += 1
+        due = []
+        if self._board is not None:
+            due = self._release()
+            if self._track.uncertainty.gap != NOTHING:
+                self._belief.proved = None  # what the next pose corrects was before the reset
+        self._backlog = Backlog()
+        self._track.begin()
+        return due
+
+    def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
+        """The estimates that this displacement completes: none while a pose must tell first."""
+        estimates = []
+        if reading.restarted:
+            estimates = self._release() if self._board is not None else []
+            self._backlog = Backlog()
+            self._restarted, self._belief.doubted = Pose(), None
+        if self._restarted is not None:
+            self._restarted = advanced(self._restarted, reading)
+        self._belief.displaced(reading)
+        is_nowhere = self._board is None or self._restarted is not None
+        means_nothing = is_nowhere and reading.frame == "earth"
+        lost_s = reading.lost * (reading.duration_s or 0.0)
+        if not (means_nothing or self._backlog or lost_s > LONG_GAP_S):
+            return [*estimates, self._integrate(reading, stamp_s)]
+        self._backlog.add(reading, stamp_s)
+        waited_s = self._backlog.duration_s
+        if means_nothing:
+            if waited_s < LONGEST_WAIT_S:
+                return estimates
+            self._assume()
+        elif self._backlog.lost_s > LONG_GAP_S and self._settles and waited_s < POSE_DUE_S:
+            return estimates
+        return estimates + self._release()
+
+    def settle(self, reading: PoseReading) -> list[OdometryEstimate]:
+        """Take what the board's pose tells; releases the displacements that waited for it."""
+        told = Pose(reading.x_m, reading.y_m, reading.yaw_rad)
+        if not self._belief.possible(told):
+            return []
+        confirmed = self._belief.confirmed(told, self._track.uncertainty.gap)
+        if reading.restarted or self._is_new_frame(told, confirmed):
+            return self._attach(told)
+        if self._board is None or self._restarted is not None:
+            self._belief.doubted = told
+            return []
+        if self._backlog and self._settings.use_board_pose and self._reachable(told):
+            return self._resume(told)
+        estimates = self._release()
+        self._bridge_until_pose(reading.lost)
+        if self._settings.use_board_pose:
+            self._judge(told, confirmed)
+        return estimates
+
+    def in_board_frame(self, place: Pose) -> Pose | None:
+        """A place in the odometry frame as the board would call it, by the shorter turn from here.
+
+        None while it cannot be told: no pose of the board says where the frames lie.
+        """
+        if self._board is None or self._restarted is not None or not self._settles:
+            return None
+        return self._board.moved(roll(self._track.way_to(place)))
+
+    @property
+    def heading_known(self) -> bool:
+        """Whether the board's heading is known well enough to tell forward from sideways."""
+        gap_rad2 = self._track.uncertainty.gap.yaw_yaw
+        proved = self._belief.proved is not None and self._restarted is None
+        return proved and gap_rad2 < WELL_KNOWN_RAD * WELL_KNOWN_RAD
+
+    @property
+    def _settles(self) -> bool:
+        """Whether a pose may settle what is lost."""
+        return self._settings.use_board_pose and self._belief.proved is not None
+
+    # The board's frame
+
+    def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
+        """Whether the board's frame is another one than before, if there was one.
+
+        After what looked like a restart, one pose alone is believed where either zero or the past
+        explains it.
+        """
+        if self._board is None:
+            return confirmed
+        if self._restarted is None:
+            return False
+        gap = self._track.uncertainty.gap
+        anew = self._restarted.way_to(told)
+        went_on = self._board.way_to(self._backlog.before(told))
+        if expected(anew, gap) and _size(anew) < _size(went_on):
+            return True
+        if expected(went_on, gap) or (confirmed and self._reachable(told)):
+            self._restarted = None
+        return confirmed and self._restarted is not None
+
+    def _attach(self, told: Pose) -> list[OdometryEstimate]:
+        """The board's frame is a new one; the odometry goes on from where it is."""
+        self._begin_at(self._backlog.before(told))
+        estimates = self._release()
+        self._belief.believe(told)
+        self._track.uncertainty.give_up()
+        return estimates
+
+    def _resume(self, told: Pose) -> list[OdometryEstimate]:
+        """The pose tells what was lost before the displacements that wait."""
+        assert self._board is not None
+        seconds = self._backlog.unstamped_s(self._last_stamp_s)
+        way = unroll(self._board.way_to(self._backlog.before(told)))
+        self._board = self._board.moved(roll(way))
+        self._track.resume(way)
+        self._move(Pose(), seconds, seconds)
+        self._backlog.forget_losses()
+        estimates = self._release()
+        self._track.uncertainty.settle()
+        self._belief.believe(told)
+        return estimates
+
+    def _assume(self) -> None:
+        """No two poses agree: the last one it is, or heading 0 where there is none."""
+        if self._belief.doubted is not None:
+            self._begin_at(self._backlog.before(self._belief.doubted))
+        else:
+            self.heading_assumed = True
+            self._begin_at(Pose())
+        self._belief.proved = None
+
+    def _begin_at(self, board: Pose) -> None:
+        self.alignments += 1
+        self._board, self._restarted, self._belief.doubted = board, None, None
+
+    def _judge(self, told: Pose, confirmed: bool) -> None:
+        """Correct by a pose that is reachable and no surprise, or confirmed by the one before."""
+        assert self._board is not None
+        way = self._board.way_to(told)
+        reachable = self._reachable(told)
+        if not confirmed and not (reachable and expected(way, self._track.uncertainty.gap)):
+            self._belief.doubted = told
+            return
+        if reachable:
+            self._track.correct(unroll(way))
+        else:
+            self.alignments += 1
+            self._track.uncertainty.give_up()
+        self._board = told
+        self._belief.believe(told)
+
+    def _reachable(self, told: Pose) -> bool:
+        waited_s = self._backlog.unheard_s(self._last_stamp_s) + self._backlog.duration_s
+        settings = self._settings
+        return self._belief.reachable(told, waited_s, settings.fastest_mps, settings.fastest_radps)
+
+    # Motion
+
+    def _release(self) -> list[OdometryEstimate]:
+        return [self._integrate(reading, stamp_s) for reading, stamp_s in self._backlog.take()]
+
+    def _integrate(self, reading: DisplacementReading, stamp_s: float) -> OdometryEstimate:
+        last_stamp_s, self._last_stamp_s = self._last_stamp_s, stamp_s
+        heading_rad = None if self._board is None else self._board.yaw_rad
+        bridge, tangent = self._bridge.tangents(reading, heading_rad)
+        seconds = reading.duration_s
+        if seconds is None:
+            self._track.miss(UNKNOWN_S)
+            seconds = max(0.0, stamp_s - (stamp_s if last_stamp_s is None else last_stamp_s))
+        elif reading.lost:
+            self._track.miss((reading.lost + 1) * seconds)
+        if reading.lost:
+            stamped_s = math.inf if last_stamp_s is None else stamp_s - last_stamp_s - seconds
+            self._cross(bridge, reading.lost * seconds, stamped_s)
+        if self._board is not None:
+            self._board = advanced(self._board, reading)
+        self._move(tangent, seconds, seconds)
+        track, follower = self._track, self._track.follower
+        follower.follow((reading.lost + 1) * seconds)
+        twist = rolling = None
+        if reading.duration_s:
+            twist, rolling = track.rates(tangent, seconds)
+        covariance = track.uncertainty.total(follower.wrong)
+        return OdometryEstimate(stamp_s, follower.pose, twist, covariance, track.rolled, rolling)
+
+    def _cross(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
+        """Motion that was not told, taken to be this one; the stamps leave so much time for it."""
+        if self._board is not None:
+            self._board = self._board.moved(roll(tangent))
+        self._belief.bridged(roll(tangent))
+        self._move(tangent, seconds, min(seconds, max(0.0, stamped_s)))
+
+    def _bridge_until_pose(self, lost: int) -> None:
+        """Displacements are missing that the pose includes; nobody knows what comes after it."""
+        if lost and self._bridge.last is not None:
+            tangent, period_s = self._bridge.last
+            self._track.miss((lost + 1) * period_s)
+            self._cross(tangent.times(lost, lost, lost), lost * period_s)
+
+    def _move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
+        """Along a tangent in the board's body axes, and no further than by the stamps it can be."""
+        self._track.move(tangent, seconds, stamped_s)
+        self._belief.passed(seconds)
+
+
+def _size(way: Pose) -> float:
+    return way.way_m + abs(way.yaw_rad)

@@ -1,0 +1,56 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a gap is taken to have held: motion like that on both sides of it.
+
+Knows displacements and headings; not where the robot is, nor what a guess does to it.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.board import DisplacementReading
+from omnibot_driver.core.geometry.se2 import Pose, unroll
+from omnibot_driver.core.odometry.pending_displacements import chord
+
+LONGEST_BRIDGE_S: Final = 2.0
+"""Board time that a bridge stands for at the most; a robot that is not heard is soon stopped."""
+NO_WAY: Final = Pose()
+
+
+class Bridge:
+    """``last``: the newest tangent in the board's body axes, and the time that it took in s; None
+    where that is not known.
+    """
+
+    def __init__(self) -> None:
+        self.last: tuple[Pose, float] | None = None
+
+    def tangents(
+        self, reading: DisplacementReading, heading_rad: float | None
+    ) -> tuple[Pose, Pose]:
+        """In the board's body axes: of the lost displacements before this one, and of this one.
+
+        ``heading_rad``: the board's before all of them; displacements of a board that never told
+        are taken for the body's.
+        """
+        last, self.last = self.last, None
+        if reading.duration_s is None:
+            return NO_WAY, _tangent(reading, heading_rad)
+        half = min(reading.lost, round(LONGEST_BRIDGE_S / reading.duration_s)) / 2
+        if half and heading_rad is not None:
+            last_turn_rad = last[0].yaw_rad if last else reading.dyaw_rad
+            heading_rad += half * (last_turn_rad + reading.dyaw_rad)
+        tangent = _tangent(reading, heading_rad)
+        self.last = tangent, reading.duration_s
+        if not half:
+            return NO_WAY, tangent
+        before = last[0] if last else tangent
+        return (before + tangent).times(half, half, half), tangent
+
+
+def _tangent(reading: DisplacementReading, heading_rad: float | None) -> Pose:
+    if reading.frame == "body" or heading_rad is None:
+        return chord(reading)
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    dx_m, dy_m = reading.dx_m, reading.dy_m
+    return unroll(Pose(cos * dx_m + sin * dy_m, cos * dy_m - sin * dx_m, reading.dyaw_rad))

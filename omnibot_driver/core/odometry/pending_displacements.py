@@ -1,0 +1,92 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Displacements that wait for a pose of the board, and what they add up to in the board's frame.
+
+Knows how a displacement moves a pose; not why one waits, nor what comes of it.
+"""
+
+from dataclasses import replace
+
+from omnibot_driver.core.board import DisplacementReading
+from omnibot_driver.core.geometry.se2 import Pose, roll
+
+
+class Backlog:
+    """In the order in which they came, each with its stamp."""
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[DisplacementReading, float]] = []
+
+    def __bool__(self) -> bool:
+        return bool(self._waiting)
+
+    def add(self, reading: DisplacementReading, stamp_s: float) -> None:
+        """The newest."""
+        self._waiting.append((reading, stamp_s))
+
+    def take(self) -> list[tuple[DisplacementReading, float]]:
+        """All of them; none waits afterwards."""
+        waiting, self._waiting = self._waiting, []
+        return waiting
+
+    def forget_losses(self) -> None:
+        """What is missing before the first is known by other means."""
+        if self._waiting:
+            reading, stamp_s = self._waiting[0]
+            self._waiting[0] = replace(reading, lost=0), stamp_s
+
+    @property
+    def lost(self) -> int:
+        """Displacements that are missing before the first."""
+        return self._waiting[0][0].lost if self._waiting else 0
+
+    @property
+    def lost_s(self) -> float:
+        """The same in board time."""
+        return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
+
+    @property
+    def duration_s(self) -> float:
+        """Board time that they stand for, as far as it is known."""
+        return sum(reading.duration_s or 0.0 for reading, _ in self._waiting)
+
+    def unheard_s(self, last_stamp_s: float | None) -> float:
+        """Time before the first, since the last stamp, in which nobody reported any motion."""
+        if not self._waiting:
+            return 0.0
+        reading, stamp_s = self._waiting[0]
+        if reading.duration_s is not None:
+            return reading.lost * reading.duration_s
+        return 0.0 if last_stamp_s is None else max(0.0, stamp_s - last_stamp_s)
+
+    def unstamped_s(self, last_stamp_s: float | None) -> float:
+        """Likewise, as far as the stamps show it beside what the first one stands for itself."""
+        unheard_s = self.unheard_s(last_stamp_s)
+        if not self._waiting or last_stamp_s is None:
+            return unheard_s
+        reading, stamp_s = self._waiting[0]
+        if reading.duration_s is None:
+            return 0.0
+        return min(unheard_s, max(0.0, stamp_s - last_stamp_s - reading.duration_s))
+
+    def before(self, board: Pose) -> Pose:
+        """Where they began if they lead to this pose."""
+        start = Pose(yaw_rad=board.yaw_rad - sum(reading.dyaw_rad for reading, _ in self._waiting))
+        end = start
+        for reading, _ in self._waiting:
+            end = advanced(end, reading)
+        return start + (board - end)
+
+
+def chord(reading: DisplacementReading) -> Pose:
+    """As it stands in its own frame."""
+    return Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad)
+
+
+def advanced(board: Pose, reading: DisplacementReading) -> Pose:
+    """A pose in the board's frame after this displacement."""
+    if reading.frame == "earth":
+        return Pose(
+            board.x_m + reading.dx_m, board.y_m + reading.dy_m, board.yaw_rad + reading.dyaw_rad
+        )
+    return board.moved(roll(chord(reading)))

@@ -1,0 +1,235 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What speaks for and against a reading of the bytes, in one currency.
+
+A cost is about the negative logarithm of a probability: 1 is a factor of three. This module knows
+what a board is likely to send after what it sent before, and how likely a line damages it; it does
+not know how readings are searched (``trellis``) or when one is believed (``decoder``).
+
+Content is soft evidence: all of a frame's together stays below what it costs to call the frame
+damaged, so a true shock between two whole frames is delivered.
+"""
+
+from math import ceil, floor
+from typing import Final, NamedTuple
+
+from omnibot_driver.core.omnibot.frames import (
+    LENT,
+    DeltaFrame,
+    Frame,
+    ImuFrame,
+    PausedFrame,
+    PoseFrame,
+    Words,
+)
+from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
+
+# What the line does.
+ONE_BYTE: Final = 5.5
+"""A frame that lost or gained one byte: one in 250, which is a byte in three thousand."""
+TWO_BYTES: Final = 8.5
+"""The same twice in one frame: rarer, but both faults come in bad times."""
+BROKEN_OFF: Final = 9.0
+"""A frame of which the last three bytes or more are missing: a burst was lost."""
+HEADER_BYTE: Final = 7.5
+"""A frame that lost half of its header: two places among the 9 to 15 where it may lose a byte."""
+HEADER_IN_PLACE: Final = 4.0
+"""A frame that gained bytes, though a header stands where it would end without them."""
+BAD_RUN: Final = 6.0
+"""A run of bytes that nobody explains begins: a burst was lost, or noise."""
+BAD_TAIL: Final = 2.5
+"""... right after a whole frame, with no header of its own: a burst seldom begins just there."""
+UNKNOWN_START: Final = 1.0
+"""Out of step, the first bytes are a part of a frame: most silences are between frames."""
+BAD_BYTE: Final = 0.35
+"""Each byte of such a run; sooner a frame of odd content than 14 unexplained bytes."""
+BAD_HEADER: Final = 0.5
+"""A header within such a run: chance makes few, a gyro at rest some."""
+GAP: Final = 5.0
+"""The line was idle within a frame, though the board sends each without a pause..."""
+BAD_TEXT: Final = 4.0
+"""A whole text within such a run: nine given letters are no chance."""
+KNOWN_GAP: Final = 11.0
+"""... and so far the pauses of this line have always stood between frames. Too much to believe the
+frame; not enough to forget that it may be the pause that deceives."""
+CUT_SHORT: Final = 6.0
+"""The line was closed within a frame."""
+ENDS_IN_NOISE: Final = 2.0
+"""The line falls silent within a bad run, though it does so behind frames, ten bytes or so long."""
+
+# What the board sends. An IMU frame that is no look-alike adds up to 6.5 at the most, a delta or a
+# pose to 4.5.
+LEAPS: Final = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
+"""So many words far from the ones before them. One makes a frame odd, a shock moves several."""
+AFTERSHOCK: Final = 1.5
+"""All that can be said against an IMU frame after one that was odd already: a shock rings."""
+WEIGHTLESS: Final = 2.5
+"""The accelerometer's norm is below 0.5 g or above 2.5 g: a fall, a shock, or other words."""
+LOOK_ALIKE: Final = 12.0
+"""Weightless, with an IMU header among the accelerations: in a run of IMU frames a gyro that reads
+-6 makes a second, shifted run, which has its gyro where the accelerometer should be."""
+JUMP: Final = 2.5
+"""A counter that is not the next one: something before it was lost."""
+IMPOSSIBLE: Final = 2.0
+"""A movement that no robot of this kind makes."""
+OFF_BEAT: Final = 1.0
+"""Not as many IMU frames to a delta, or deltas to a pose, as the schedule has: four, and five."""
+
+CONTRADICTED: Final = 1.5
+"""A pose that is turned otherwise than by the sum of the deltas since the one before."""
+
+IMU_HEADER_WORD: Final = -6
+"""FF FA, read as a signed word."""
+ROUNDING: Final = 4.0
+"""Of five deltas, in 0.1 mrad."""
+LARGEST_DELTA: Final = 4000
+"""Deltas are in 0.1 mm and 0.1 mrad: 10 m/s or 10 rad/s."""
+FARTHEST_POSE: Final = 1e7
+"""Poses are in mm and mrad: beyond 10 km, or 1600 turns, a pose is other bytes misread."""
+LONGEST_STEP: Final = 2000.0
+"""Between two poses: 10 m/s, or 10 rad/s, for 200 ms."""
+DELTAS_MISSED: Final = 2
+"""As many IMU frames as come to so many deltas, without any, and none is expected."""
+
+
+class Context(NamedTuple):
+    """What came before, as far as it tells what is likely next. None: not known."""
+
+    imu: ImuFrame | None = None
+    seq: int | None = None
+    pose: PoseFrame | None = None
+    imus: int = 0
+    """IMU frames since the last delta."""
+    deltas: int = 0
+    """Deltas since the last pose."""
+    shaken: bool = False
+    """The last IMU frame was a leap, or weightless."""
+    turned: int | None = None
+    """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
+
+    def damaged(self) -> "Context":
+        """Nobody knows how much was lost."""
+        return Context(self.imu, deltas=self.deltas, shaken=self.shaken)
+
+
+NOTHING_KNOWN: Final = Context()
+
+
+class Expectation:
+    """Judges content by what came before; it learns how much the sensor's words scatter."""
+
+    def __init__(self, counts_per_g: float, schedule: Schedule = USUAL) -> None:
+        self.imus_per_delta = schedule.imus_per_delta
+        self.deltas_per_pose = schedule.deltas_per_pose
+        self._lightest = (0.5 * counts_per_g) ** 2
+        self._heaviest = (2.5 * counts_per_g) ** 2
+        self._accel_scatter = 300.0
+        self._gyro_scatter = 100.0
+        self._accel_limit = 2400.0
+        self._gyro_limit = 800.0
+        self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
+        """Between the first two the squared norm of an acceleration costs nothing; nor does a step
+        of less than the third in one of its words, or than the fourth in one of the gyro's. In
+        whole numbers, with which Python compares twice as fast."""
+
+    def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
+        """The cost of a whole frame's content, and what is known after it."""
+        if type(frame) is ImuFrame:
+            last, seq, pose, imus, deltas, shaken, turned = before
+            ax, ay, az = frame.accel
+            cost = 0.0
+            norm = ax * ax + ay * ay + az * az
+            if not self._lightest < norm < self._heaviest:
+                if norm < self._lightest and IMU_HEADER_WORD in frame.accel:
+                    return LOOK_ALIKE, Context(frame, seq, pose, imus + 1, deltas, True, turned)
+                cost = AFTERSHOCK if shaken else WEIGHTLESS
+            after = Context(frame, seq, pose, imus + 1, deltas, cost > 0.0, turned)
+            if last is None:
+                return cost, after
+            (px, py, pz), (pu, pv, pw) = last.accel, last.gyro
+            u, v, w = frame.gyro
+            far, fast = self._accel_limit, self._gyro_limit
+            if (
+                -far < ax - px < far
+                and -far < ay - py < far
+                and -far < az - pz < far
+                and -fast < u - pu < fast
+                and -fast < v - pv < fast
+                and -fast < w - pw < fast
+            ):
+                return cost, after
+            leaps = _leaps(frame.accel, last.accel, far) + _leaps(frame.gyro, last.gyro, fast)
+            after = Context(frame, seq, pose, imus + 1, deltas, True, turned)
+            return (AFTERSHOCK if shaken else cost + LEAPS[leaps]), after
+        if type(frame) is DeltaFrame:
+            return self._weigh_delta(frame, before)
+        if type(frame) is PoseFrame:
+            return self._weigh_pose(frame, before)
+        return 0.0, NOTHING_KNOWN
+
+    def _weigh_delta(self, frame: DeltaFrame, before: Context) -> tuple[float, Context]:
+        cost = 0.0
+        if max(abs(frame.dx), abs(frame.dy), abs(frame.dtheta)) > LARGEST_DELTA:
+            cost = IMPOSSIBLE
+        imu, seq, pose, imus, deltas, shaken, turned = before
+        next_one = seq is not None and frame.seq == (seq + 1) & 255
+        turned = turned + frame.dtheta if next_one and turned is not None else None
+        after = Context(imu, frame.seq, pose, 0, deltas + 1, shaken, turned)
+        if seq is None:
+            return cost, after
+        if not next_one:
+            return cost + JUMP, after
+        return (cost if imus == self.imus_per_delta else cost + OFF_BEAT), after
+
+    def _weigh_pose(self, frame: PoseFrame, before: Context) -> tuple[float, Context]:
+        after = Context(before.imu, before.seq, frame, before.imus, 0, before.shaken, 0)
+        x, y, theta = frame.x, frame.y, frame.theta
+        if not (abs(x) < FARTHEST_POSE and abs(y) < FARTHEST_POSE and abs(theta) < FARTHEST_POSE):
+            return IMPOSSIBLE + JUMP, after
+        last = before.pose
+        if last is None:
+            return 0.0, after
+        if frame.seq != (last.seq + 1) & 255:
+            return JUMP, after
+        moved = max(abs(x - last.x), abs(y - last.y), abs(theta - last.theta))
+        cost = IMPOSSIBLE if moved > LONGEST_STEP else 0.0
+        turned = before.turned
+        if turned is not None and abs(10.0 * (theta - last.theta) - turned) > ROUNDING:
+            cost += CONTRADICTED
+        on_beat = before.deltas == self.deltas_per_pose and before.imus == 0
+        return (cost if on_beat else cost + OFF_BEAT), after
+
+    def learn(self, frame: ImuFrame, last: ImuFrame) -> None:
+        """Two frames in a row that were believed."""
+        (x, y, z), (px, py, pz) = frame.accel, last.accel
+        (u, v, w), (pu, pv, pw) = frame.gyro, last.gyro
+        d_accel = max(abs(x - px), abs(y - py), abs(z - pz))
+        d_gyro = max(abs(u - pu), abs(v - pv), abs(w - pw))
+        self._accel_scatter += (d_accel - self._accel_scatter) / 8
+        self._gyro_scatter += (d_gyro - self._gyro_scatter) / 8
+        self._accel_limit = 6 * self._accel_scatter + 100
+        self._gyro_limit = 6 * self._gyro_scatter + 30
+        lightest, heaviest, _, _ = self.calm
+        self.calm = lightest, heaviest, ceil(self._accel_limit), ceil(self._gyro_limit)
+
+    def more_is_due(self, frame: Frame, before: Context) -> bool:
+        """The board may send another frame in the same tick, without a pause."""
+        if isinstance(frame, ImuFrame):
+            if before.seq is not None:
+                return before.imus >= self.imus_per_delta - 1
+            return before.imus < DELTAS_MISSED * self.imus_per_delta
+        last = before.deltas >= self.deltas_per_pose - 1
+        return isinstance(frame, DeltaFrame) and (before.pose is None or last)
+
+
+def may_be_lent(frame: Frame, before: Context) -> bool:
+    """Its last byte may be the next header's. Not so if it is what the sensor said before."""
+    if isinstance(frame, ImuFrame):
+        lent = frame.gyro[2] & 0xFF in LENT
+        said = before.imu is not None and frame.gyro[2] == before.imu.gyro[2]
+        return lent and (frame.gyro[2] & 0xFF == 0xFF or not said)
+    return not isinstance(frame, PausedFrame) and frame.seq in LENT
+
+
+def _leaps(now: Words, before: Words, limit: float) -> int:
+    return sum(abs(a - b) >= limit for a, b in zip(now, before, strict=True))

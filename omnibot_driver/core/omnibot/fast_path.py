@@ -1,0 +1,242 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The commonest frames, quickly: those that nothing at all speaks against, and shocks that go on.
+
+It takes what the decoder's own loop would take with the evidence ``weigh`` finds, and nothing else:
+a test holds one against the other. What costs anything else is left to that loop.
+"""
+
+import struct
+from typing import Any, Final
+
+from omnibot_driver.core.omnibot.cost_model import (
+    FARTHEST_POSE,
+    LARGEST_DELTA,
+    LONGEST_STEP,
+    ROUNDING,
+    Context,
+    Expectation,
+)
+from omnibot_driver.core.omnibot.frames import (
+    DELTA_HEADER,
+    DELTA_LENGTH,
+    IMU_HEADER,
+    IMU_LENGTH,
+    LENT,
+    NO_FRAME,
+    POSE_HEADER,
+    POSE_LENGTH,
+    ByteOrder,
+    DeltaFrame,
+    Frame,
+    ImuFrame,
+    PoseFrame,
+    measure,
+)
+
+_FIRST, _IMU_KIND = IMU_HEADER
+_DELTA_KIND, _POSE_KIND = DELTA_HEADER[1], POSE_HEADER[1]
+_LONE_IMU: Final = struct.Struct(">H6h").unpack
+_LONE_HEADER: Final = int.from_bytes(IMU_HEADER, "big")
+_IMU: Final = struct.Struct(">6h").unpack_from
+_DELTA: Final = struct.Struct(">3hB").unpack_from
+_POSE: Final = {
+    "big": struct.Struct(">3fB").unpack_from,
+    "little": struct.Struct("<3fB").unpack_from,
+}
+
+# A frozen object is made in a third of the time from one of the same slots that is not frozen yet.
+_Imu, _Delta, _Pose = (
+    type(kind.__name__, (), {"__slots__": vars(kind)["__slots__"]})
+    for kind in (ImuFrame, DeltaFrame, PoseFrame)
+)
+
+LEARN_EVERY: Final = 8
+"""Frames; more would teach the expectation nothing new."""
+
+
+class Walk:
+    """Frames in a row, from the first byte held on, that nothing speaks against.
+
+    ``ends``: of each; ``lessons``: numbers of frames from which the expectation is to learn, each
+    with two readings; ``known``: what was known after so many frames (fields of a Context), never
+    more than a few apart.
+    """
+
+    __slots__ = ("ends", "frames", "known", "lessons")
+
+    def __init__(self, context: Context) -> None:
+        self.frames: list[Frame] = []
+        self.ends: list[int] = []
+        self.lessons: list[tuple[int, ImuFrame, ImuFrame]] = []
+        self.known: list[tuple[int, tuple[Any, ...]]] = [(0, context)]
+
+    def add(self, end: int, frame: Frame, before: Context) -> None:
+        """One more."""
+        number = len(self.frames)
+        is_lesson = not number % LEARN_EVERY and not before.imus & 3
+        if is_lesson and type(frame) is ImuFrame and before.imu is not None:
+            self.lessons.append((number, frame, before.imu))
+        self.known.append((number, before))
+        self.frames.append(frame)
+        self.ends.append(end)
+
+    def known_after(self, count: int, expectation: Expectation) -> Context:
+        """What was known after so many frames."""
+        at, fields = next(known for known in reversed(self.known) if known[0] <= count)
+        context = Context._make(fields)
+        for frame in self.frames[at:count]:
+            _, context = expectation.weigh(frame, context)
+        return context
+
+
+def take_lone(
+    data: bytes, context: Context, expectation: Expectation
+) -> tuple[ImuFrame, Context] | None:
+    """``take_calm`` where one IMU frame is all there is: the frame, and what is known then.
+
+    It came as a whole, so its last byte is its own.
+    """
+    header, x, y, z, u, v, w = _LONE_IMU(data)
+    last, seq, pose, imus, deltas, _, turned = context
+    if header != _LONE_HEADER or last is None:
+        return None
+    lightest, heaviest, far, fast = expectation.calm
+    px, py, pz = last.accel
+    pu, pv, pw = last.gyro
+    if not (
+        lightest < x * x + y * y + z * z < heaviest
+        and -far < x - px < far
+        and -far < y - py < far
+        and -far < z - pz < far
+        and -fast < u - pu < fast
+        and -fast < v - pv < fast
+        and -fast < w - pw < fast
+    ):
+        return None
+    frame: Any = _Imu()
+    frame.accel = x, y, z
+    frame.gyro = u, v, w
+    frame.__class__ = ImuFrame
+    if not imus & 3:
+        expectation.learn(frame, last)
+    return frame, tuple.__new__(Context, (frame, seq, pose, imus + 1, deltas, False, turned))
+
+
+def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
+    """Whether a whole frame follows, and perhaps one more: then it is a shock, no damage."""
+    if at == len(held):
+        return closed
+    length = measure(held, at)
+    if length <= 0:
+        return False
+    at += length
+    return at == len(held) or measure(held, at) != NO_FRAME
+
+
+def take_calm(
+    held: bytes | bytearray,
+    at: int,
+    context: Context,
+    expectation: Expectation,
+    order: ByteOrder,
+    walk: Walk,
+) -> tuple[int, Context]:
+    """Add the calm frames that begin here; where they end, and what is known then.
+
+    The last one in hand is left out where its last byte may be lent.
+    """
+    last, seq, pose, imus, deltas, shaken, turned = context
+    if last is None:
+        return at, context
+    frames, ends = walk.frames, walk.ends
+    lightest, heaviest, far, fast = expectation.calm
+    per_delta, per_pose = expectation.imus_per_delta, expectation.deltas_per_pose
+    back, slow = -far, -fast
+    px, py, pz = last.accel
+    pu, pv, pw = last.gyro
+    size = len(held)
+    final = size - 1
+    frame: Any
+    while at < final and held[at] == _FIRST:
+        kind = held[at + 1]
+        if kind == _IMU_KIND:
+            end = at + IMU_LENGTH
+            if end > final and (end > size or held[final] in LENT):
+                break
+            x, y, z, u, v, w = _IMU(held, at + 2)
+            norm = x * x + y * y + z * z
+            if not lightest < norm < heaviest:
+                break
+            if (
+                back < x - px < far
+                and back < y - py < far
+                and back < z - pz < far
+                and slow < u - pu < fast
+                and slow < v - pv < fast
+                and slow < w - pw < fast
+            ):
+                shaken = False
+            elif shaken or goes_on(held, end, closed=False):
+                shaken = True
+            else:
+                break
+            px, py, pz = x, y, z
+            pu, pv, pw = u, v, w
+            frame = _Imu()
+            frame.accel = x, y, z
+            frame.gyro = u, v, w
+            frame.__class__ = ImuFrame
+            if not imus & 3:
+                count = len(frames)
+                if not count % LEARN_EVERY:
+                    walk.lessons.append((count, frame, last))
+                walk.known.append((count + 1, (frame, seq, pose, imus + 1, deltas, shaken, turned)))
+            last = frame
+            imus += 1
+        elif kind == _DELTA_KIND and imus == per_delta:
+            end = at + DELTA_LENGTH
+            if end > size or seq is None:
+                break
+            dx, dy, dtheta, count = _DELTA(held, at + 2)
+            if (
+                count != (seq + 1) & 255
+                or not -LARGEST_DELTA <= dx <= LARGEST_DELTA
+                or not -LARGEST_DELTA <= dy <= LARGEST_DELTA
+                or not -LARGEST_DELTA <= dtheta <= LARGEST_DELTA
+                or (end == size and count in LENT)
+            ):
+                break
+            frame = _Delta()
+            frame.dx, frame.dy = dx, dy
+            frame.dtheta, frame.seq = dtheta, count
+            frame.__class__ = DeltaFrame
+            seq, imus, deltas = count, 0, deltas + 1
+            turned = None if turned is None else turned + dtheta
+        elif kind == _POSE_KIND and deltas == per_pose and imus == 0:
+            end = at + POSE_LENGTH
+            if end > size or pose is None or turned is None:
+                break
+            x, y, theta, count = _POSE[order](held, at + 2)
+            if (
+                count != (pose.seq + 1) & 255
+                or not -FARTHEST_POSE < x < FARTHEST_POSE
+                or not -FARTHEST_POSE < y < FARTHEST_POSE
+                or not -FARTHEST_POSE < theta < FARTHEST_POSE
+                or not -LONGEST_STEP <= x - pose.x <= LONGEST_STEP
+                or not -LONGEST_STEP <= y - pose.y <= LONGEST_STEP
+                or not -LONGEST_STEP <= theta - pose.theta <= LONGEST_STEP
+                or not -ROUNDING <= 10.0 * (theta - pose.theta) - turned <= ROUNDING
+                or (end == size and count in LENT)
+            ):
+                break
+            frame = _Pose()
+            frame.x, frame.y, frame.theta, frame.seq = x, y, theta, count
+            frame.__class__ = PoseFrame
+            pose, deltas, turned = frame, 0, 0
+        else:
+            break
+        frames.append(frame)
+        ends.append(end)
+        at = end
+    return at, tuple.__new__(Context, (last, seq, pose, imus, deltas, shaken, turned))

@@ -1,0 +1,132 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Where the line was idle, and how far that may be trusted.
+
+A board sends a tick's frames at once, so a pause of its line stands between frames. An adapter that
+collects bytes makes pauses of its own, anywhere, and so does a reader that is scheduled late
+(``late_reads``). Which of the first two a pause is, only frames can tell: this module counts how
+often pauses stood where they should. It knows places and times; not what is in a frame, nor which
+frames are believed (``decoder``).
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+from omnibot_driver.core.omnibot import cost_model
+from omnibot_driver.core.omnibot.late_reads import IDLE_S, PACE_S, Cause, Gap, Read, cause
+
+LATE_S: Final = 0.011
+"""While the board runs its line is never idle for longer, unless bytes were lost; an adapter that
+collects bytes for longer shows pauses of its own."""
+GAP_S: Final = 4e-3
+"""No frame is sent with such a pause in it."""
+BYTE_S: Final = 10 / 115200
+"""To send one, by the manual."""
+TICK_BYTES: Final = 14 + 9 + 15
+"""All that one tick can bring. More at once after a pause means that we were late, not the line."""
+PAUSES_TO_TRUST: Final = 16
+"""So many pauses that stood where they should, and they are taken for the line's own."""
+
+
+class Pauses:
+    """``gaps``: those within the bytes held.
+
+    ``sharp``: as a rule, the first byte that comes after a pause begins a frame; ``between``: as a
+    rule, a frame begins somewhere in what comes after it. ``certain``: both have held for so long
+    that once more changes nothing. ``at_pace``: the last bytes came without a pause.
+    ``byte_s``: how long the line takes for a byte.
+    """
+
+    def __init__(self, byte_s: float) -> None:
+        self._byte_s = byte_s
+        self.gaps: list[Gap] = []
+        self.at_pace = False
+        self._reads: list[Read] = []
+        self.doubt()
+
+    def doubt(self) -> None:
+        """They may have deceived us."""
+        self.sharp = self.between = self.certain = False
+        self._sharp = self._between = 0
+
+    def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
+        """So many bytes arrived now, to be held from this place on, so long after the last."""
+        idle_s = pause_s - arrived * self._byte_s
+        self.at_pace = idle_s < PACE_S
+        if idle_s > GAP_S and arrived <= TICK_BYTES:
+            self._add(pause_s, arrived, place)
+        if self.gaps:
+            self._reads.append(Read(place + arrived, now))
+
+    def _add(self, pause_s: float, arrived: int, place: int) -> None:
+        silent = pause_s >= IDLE_S
+        sharp, between = self.sharp, self.between
+        if pause_s > LATE_S:
+            sharp = sharp or between or silent  # bytes were lost here, and hardly whole frames
+            self._trust(sharp=False, between=False)
+        width = 1 if sharp else arrived
+        price = cost_model.KNOWN_GAP if between or silent else cost_model.GAP
+        self.gaps.append(Gap(place, place + width, price, pause_s))
+
+    def stood_between(self, pause_s: float, arrived: int) -> None:
+        """What came after this pause began with a frame and ended with one."""
+        if pause_s - arrived * self._byte_s > GAP_S:
+            self._trust(sharp=True, between=True)
+
+    def compare(self, ends: Sequence[int]) -> None:
+        """Do they end where frames begin? Then they are the line's, not the adapter's."""
+        start = 0
+        for end in ends:
+            for gap in self.gaps:
+                if start <= gap.first < end:
+                    sharp = gap.first == start
+                    self._trust(sharp=sharp, between=sharp or end < gap.before)
+            start = end
+
+    def against(self, data: bytes | bytearray, start: int, end: int) -> float:
+        """What the pauses within these bytes cost, if they are taken for a frame."""
+        return sum(
+            gap.price
+            for gap in self.gaps
+            if gap.within(start, end)
+            and self._cause(gap, data, start, end) is not Cause.LATE_READER
+        )
+
+    def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
+        """Whether what follows may still tell why there was a pause within this frame."""
+        causes = [self._cause(gap, data, start, end) for gap in self.gaps if gap.within(start, end)]
+        return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes
+
+    def silent_within(self, start: int, end: int) -> bool:
+        """Whether nothing was read for long amid these bytes."""
+        return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
+
+    def forget(self, count: int) -> None:
+        """The first bytes are held no longer."""
+        if not self.gaps or self.gaps[-1].first < count:
+            self.clear()
+            return
+        self.gaps = [
+            gap._replace(first=gap.first - count, before=gap.before - count)
+            for gap in self.gaps
+            if gap.first >= count
+        ]
+        first = self.gaps[0].first + count
+        self._reads = [Read(end - count, now) for end, now in self._reads if end > first]
+
+    def clear(self) -> None:
+        """Time tells nothing about the bytes held."""
+        self.gaps, self._reads = [], []
+
+    def _cause(self, gap: Gap, data: bytes | bytearray, start: int, end: int) -> Cause:
+        return cause(gap, self._reads, data, start, end, self._byte_s)
+
+    def _trust(self, *, sharp: bool, between: bool) -> None:
+        if sharp and between and self.certain:
+            return
+        most = 2 * PAUSES_TO_TRUST
+        self._sharp = min(self._sharp + 1, most) if sharp else max(self._sharp - 4, 0)
+        self._between = min(self._between + 1, most) if between else max(self._between - 4, 0)
+        self.sharp = self._sharp >= PAUSES_TO_TRUST
+        self.between = self._between >= PAUSES_TO_TRUST
+        self.certain = self._sharp == self._between == most

@@ -1,0 +1,134 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Settings that what the board sends contradicts: the user is told, nothing is switched by itself.
+
+Poses that make sense only in the other byte order; deltas that lead to the next pose only in the
+other frame, or come at another rate. This module knows what the wire says in each setting; not how
+anybody is told.
+"""
+
+import math
+import struct
+from typing import Final, Literal
+
+from omnibot_driver.core.board import DisplacementReading, PoseReading
+from omnibot_driver.core.geometry.se2 import Pose, roll
+from omnibot_driver.core.odometry.pending_displacements import chord
+from omnibot_driver.core.omnibot.frames import ByteOrder, PoseFrame
+from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, TICK_S, USUAL, Schedule
+
+SURE: Final = 10
+"""So many poses that speak against a setting, and none for it: two seconds."""
+SMALLEST: Final = 1e-6
+LARGEST: Final = 1e7
+"""Of a coordinate in mm or mrad that is not 0: beyond, it is other bytes misread."""
+MOST_DELTAS: Final = 10
+"""So many deltas from one pose to the next, one of which was lost; more belong to no two poses."""
+CLEARLY_M: Final = 0.01
+TIMES: Final = 4.0
+"""One frame leads so far away from the pose, and so many times further than the other."""
+
+FEWEST_DELTAS: Final = 10
+FOR_S: Final = 1.0
+"""So many deltas in a row, and for so long, that came at another rate than the settings have."""
+RATE_TOLERANCE: Final = 0.1
+
+_OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}
+_OTHER_FRAME: Final[dict[str, Literal["earth", "body"]]] = {"earth": "body", "body": "earth"}
+
+
+class Suspicion:
+    """``advice``: a sentence for the user, once there is reason for it."""
+
+    def __init__(self, schedule: Schedule = USUAL) -> None:
+        self.advice: str | None = None
+        self._period_s, self._imus_per_delta = schedule.delta_period_s, schedule.imus_per_delta
+        self._seen_period_s: float | None = None
+        self._seen_since_s, self._seen_deltas = 0.0, 0
+        self._against_order = self._against_frame = 0
+        self._from: Pose | None = None
+        self._moved: list[DisplacementReading] = []
+
+    def displaced(self, reading: DisplacementReading) -> None:
+        """A delta, as the settings read it."""
+        self._moved.append(reading)
+        unbroken = not (reading.lost or reading.restarted or reading.duration_s is None)
+        if not unbroken or len(self._moved) > MOST_DELTAS:
+            self._from = None
+        if self._from is None:
+            self._moved.clear()
+
+    def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
+        """A delta came in at ``now``, and so many IMU frames since the one before.
+
+        The IMU frames, of which some may be lost, tell the period; arrival times confirm it.
+        """
+        broken = reading.lost or reading.restarted or reading.duration_s is None
+        if imus == self._imus_per_delta or not imus or broken:
+            self._seen_period_s = None
+            return
+        period_s = _nearest_period_s(imus * TICK_S)
+        if period_s != self._seen_period_s:
+            self._seen_period_s, self._seen_since_s, self._seen_deltas = period_s, now, 0
+            return
+        self._seen_deltas += 1
+        passed_s, deltas = now - self._seen_since_s, self._seen_deltas
+        if period_s == self._period_s or passed_s < FOR_S or deltas < FEWEST_DELTAS:
+            return
+        self._seen_period_s = None
+        if abs(passed_s / deltas - period_s) <= RATE_TOLERANCE * period_s:
+            self.advice = (
+                f"the board sends a delta every {period_s:g} s, not every {self._period_s:g} s, so"
+                f" velocities are wrong: set the parameter `delta_period` to {period_s:g}"
+            )
+
+    def posed(self, frame: PoseFrame, reading: PoseReading, order: ByteOrder) -> None:
+        """A pose, as the settings read it."""
+        values = (frame.x, frame.y, frame.theta)
+        makes_sense, swapped = _makes_sense(values), _makes_sense(_swapped(values))
+        if makes_sense != swapped:
+            self._against_order = 0 if makes_sense else self._against_order + 1
+        if self._against_order == SURE:
+            self.advice = (
+                "the board's poses make sense only in the other byte order: set the parameter"
+                f" `pose_byte_order` to {_OTHER_ORDER[order]}"
+            )
+        if makes_sense:
+            self._compare(Pose(reading.x_m, reading.y_m, reading.yaw_rad))
+
+    def _compare(self, told: Pose) -> None:
+        before, self._from = self._from, told
+        moved, self._moved = self._moved, []
+        if before is None or not moved:
+            return
+        frame = moved[0].frame
+        said = _distance(before, moved, frame, told)
+        other = _distance(before, moved, _OTHER_FRAME[frame], told)
+        if said > max(CLEARLY_M, TIMES * other):
+            self._against_frame += 1
+        elif other > max(CLEARLY_M, TIMES * said):
+            self._against_frame = 0
+        if self._against_frame == SURE:
+            self.advice = (
+                "the board's deltas lead to its poses only in the other frame: set the parameter"
+                f" `delta_frame` to {_OTHER_FRAME[frame]}"
+            )
+
+
+def _nearest_period_s(seconds: float) -> float:
+    return min(DELTA_PERIODS_S, key=lambda period_s: abs(math.log(seconds / period_s)))
+
+
+def _makes_sense(values: tuple[float, ...]) -> bool:
+    return all(value == 0.0 or SMALLEST < abs(value) < LARGEST for value in values)
+
+
+def _swapped(values: tuple[float, ...]) -> tuple[float, ...]:
+    return struct.unpack("<3f", struct.pack(">3f", *values))
+
+
+def _distance(start: Pose, moved: list[DisplacementReading], frame: str, told: Pose) -> float:
+    for reading in moved:
+        way = chord(reading)
+        start = start + way if frame == "earth" else start.moved(roll(way))
+    return math.hypot(told.x_m - start.x_m, told.y_m - start.y_m)

@@ -1,0 +1,292 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""All readings of a stretch of bytes at once, the cheapest of them, and what is sure in it.
+
+Nodes are the places between bytes, each twice: as a boundary of frames, and within a bad run.
+Edges are whole frames, damaged ones, bad bytes. A shortest path is the best reading; a frame of it
+is sure where every path that reads its first byte in another way is dearer by ``SURE``. This module
+knows the shapes that a line gives to frames; prices are in ``evidence``. Work and memory are
+proportional to the stretch.
+
+The context of a node (for the price of content) is that of the cheapest way to it.
+
+Most edges lie on no path that is nearly as cheap as the best. So the search leaves out what would
+cost more than a limit in all, by the least that the rest can cost (``lower_bound``), and takes a
+higher limit until nothing that matters is beyond it. The outcome is that of searching everything.
+"""
+
+from bisect import bisect_left
+from math import inf
+from typing import Final
+
+from omnibot_driver.core.omnibot import cost_model
+from omnibot_driver.core.omnibot.cost_model import Context, Expectation
+from omnibot_driver.core.omnibot.frames import (
+    INCOMPLETE,
+    ByteOrder,
+    Frame,
+    decode_measured,
+    measure,
+)
+from omnibot_driver.core.omnibot.gaps import Pauses
+from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
+from omnibot_driver.core.values import value
+
+SURE: Final = 3.5
+"""One reading in thirty as likely as the best is too many."""
+STEP: Final = 5.5
+"""What the limit is above the bound at first; then twice that, and so on."""
+BEYOND: Final = 0.025
+"""Half the grid of the prices: no sum is at the limit itself, so rounding decides nothing."""
+
+_LENGTHS: Final = {0xFA: 14, 0xFB: 9, 0xFC: 15}
+_HEADERS: Final = tuple(bytes((0xFF, kind)) for kind in _LENGTHS)
+_Shapes = tuple[tuple[int, float], ...]
+"""Lengths, and what each costs."""
+
+
+def _misfits(length: int, gained: float) -> _Shapes:
+    one, two = cost_model.ONE_BYTE, cost_model.TWO_BYTES
+    return (
+        (length - 1, one),
+        (length + 1, one + gained),
+        (length - 2, two),
+        (length + 2, two + gained),
+    )
+
+
+_MISFITS: Final = {length: _misfits(length, 0.0) for length in _LENGTHS.values()}
+_MISFITS_FOLLOWED: Final = {
+    length: _misfits(length, cost_model.HEADER_IN_PLACE) for length in _LENGTHS.values()
+}
+_HEADLESS: Final = {
+    0xFF: ((13, cost_model.HEADER_BYTE), (8, cost_model.HEADER_BYTE), (14, cost_model.HEADER_BYTE)),
+    **{kind: ((length - 1, cost_model.HEADER_BYTE),) for kind, length in _LENGTHS.items()},
+}
+"""By the half of the header that is left."""
+_HEADER: Final = 0xFF
+_TEXT: Final = 0x50
+_BEGINNINGS: Final = (_HEADER, _TEXT)
+
+
+@value(frozen=True, slots=True)
+class Piece:
+    """A whole frame of the best reading; ``sure``: any other reading of it is clearly dearer."""
+
+    start: int
+    end: int
+    frame: Frame
+    before: Context
+    after: Context
+    sure: bool
+
+
+_Edge = tuple[int, int, float, Frame | None, Context | None]
+"""From node, to node, price, the whole frame, context after it."""
+
+
+def read(
+    data: bytes,
+    context: Context,
+    expectation: Expectation,
+    pauses: Pauses,
+    pose_byte_order: ByteOrder,
+    *,
+    in_step: bool,
+    closed: bool,
+) -> list[Piece]:
+    """The whole frames of the best reading of ``data``.
+
+    ``in_step``: a frame ended right before; ``closed``: nothing follows, ever.
+    """
+    search = _Search(data, context, expectation, pauses, pose_byte_order)
+    search.run(in_step, closed)
+    return search.pieces()
+
+
+class _Search:
+    def __init__(
+        self,
+        data: bytes,
+        context: Context,
+        expectation: Expectation,
+        pauses: Pauses,
+        pose_byte_order: ByteOrder,
+    ) -> None:
+        self._data = data
+        self._expectation = expectation
+        self._pauses = pauses
+        self._pose_byte_order = pose_byte_order
+        # Node 2 n: in a bad run before byte n; 2 n + 1: at a boundary there; the last: the end.
+        self._end = 2 * len(data) + 2
+        self._start_context = context
+        self._least: list[float]
+        self._limit: float
+        self._cost: list[float]
+        self._by: list[_Edge | None]
+        self._edges: list[_Edge]
+        self._contexts: dict[int, Context]
+
+    def run(self, in_step: bool, closed: bool) -> None:
+        """Find the best reading, and all that are nearly as cheap."""
+        self._least = [0.0] * (self._end + 1) if closed else least_costs(self._data)
+        step = STEP
+        limit = self._least[1] + step + BEYOND
+        while True:
+            self._forward(in_step, closed, limit)
+            best = self._cost[self._end]
+            if best + SURE <= limit:
+                return
+            if best < inf:
+                limit = best + SURE + BEYOND
+            else:
+                limit, step = limit + step, 2 * step
+
+    def _forward(self, in_step: bool, closed: bool, limit: float) -> None:
+        data, size, least = self._data, len(self._data), self._least
+        self._limit = limit
+        self._cost = cost = [inf] * (self._end + 1)
+        by: list[_Edge | None] = [None] * (self._end + 1)
+        edges: list[_Edge] = []
+        self._by, self._edges = by, edges
+        self._contexts = {0: self._start_context, 1: self._start_context}
+        cost[0], cost[1] = inf if in_step else cost_model.UNKNOWN_START, 0.0
+        for at, byte in enumerate(data):
+            bad = 2 * at
+            run = cost[bad]
+            if run == inf and cost[bad + 1] == inf:
+                continue
+            begins = byte in _BEGINNINGS
+            price = onward = cost_model.BAD_BYTE
+            begin_run = cost_model.BAD_RUN + cost_model.BAD_TAIL
+            if begins:
+                if byte == _TEXT and measure(data, at) > 0:
+                    price = onward = price + cost_model.BAD_TEXT
+                if byte == _HEADER and at + 1 < size and data[at + 1] in _LENGTHS:
+                    onward, begin_run = price + cost_model.BAD_HEADER, cost_model.BAD_RUN
+                if run < inf:
+                    self._edge(bad, bad + 1, 0.0)
+            if run + onward + least[bad + 2] <= limit:
+                cost[bad + 2] = run + onward
+                edges.append((bad, bad + 2, onward, None, None))
+                by[bad + 2] = edges[-1]
+            here = cost[bad + 1]
+            if here < inf:
+                price += begin_run
+                if here + price + least[bad + 2] <= limit:
+                    self._edge(bad + 1, bad + 2, price)
+                if begins:
+                    self._undamaged(at, closed)
+                if here + DAMAGE <= limit and (byte == _HEADER or byte in _LENGTHS):
+                    self._damaged(at, closed)
+        unexplained = cost_model.ENDS_IN_NOISE if closed else 0.0
+        for node, price in ((2 * size, unexplained), (2 * size + 1, 0.0)):
+            if cost[node] < inf:
+                self._edge(node, self._end, price)
+
+    def _undamaged(self, at: int, closed: bool) -> None:
+        """The whole frame or text that begins here."""
+        data, node = self._data, 2 * at + 1
+        length = measure(data, at)
+        if length == INCOMPLETE:
+            self._open(at, cost_model.CUT_SHORT if closed else 0.0)
+        end = at + length
+        if length <= 0 or self._cost[node] + self._least[2 * end + 1] > self._limit:
+            return
+        frame = decode_measured(data[at:end], self._pose_byte_order)
+        price, after = self._expectation.weigh(frame, self._context(node))
+        self._edge(node, 2 * end + 1, price + self._idle_within(at, end), frame, after)
+
+    def _damaged(self, at: int, closed: bool) -> None:
+        """What may have been a frame that begins here, before the line damaged it."""
+        data, size, node = self._data, len(self._data), 2 * at + 1
+        spare = self._limit - self._cost[node]
+        first = data[at]
+        length = _LENGTHS.get(data[at + 1], 0) if first == _HEADER and at + 1 < size else 0
+        if length:
+            if spare >= cost_model.BROKEN_OFF:
+                for end in range(at + 2, min(at + length - 2, size - 1)):
+                    if data[end] == _HEADER and data[end + 1] in _LENGTHS:
+                        price = cost_model.BROKEN_OFF + self._idle_within(at, end)
+                        self._edge(node, 2 * end + 1, price)
+            followed = data[at + length : at + length + 2] in _HEADERS
+            shapes = (_MISFITS_FOLLOWED if followed else _MISFITS)[length]
+        elif first == _HEADER and at + 1 == size:
+            return
+        else:
+            shapes = _HEADLESS[first]
+        for length, price in shapes:
+            end = at + length
+            if end > size:
+                if not closed:
+                    self._open(at, price)
+            elif price + self._least[2 * end + 1] <= spare:
+                self._edge(node, 2 * end + 1, price + self._idle_within(at, end))
+
+    def _open(self, at: int, price: float) -> None:
+        """A frame, whole or damaged, whose end has not come yet."""
+        self._edge(2 * at + 1, self._end, price + self._idle_within(at, len(self._data)))
+
+    def _idle_within(self, start: int, end: int) -> float:
+        return self._pauses.against(self._data, start, end) if self._pauses.gaps else 0.0
+
+    def _edge(
+        self,
+        start: int,
+        end: int,
+        price: float,
+        frame: Frame | None = None,
+        after: Context | None = None,
+    ) -> None:
+        total = self._cost[start] + price
+        if total + self._least[end] > self._limit:
+            return
+        edge = (start, end, price, frame, after)
+        if total < self._cost[end]:
+            self._cost[end] = total
+            self._by[end] = edge
+        self._edges.append(edge)
+
+    def _context(self, node: int) -> Context:
+        """On the cheapest way to this node; after a bad run or a damaged frame little is known."""
+        found, damaged, at = self._contexts.get(node), False, node
+        while found is None:
+            edge = self._by[at]
+            assert edge is not None
+            at, _, _, _, found = edge
+            if found is None:
+                damaged = damaged or at % 2 == 1
+                found = self._contexts.get(at)
+        self._contexts[node] = found = found.damaged() if damaged else found
+        return found
+
+    def pieces(self) -> list[Piece]:
+        """Walk the best path back, then ask every edge what the best path through it costs."""
+        cost = self._cost
+        path: list[_Edge] = []
+        edge = self._by[self._end]
+        while edge is not None:
+            if edge[3] is not None:
+                path.append(edge)
+            edge = self._by[edge[0]]
+        path.reverse()
+        starts = [edge[0] >> 1 for edge in path]
+        rest = [inf] * (self._end + 1)
+        rest[self._end] = 0.0
+        sure = [True] * len(path)
+        best = cost[self._end]
+        for edge in reversed(self._edges):
+            start, end, price, _, _ = edge
+            onward = price + rest[end]
+            if onward == inf:
+                continue
+            if onward < rest[start]:
+                rest[start] = onward
+            if cost[start] + onward - best < SURE:
+                for number in range(bisect_left(starts, start >> 1), bisect_left(starts, end >> 1)):
+                    sure[number] = sure[number] and path[number] is edge
+        return [
+            Piece(start >> 1, end >> 1, frame, self._context(start), after, is_sure)
+            for (start, end, _, frame, after), is_sure in zip(path, sure, strict=True)
+            if frame is not None and after is not None
+        ]

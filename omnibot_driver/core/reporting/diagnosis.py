@@ -1,0 +1,332 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From figures to verdicts: what an operator should know, and do.
+
+Levels are those of diagnostic_msgs. ERROR: the robot cannot be used, or must not be. WARN: it can,
+and something should be looked at. STALE: nothing can be said. Knows figures and times; it does not
+know where they come from.
+"""
+
+import math
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
+
+RECENT_S: Final = 10.0
+"""What happened is told for so long."""
+RATE_TOLERANCE: Final = 0.05
+STUCK_READINGS: Final = 100
+LATE_S: Final = 0.005
+"""Half a tick: the mean age of what waits for a timer of 10 ms."""
+LARGEST_SKEW_PPM: Final = 115.0
+"""More than two crystals differ by."""
+SKEW_KNOWN_S: Final = 75.0
+"""Arrivals count for so long; a skew that lasts less may be that of a computer that was busy."""
+
+BUSY_SHARE: Final = 0.1
+"""Of the time that the reader waits for the processor."""
+
+RUNNING: Final = ("nominal", "imu_only")
+
+
+class Level(IntEnum):
+    """As in diagnostic_msgs/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+    STALE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """One verdict, and the figures that it rests on."""
+
+    name: str
+    level: Level
+    message: str
+    values: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refusals:
+    """Commands that came and were turned away, and why the last one was."""
+
+    count: int = 0
+    last: str = ""
+
+
+class Diagnosis:
+    """Asked about once a second; remembers what it needs for rates and for what is recent."""
+
+    def __init__(self) -> None:
+        self._counts: dict[str, tuple[int, float]] = {}
+        self._window: deque[tuple[float, SessionFigures]] = deque()
+        self._skewed_since = math.inf
+        self._waits: deque[tuple[float, float]] = deque()
+
+    def judge(
+        self, link: LinkFigures, session: SessionFigures, refusals: Refusals, now: float
+    ) -> list[Status]:
+        """All verdicts, always of the same names in the same order."""
+        self._remember(session, now)
+        return [
+            self._link(link, now),
+            self._board(session, now),
+            self._stream(link, session, now),
+            self._time(session, now),
+            self._commands(session, refusals, now),
+            self._estop(session),
+            self._imu(session),
+        ]
+
+    def _remember(self, session: SessionFigures, now: float) -> None:
+        """The same state all along."""
+        if self._window and self._window[-1][1].state != session.state:
+            self._window.clear()
+        self._window.append((now, session))
+        while now - self._window[0][0] > RECENT_S:
+            self._window.popleft()
+
+    def _grew(self, name: str, count: int, now: float) -> bool:
+        """Whether this count has grown lately."""
+        before, at = self._counts.get(name, (count, -math.inf))
+        if count != before:
+            at = now
+        self._counts[name] = (count, at)
+        return now - at < RECENT_S
+
+    def _link(self, link: LinkFigures, now: float) -> Status:
+        reconnects = max(0, link.opened - 1)
+        level, message = Level.OK, "connected"
+        if link.trouble:
+            level, message = Level.ERROR, link.trouble
+        elif not link.opened:
+            level, message = Level.STALE, "the port is being opened"
+        elif self._grew("reconnects", reconnects, now):
+            level = Level.WARN
+            message = "the port was lost and is open again: check cable, hub and power"
+        values = {
+            "Port": link.port,
+            "Connected": _yes(bool(link.opened) and not link.trouble),
+            "Reconnects": str(reconnects),
+            "Bytes received": str(link.received_bytes),
+            "Bytes sent": str(link.sent_bytes),
+            "Overruns": "not counted" if link.overruns is None else str(link.overruns),
+            "Reader waited (s)": "" if link.waited_s is None else f"{link.waited_s:.1f}",
+        }
+        return Status("Link", level, message, values)
+
+    def _board(self, session: SessionFigures, now: float) -> Status:
+        restarts = session.tally.restarts
+        level, message = {
+            "disconnected": (Level.STALE, "not known while the port is closed"),
+            "connecting": (
+                Level.ERROR,
+                "nothing is understood from the board: check its power, cable and baudrate",
+            ),
+            "paused": (Level.WARN, "paused: the service ~/start makes it run"),
+            "imu_only": (
+                Level.WARN,
+                "IMU-only mode, without odometry: set the board's own mode and reboot it",
+            ),
+            "nominal": (Level.OK, "running"),
+        }[session.state]
+        if self._grew("restarts", restarts, now) and level is Level.OK:
+            level = Level.WARN
+            message = "the board has restarted: unless you reset it, check its power supply"
+        return Status("Board", level, message, {"Mode": session.state, "Restarts": str(restarts)})
+
+    def _stream(self, link: LinkFigures, session: SessionFigures, now: float) -> Status:
+        tally, refused = session.tally, session.refused
+        readings_refused = refused.imu + refused.displacements + refused.poses
+        damaged = self._grew("faults", session.board.faults, now)
+        lossy = self._grew("gaps", tally.gaps, now)
+        overran = self._grew("overruns", link.overruns or 0, now)
+        waiting = self._waiting_share(link, now)
+        doubtful = self._grew("refused", readings_refused, now)
+        rates = self._rates_hz()
+        wanted = (
+            session.board.rates_hz if session.state == "nominal" else session.board.rates_hz[:1]
+        )
+        level, message = Level.OK, "complete"
+        if session.state not in RUNNING:
+            level, message = Level.STALE, "the board sends no measurements"
+        elif rates and any(
+            abs(rate - want) > RATE_TOLERANCE * want + 1.0 / self._span_s
+            for rate, want in zip(rates, wanted, strict=False)
+        ):
+            level = Level.WARN
+            message = (
+                f"rates are off: the reader waits {waiting:.0%} of the time for the processor;"
+                " this computer is too busy: reduce its load"
+                if waiting > BUSY_SHARE
+                else "rates are off: bytes are lost, or this computer is too busy to read them;"
+                " check cable, hub and load"
+            )
+        elif overran:
+            level = Level.WARN
+            message = (
+                "the serial port overran: bytes are lost in this computer, not on the line;"
+                " reduce its load"
+            )
+        elif damaged or lossy:
+            level, message = Level.WARN, "bytes are lost on the line: check cable, hub and ground"
+        elif doubtful:
+            level = Level.WARN
+            message = (
+                "readings that cannot be true were refused: the line changes bits, or a limit of"
+                " motion (fastest_…) is set too low"
+            )
+        elif waiting > BUSY_SHARE:
+            message = (
+                "complete, but read late: the reader waits"
+                f" {waiting:.0%} of the time for the processor"
+            )
+        names = ("IMU", "Odometry", "Pose")
+        shown = rates or (math.nan,) * 3
+        values = {
+            **{
+                f"{name} rate (Hz)": f"{rate:.1f} of {want:g}"
+                for name, rate, want in zip(names, shown, session.board.rates_hz, strict=True)
+            },
+            "Framing faults": str(session.board.faults),
+            "Bytes discarded": str(session.board.discarded_bytes),
+            "IMU frames lost": str(tally.lost_imu),
+            "Odometry frames lost": str(tally.lost_displacements),
+            "Sequence gaps": str(tally.gaps),
+            "Last gap (frames)": str(tally.last_gap),
+            "IMU readings refused": str(refused.imu),
+            "Odometry readings refused": str(refused.displacements),
+            "Poses refused": str(refused.poses),
+        }
+        return Status("Stream", level, message, values)
+
+    def _waiting_share(self, link: LinkFigures, now: float) -> float:
+        """Of the recent time that the reader was ready to run and did not."""
+        if link.waited_s is None:
+            return 0.0
+        self._waits.append((now, link.waited_s))
+        while now - self._waits[0][0] > RECENT_S:
+            self._waits.popleft()
+        since, before_s = self._waits[0]
+        return (link.waited_s - before_s) / (now - since) if now > since else 0.0
+
+    @property
+    def _span_s(self) -> float:
+        return self._window[-1][0] - self._window[0][0]
+
+    def _rates_hz(self) -> tuple[float, float, float] | None:
+        """Of the readings in this state; None before there was time to count any."""
+        if not self._span_s:
+            return None
+        old, new = self._window[0][1].tally, self._window[-1][1].tally
+        counts = (new.imu - old.imu, new.displacements - old.displacements, new.poses - old.poses)
+        imu, displacements, poses = (count / self._span_s for count in counts)
+        return imu, displacements, poses
+
+    def _time(self, session: SessionFigures, now: float) -> Status:
+        old, new = self._window[0][1].tally, self._window[-1][1].tally
+        reads = new.reads - old.reads
+        skewed = session.state in RUNNING and abs(session.skew_ppm) > LARGEST_SKEW_PPM
+        self._skewed_since = min(self._skewed_since, now) if skewed else math.inf
+        if session.state not in RUNNING or not reads:
+            return Status("Time", Level.STALE, "no measurements tell the board's time", {})
+        delay_s = (new.delay_s - old.delay_s) / reads
+        variance = (new.squared_delay_s2 - old.squared_delay_s2) / reads - delay_s * delay_s
+        level, message = Level.OK, "stamps are sampling times"
+        if now - self._skewed_since > SKEW_KNOWN_S:
+            level = Level.WARN
+            message = "the two clocks differ more than crystals do: is this computer's clock right?"
+        elif delay_s > LATE_S:
+            level = Level.WARN
+            message = (
+                "measurements wait before they can be read: set the adapter's latency_timer to 1"
+                " (udev/99-omnibot.rules), or relieve this computer"
+            )
+        values = {
+            "Clock skew (ppm)": f"{session.skew_ppm:.1f}",
+            "Delay over the least (ms)": f"{1e3 * delay_s:.2f}",
+            "Jitter (ms rms)": f"{1e3 * math.sqrt(max(0.0, variance)):.2f}",
+        }
+        return Status("Time", level, message, values)
+
+    def _commands(self, session: SessionFigures, refusals: Refusals, now: float) -> Status:
+        commands, saturated = session.commands, session.board.saturated
+        refused = self._grew("refusals", refusals.count, now)
+        too_large = self._grew("saturated", saturated, now)
+        limited = self._grew("limited", commands.limited, now)
+        tripped = self._grew("trips", commands.trips, now)
+        level = Level.OK
+        if commands.interlock:
+            level, message = Level.ERROR, f"motion is refused: {commands.interlock}"
+        elif tripped:
+            level = Level.WARN
+            message = "the motion monitor has stopped the robot: the log says what it saw"
+        elif not commands.monitored:
+            level = Level.WARN
+            message = "the motion monitor is off: set `motion_monitor` to true to have it back"
+        elif refused:
+            level, message = Level.WARN, f"lately: {refusals.last}"
+        elif too_large:
+            level = Level.WARN
+            message = "speeds do not fit into a command: lower the scales or the speed limits"
+        elif commands.source is None:
+            message = "nobody commands; the robot stands"
+        elif limited:
+            message = f"{commands.source} commands, faster than the limits max_… allow"
+        else:
+            message = f"{commands.source} commands"
+        values = {
+            "Source": commands.source or "none",
+            "Age (s)": f"{commands.age_s:.2f}" if commands.source else "none",
+            "Refused": str(refusals.count),
+            "Limited": str(commands.limited),
+            "Saturated": str(saturated),
+            "Motion monitor trips": str(commands.trips),
+        }
+        return Status("Commands", level, message, values)
+
+    def _estop(self, session: SessionFigures) -> Status:
+        level, message = Level.OK, "not latched"
+        if session.commands.estop:
+            level = Level.WARN
+            message = "latched: look why, then release it with the service ~/estop (data: false)"
+        return Status("E-stop", level, message, {"Latched": _yes(session.commands.estop)})
+
+    def _imu(self, session: SessionFigures) -> Status:
+        imu, tally = session.imu, session.tally
+        stuck = [
+            name
+            for name, same in (("accelerometer", tally.same_force), ("gyro", tally.same_rate))
+            if same >= STUCK_READINGS
+        ]
+        level, message = Level.OK, "measuring"
+        if session.state not in RUNNING:
+            level, message = Level.STALE, "the board sends no measurements"
+        elif stuck:
+            level = Level.ERROR
+            message = f"always the same from the {' and '.join(stuck)}: switch the board off and on"
+        elif imu.advice:
+            level, message = Level.WARN, imu.advice
+        elif imu.gravity_mps2 is None:
+            message = "measuring; the robot has not stood still yet"
+        values = {
+            "Gravity (m/s²)": "none" if imu.gravity_mps2 is None else f"{imu.gravity_mps2:.3f}",
+            "Gyro bias (rad/s)": _numbers(imu.bias_radps),
+            "Gyro noise (rad/s rms)": _numbers(imu.noise_radps),
+            "Stuck": " and ".join(stuck) or "no",
+        }
+        return Status("IMU", level, message, values)
+
+
+def _yes(value: bool) -> str:
+    return "yes" if value else "no"
+
+
+def _numbers(vector: tuple[float, float, float] | None) -> str:
+    return "none" if vector is None else ", ".join(f"{value:.5f}" for value in vector)

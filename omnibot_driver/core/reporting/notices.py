@@ -1,0 +1,113 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a user is told of the stream: seldom, or once, in sentences that say what to do.
+
+Knows counts, times and words; not where they come from.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.board import Mode
+from omnibot_driver.core.measurement.outlier_filter import Refused
+
+NEWS_S: Final = 10.0
+"""What is counted is told no more often than this."""
+HEADING_ASSUMED: Final = (
+    "the board sends no pose that makes sense: its heading is assumed to have been 0 at first"
+)
+
+STOP_UNSEEN: Final = (
+    "stop unconfirmed: in IMU-only mode the board does not report motion, so Stop is repeated for"
+    " 5 s each time; check by eye that the robot stands"
+)
+STOP_UNANSWERED: Final = "stop unconfirmed: the board is not responding"
+STOP_UNMEASURED: Final = (
+    "stop unconfirmed: no odometry frames come from the board, so Stop was sent for 5 s; check by"
+    " eye that the robot stands, and check cable and hub"
+)
+STOP_UNHEEDED: Final = (
+    "stop unconfirmed: Stop was sent for 5 s and the robot still moves; if it is not being pushed,"
+    " the board is not receiving: switch the motors off by hand and check the cable"
+)
+
+
+class News:
+    """What a count has grown by since that was last told."""
+
+    def __init__(self) -> None:
+        self._told = 0
+        self._told_at = -math.inf
+
+    def since_told(self, count: int, now: float) -> int:
+        """0 while there is nothing new, or something was told just before."""
+        if count == self._told or now - self._told_at < NEWS_S:
+            return 0
+        new, self._told, self._told_at = count - self._told, count, now
+        return new
+
+
+class Bulletin:
+    """The sentences that are due."""
+
+    def __init__(self) -> None:
+        self._lost, self._refused = News(), News()
+        self._overruns = 0
+        self._told: set[str] = set()
+        self._standing = ""
+
+    def counted(self, lost: int, overruns: int, refused: Refused, now: float) -> list[str]:
+        """What was lost and refused since it was last told. ``overruns``: of the port."""
+        news = []
+        if more := self._lost.since_told(lost, now):
+            overrun, self._overruns = overruns > self._overruns, overruns
+            news.append(
+                f"odometry frames lost in this computer: {more}; the serial port overran: reduce"
+                " the load, or use another adapter"
+                if overrun
+                else f"odometry frames lost on the line: {more}; check cable and hub"
+            )
+        total = refused.imu + refused.displacements + refused.poses
+        if more := self._refused.since_told(total, now):
+            news.append(
+                f"readings refused that cannot be true: {more} (in all {refused.imu} imu,"
+                f" {refused.displacements} odometry, {refused.poses} poses); the line changes bits,"
+                " or a limit of motion is set too low"
+            )
+        return news
+
+    def once(self, sentence: str) -> list[str]:
+        """Unless it was told before."""
+        if sentence in self._told:
+            return []
+        self._told.add(sentence)
+        return [sentence]
+
+    def unconfirmed(self, mode: Mode, *, measured: bool) -> list[str]:
+        """Stop was repeated for its whole time, and nothing showed that the robot stands.
+
+        ``measured``: displacements came meanwhile.
+        """
+        if mode is Mode.IMU_ONLY:
+            return self.once(STOP_UNSEEN)
+        if mode is Mode.UNKNOWN:
+            return [STOP_UNANSWERED]
+        return [STOP_UNHEEDED if measured else STOP_UNMEASURED]
+
+    def standing(self, sentence: str) -> list[str]:
+        """What holds now, empty for nothing; told when it begins to hold."""
+        before, self._standing = self._standing, sentence
+        return [sentence] if sentence and not before else []
+
+
+def why_silent(silence_s: float, *, bytes_came: bool) -> str:
+    """Why nothing was understood for so long, and what to do."""
+    if bytes_came:
+        return (
+            f"nothing that comes in makes sense for {silence_s:g} s: check the parameter"
+            " `baudrate`, the cable, and that it is this board"
+        )
+    return (
+        f"nothing comes from the board for {silence_s:g} s: check its power and the cable,"
+        " and that `port` is its port"
+    )

@@ -1,0 +1,237 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From arrival times to sampling times: the board's clock, as it is seen from the host's.
+
+The board samples once a tick by a crystal of its own. Its bytes reach us with a delay that is
+unknown and ever changing, but never before they were sent. Two questions follow.
+
+*Which tick is it?* IMU readings are counted, with those that the board says were lost. What no byte
+told of is told exactly by the counter that displacements carry; until the next of those, or without
+any, by arrival: a read takes all that has come, so the newest tick in it is hardly older than one
+period, and never from the future.
+
+*When was it?* ``TickLine`` lays a line under the arrivals. What stays in the stamps is the least
+delay that ever happens: one constant.
+
+This module knows readings and times. It reads no clock and knows no board's bytes.
+"""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from typing import Final
+
+from omnibot_driver.core.board import DisplacementReading, Edge, ImuReading, PoseReading, Reading
+from omnibot_driver.core.timing.clock_fit import Point, TickLine
+
+LARGEST_LOSS_TICKS: Final = 25
+"""If more are missing that no counter has told, then nothing that was known holds any more."""
+BEAT_READS: Final = 12
+"""Among so many reads one is little delayed: a 16 ms adapter's cuts recur after five."""
+CALM: Final = 0.45
+"""Part of a period, less than half of it: two reads in a row that came so near the line leave no
+doubt about their ticks."""
+LARGEST_RISE: Final = 0.02
+"""By this part of a period a stamp follows, each tick, a line that was laid later."""
+SMALLEST_STEP_S: Final = 1e-6
+"""Between two stamps for which even their arrivals leave no room."""
+
+WHOLE: Final = Edge(ahead=0, latest_s=0.0, earliest_s=0.0)
+"""A read that ended with a whole sample."""
+
+
+class DeviceClock:
+    """``period_s``: the board's nominal tick; each brings one ImuReading."""
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self._calm_s = CALM * period_s
+        self._tick = 0
+        self._stamp_s = -math.inf
+        self.restart()
+
+    def restart(self) -> None:
+        """What the board does from here on has nothing to do with what it did before.
+
+        Stamps go forward all the same.
+        """
+        self._stamped_tick: int | None = None
+        self._displaced_tick: int | None = None
+        self._displacement_ticks = 0
+        self._line: TickLine | None = None
+        self._seen_tick: int | None = None
+        self._settled = False
+        self._calm: TickLine | None = None
+        """The line, if the last read was near it and cut no sample."""
+        self._single_reads = 0
+        """The last so many brought one sample each, so none waited for another."""
+        self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
+        self._seen_at = -math.inf
+        """When a new tick was seen last. Soon after a late one come those that waited with it."""
+        self._awaited: Point | None = None
+        """The next tick, and by when it had not come, unless it was only not read yet."""
+        self._cut_off: Point | None = None
+        """What a cut sample tells of the line, if it was cut by the read and not by a loss."""
+
+    @property
+    def skew_ppm(self) -> float:
+        """By how much the board's clock is faster than ours, by what has been seen so far."""
+        line = self._line
+        return 0.0 if line is None else 1e6 * (self._period_s / line.slope_s - 1.0)
+
+    def stamps(
+        self, readings: Sequence[Reading], now: float, edge: Edge | None = WHOLE
+    ) -> list[float]:
+        """When each of these readings, all that one read at ``now`` completed, was sampled.
+
+        ``edge``: where the read ended. From tick to tick stamps increase, and none is later than
+        ``now``; a displacement has the stamp of its tick's ImuReading.
+        """
+        ticks = self._count(readings)
+        if ticks and ticks.count(ticks[0]) == len(ticks) and isinstance(readings[0], ImuReading):
+            stamp_s = self._due(ticks[0], now, edge, len(ticks))
+            if stamp_s is not None:
+                return [stamp_s] * len(ticks)
+        line = self._line = self._line or TickLine(self._period_s, (self._tick, now))
+        if readings and self._cut_off:
+            if isinstance(readings[0], ImuReading) and not readings[0].lost:
+                line.not_before(self._cut_off)
+            self._cut_off = None
+        short = 0
+        if edge is not None:
+            kinds = list(map(type, readings))
+            came = edge.ahead + kinds.count(ImuReading)
+            if came:
+                self._single_reads = self._single_reads + 1 if came == 1 else 0
+                short = self._compare(line, edge, now, counted=DisplacementReading in kinds)
+        # Where a counter took ticks back, the order of the readings must still find room.
+        least_s = 0.0 if len(ticks) < 2 or ticks == sorted(ticks) else SMALLEST_STEP_S
+        stamps = []
+        for left, tick, reading in zip(range(len(ticks), 0, -1), ticks, readings, strict=True):
+            is_new = tick + short != self._stamped_tick
+            kind = type(reading)
+            if kind is ImuReading or (kind is DisplacementReading and is_new):
+                later_s = max((ticks[-1] - tick) * self._period_s, left * least_s)
+                self._stamp(tick + short, now - later_s, (now - self._stamp_s) / (left + 1))
+            stamps.append(self._stamp_s)
+        return stamps
+
+    def stamp(self, reading: ImuReading, now: float, edge: Edge | None) -> float | None:
+        """``stamps`` of one that came alone, when due; None, and nothing is changed, otherwise."""
+        if reading.lost:
+            return None
+        stamp_s = self._due(self._tick + 1, now, edge, 1)
+        if stamp_s is not None:
+            self._tick += 1
+        return stamp_s
+
+    def _due(self, tick: int, now: float, edge: Edge | None, readings: int) -> float | None:
+        """The stamp of one new tick that came as a whole, when it was due; None if it did not."""
+        line = self._calm
+        if line is None or edge is None or edge.ahead or edge.cut or tick == self._seen_tick:
+            return None
+        arrival = now + edge.latest_s
+        lag_s = arrival - line.at(tick)
+        if not -self._calm_s <= lag_s <= self._calm_s:
+            return None
+        self._single_reads += 1
+        self._see(line, tick, lag_s, now)
+        line.see((tick, arrival), cut=False)
+        self._awaited = tick + 1, now + edge.earliest_s
+        self._stamp(tick, now, (now - self._stamp_s) / (readings + 1))
+        return self._stamp_s
+
+    def _count(self, readings: Sequence[Reading]) -> list[int]:
+        """The ticks of the readings, by what is known of losses; the counter is right."""
+        ticks: list[int] = []
+        for reading in readings:
+            if isinstance(reading, ImuReading):
+                self._tick += 1 + reading.lost
+            elif isinstance(reading, DisplacementReading):
+                self._tick += self._missing(reading)
+                self._displaced_tick = None if reading.restarted else self._tick
+            elif isinstance(reading, PoseReading) and self._displaced_tick is not None:
+                self._displaced_tick += reading.lost * self._displacement_ticks
+            ticks.append(self._tick)
+        return ticks
+
+    def _missing(self, reading: DisplacementReading) -> int:
+        """How many ticks the counter is ahead of the count."""
+        if self._displaced_tick is None or reading.duration_s is None:
+            return 0
+        self._displacement_ticks = round(reading.duration_s / self._period_s)
+        passed = self._displacement_ticks * (reading.lost + 1)
+        return self._displaced_tick + passed - self._tick
+
+    def _compare(self, line: TickLine, edge: Edge, now: float, *, counted: bool) -> int:
+        """Hold the newest tick against its arrival; by how many the count was found to be short.
+
+        ``counted``: a counter told this tick.
+        """
+        tick, arrival = self._tick + edge.ahead, now + edge.latest_s
+        if tick == self._seen_tick:
+            return 0  # its beginning has been seen before, and told more
+        lag_s = arrival - line.at(tick)
+        period_s, lags_s = self._period_s, self._lags_s
+        short = 0
+        if self._settled and lag_s < -period_s / 2:
+            short = round(lag_s / period_s)
+        elif len(lags_s) == BEAT_READS:
+            self._settled = True
+            *before_s, last_s = lags_s
+            at_once_s = lag_s - max(lags_s)
+            later_s = min(last_s, lag_s) - max(before_s)
+            if (
+                self._single_reads > BEAT_READS
+                and now - self._seen_at > period_s / 2
+                and (0.95 < at_once_s / period_s < 1.05 or 0.95 < later_s / period_s < 1.5)
+            ):
+                short = 1  # more at once were sooner kept waiting than lost
+            elif min(lags_s) > period_s / 2:
+                short, counted = round(min(lags_s) / period_s), True
+                lags_s.clear()
+        if short > LARGEST_LOSS_TICKS:
+            self.restart()
+            line = self._line = TickLine(period_s, (tick, arrival))
+            short, lag_s = 0, 0.0
+        elif short:
+            self._tick += short
+            if self._displaced_tick is not None:
+                self._displaced_tick = min(self._displaced_tick + short * counted, self._tick)
+            tick += short
+            lag_s -= short * line.slope_s
+        self._see(line, tick, lag_s, now)
+        line.see((tick, arrival), cut=edge.cut)
+        if edge.cut:
+            self._cut_off = tick, now + edge.earliest_s
+        else:
+            self._awaited = tick + 1, now + edge.earliest_s
+        is_calm = self._settled and not edge.cut and abs(lag_s) <= self._calm_s
+        self._calm = line if is_calm else None
+        return short
+
+    def _see(self, line: TickLine, tick: int, lag_s: float, now: float) -> None:
+        """A new tick. One that comes right behind another had waited with it to be read."""
+        if now - self._seen_at < self._period_s / 2 and self._lags_s:
+            self._lags_s[-1] = lag_s
+            self._single_reads = 0
+        else:
+            self._lags_s.append(lag_s)
+            if self._awaited:
+                line.not_before(self._awaited)
+        self._awaited = None
+        self._seen_tick, self._seen_at = tick, now
+
+    def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
+        """The line's time, but no jump backwards, and forwards only little by little.
+
+        ``room_s``: by so much it may go forward and leave as much to each that comes after it.
+        """
+        assert self._line is not None
+        stamp_s = min(self._line.at(tick), latest_s)
+        if self._stamped_tick is not None:
+            passed = max(1, tick - self._stamped_tick)
+            stamp_s = min(stamp_s, self._stamp_s + passed * self._period_s * (1 + LARGEST_RISE))
+        step_s = max(SMALLEST_STEP_S, min(self._period_s / 2, room_s))
+        self._stamp_s = max(stamp_s, self._stamp_s + step_s)
+        self._stamped_tick = tick

@@ -1,0 +1,179 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Motion commands through a session to a simulated board: authority, ramps, stamps, limits."""
+
+import itertools
+
+import pytest
+from session_bench import STOP, Bench, bare
+
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.stream import PACE_S
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.simulator import BoardSettings
+
+GENTLE = SpeedLimits(linear_mps2=1.0, angular_radps2=2.0)
+
+
+def running(**options: object) -> Bench:
+    """A board that stands still and runs, with nothing left to say on the line."""
+    bench = Bench(BoardSettings(running=True), **options)  # type: ignore[arg-type]
+    bench.open()
+    bench.run_until_state("nominal")
+    bench.run(1.5)
+    return bench
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return running()
+
+
+def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
+    """The frames since a mark that were sent in mode 1, and Stop, as words with their times."""
+    frames = [(at, data[-9:]) for at, data in bench.written[mark:]]
+    return [
+        (at, [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)])
+        for at, data in frames
+        if data[-7] == 1 or data == STOP
+    ]
+
+
+def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
+    """And the base after the wheels: Stop, then the newest."""
+    bench.drive(0.3)
+    bench.run(0.1)
+    start = len(bench.written)
+    bench.turn_wheels(10.0, 10.0, 10.0)
+    bench.run(0.02)
+    bench.drive(0.3)
+    bench.run(0.02)
+    assert [bare(data).hex(" ") for _, data in bench.written[start:]] == [
+        "ff fe 02 00 00 00 00 00 00",
+        "ff fe 02 00 14 00 14 00 14",
+        "ff fe 02 00 00 00 00 00 00",
+        "ff fe 01 00 15 00 00 00 00",
+    ]
+
+
+def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
+    """The base drives on, without a Stop."""
+    bench.drive(0.3)
+    start = len(bench.written)
+    with pytest.raises(CommandRefused):
+        bench.session.command_wheels((1.0, 2.0), bench.now)
+    bench.run(0.2)
+    assert STOP not in [data for _, data in bench.written[start:]]
+
+
+def test_a_step_is_ramped_with_its_direction_kept() -> None:
+    """1 m/s² to 0.3 and 0.4 m/s takes half a second; 70 LSB per m/s; the bench has 10 ms."""
+    bench = running(limits=GENTLE)
+    start, begun = len(bench.written), bench.now
+    for _ in range(6):
+        bench.drive(0.3, 0.4)
+        bench.run(0.1)
+    sent = velocities(bench, start)
+    times = [at - begun for at, _ in sent]
+    assert times[:25] == pytest.approx([0.02 * n for n in range(25)])
+    for at, (vx, vy, yaw_rate) in sent[:25]:
+        speed = min(0.5, 1.0 * (at - begun + PACE_S))
+        assert (vx, vy) == pytest.approx((70 * 0.6 * speed, 70 * 0.8 * speed), abs=0.51)
+        assert yaw_rate == 0
+    assert sent[-1][1] == [21, 28, 0]
+
+
+def test_a_reversal_is_ramped_through_zero() -> None:
+    """From forward to back by no more than the acceleration, each frame after the other."""
+    bench = running(limits=GENTLE)
+    for _ in range(8):
+        bench.drive(0.5)
+        bench.run(0.1)
+    start = len(bench.written)
+    for _ in range(12):
+        bench.drive(-0.5)
+        bench.run(0.1)
+    words = [vx for _, (vx, _, _) in velocities(bench, start)]
+    assert words[0] > 30
+    assert words[-1] == -35
+    assert all(0 <= before - after <= 2 for before, after in itertools.pairwise(words))
+
+
+def test_turning_is_ramped_by_its_own_limit() -> None:
+    """2 rad/s² to 0.5 rad/s is a quarter of a second."""
+    bench = running(limits=GENTLE)
+    start = len(bench.written)
+    bench.drive(0.0, 0.0, 0.5)
+    bench.run(0.3)
+    words = [yaw_rate for _, (_, _, yaw_rate) in velocities(bench, start)]
+    assert words[:3] == [10, 30, 50]  # a tick of the bench is 10 ms
+    assert words[13] == words[-1] == 250
+
+
+def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:
+    """Whoever says zero may mean: there is somebody in front of it."""
+    bench = running(limits=GENTLE)
+    for _ in range(8):
+        bench.drive(0.5)
+        bench.run(0.1)
+    start = len(bench.written)
+    bench.drive()
+    assert bench.written_since(start) == STOP
+
+
+def test_what_comes_after_a_stop_begins_at_rest() -> None:
+    """A timeout, an e-stop and a zero command each take the set-point along."""
+    bench = running(limits=GENTLE)
+    for stop in (
+        lambda: bench.run(1.0),
+        lambda: bench.drive(),
+        lambda: (bench.session.estop(True, bench.now), bench.session.estop(False, bench.now)),
+    ):
+        for _ in range(8):
+            bench.drive(0.5)
+            bench.run(0.1)
+        stop()
+        bench.run(0.02)
+        start = len(bench.written)
+        bench.drive(0.5)
+        assert velocities(bench, start)[0][1] == [1, 0, 0]
+        bench.run(1.0)
+
+
+def test_wheels_are_not_ramped() -> None:
+    """Acceleration limits are the base's."""
+    bench = running(limits=GENTLE)
+    start = len(bench.written)
+    bench.turn_wheels(10.0, 0.0, 0.0)
+    assert bare(bench.written_since(start)).hex(" ") == "ff fe 02 00 14 00 00 00 00"
+
+
+def test_a_stamped_command_expires_by_its_stamp(bench: Bench) -> None:
+    """One that is 0.3 s old has 0.2 s left."""
+    bench.drive(0.3, age_s=0.3)
+    bench.run(0.19)
+    assert bench.written[-1][1] != STOP
+    bench.run(0.02)
+    assert bench.written[-1][1] == STOP
+
+
+def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
+    """The sender's clock is a little ahead."""
+    bench.drive(0.3, age_s=-0.3)
+    bench.run(0.49)
+    assert bench.written[-1][1] != STOP
+    bench.run(0.02)
+    assert bench.written[-1][1] == STOP
+
+
+@pytest.mark.parametrize("age_s", [0.6, -0.6])
+def test_a_command_too_old_or_from_the_future_is_refused_and_keeps_nothing_alive(
+    bench: Bench, age_s: float
+) -> None:
+    """It counts as no command."""
+    bench.drive(0.3)
+    bench.run(0.4)
+    with pytest.raises(CommandRefused, match=r"0\.60 s"):
+        bench.drive(0.3, age_s=age_s)
+    bench.run(0.2)
+    assert bench.written[-1][1] == STOP

@@ -1,0 +1,136 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The e-stop: latched at once, repeated without end, ended by nothing but its release."""
+
+from unittest.mock import ANY
+
+import pytest
+from robots import drive_on, driving, estop
+from session_bench import EMERGENCY_STOP, OPENING, START, STOP, Bench
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.events import StateChanged
+from omnibot_driver.core.mode_manager import Request
+
+LATCHED_AND_RELEASED = ["e-stop latched by the driver", "e-stop released by the driver"]
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return driving()
+
+
+def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
+    """Motion stops, and nothing but the manual's E-stop is sent while it is latched."""
+    bench.drive(0.5)
+    bench.run(0.1)
+    start = len(bench.written)
+    assert "latched" in bench.session.estop(True, bench.now)
+    bench.settle()
+    assert bench.written_since(start) == 2 * (EMERGENCY_STOP + STOP)
+    with pytest.raises(CommandRefused, match="~/estop"):
+        bench.drive(0.5)
+    start += 1
+    bench.run(5.0)
+    assert {data for _, data in bench.written[start:]} == {EMERGENCY_STOP + STOP}
+    assert bench.still()
+    assert StateChanged("nominal", True) in bench.events
+
+
+def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> None:
+    """Only a release ends it, and then the robot stands until a newer command."""
+    bench.session.estop(True, bench.now)
+    bench.settle()
+    bench.close()
+    bench.open()
+    bench.run(1.0)
+    bench.board.reboot()
+    bench.run(3.0)
+    bench.ask(Request.START, 5.0)
+    bench.ask(Request.RESET, 10.0)
+    assert bench.session.estop_active
+    bench.run(1.0)
+    assert bench.written[-1][1] == EMERGENCY_STOP + STOP
+    assert "released" in bench.session.estop(False, bench.now)
+    bench.settle()
+    bench.run(2.0)
+    assert bench.still()
+    bench.drive(0.3)
+    bench.run(0.3)
+    assert not bench.still()
+
+
+def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
+    bench: Bench,
+) -> None:
+    """Latched while there was no port; the answer says so."""
+    bench.close()
+    assert "port is not open" in estop(bench, True)
+    start = len(bench.written)
+    bench.open()
+    assert bench.written_since(start) == OPENING + START + 2 * (EMERGENCY_STOP + STOP)
+    bench.run(2.0)
+    assert bench.still()
+
+
+def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_nothing(
+    bench: Bench,
+) -> None:
+    """A hundred commands under the latch, and nothing moves when it is let go."""
+    estop(bench, True)
+    for _ in range(100):
+        with pytest.raises(CommandRefused, match="e-stop"):
+            bench.drive(0.4)
+        bench.run(0.01)
+    estop(bench, False)
+    bench.run(1.0)
+    assert bench.still()
+    drive_on(bench)
+    assert not bench.still()
+
+
+def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
+    """Released and commanded, it stands: after a second the driver says so, once; a reset helps."""
+    bench = driving(estop_latches=True)
+    estop(bench, True)
+    bench.run(1.0)
+    estop(bench, False)
+    for _ in range(8):
+        drive_on(bench)
+    assert bench.still()
+    told = [*LATCHED_AND_RELEASED, ANY]
+    assert bench.notices == told
+    assert "~/reset" in bench.notices[-1]
+    assert bench.ask(Request.RESET, 10.0).success
+    drive_on(bench)
+    assert not bench.still()
+    assert bench.notices == told
+
+
+def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
+    """Speeding up takes its time, and that is all."""
+    for _ in range(3):
+        estop(bench, True)
+        bench.run(0.5)
+        estop(bench, False)
+        for _ in range(4):
+            drive_on(bench)
+    assert bench.notices == 3 * LATCHED_AND_RELEASED
+
+
+def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) -> None:
+    """However often they say it."""
+    for active, by in ((True, "a topic"), (True, "a service"), (False, "Ann"), (False, "Bob")):
+        bench.session.estop(active, bench.now, by=by)
+        bench.settle()
+    assert bench.notices == ["e-stop latched by a topic", "e-stop released by Ann"]
+
+
+def test_an_estop_that_nobody_may_have_heard_says_so(bench: Bench) -> None:
+    """It is latched and sent, but not a byte has come from the board for a while."""
+    assert estop(bench, True) == "e-stop latched"
+    bench.speaks = False
+    bench.run(2.0)
+    assert "nobody knows" in estop(bench, True)
+    bench.close()
+    assert "not open" in estop(bench, True)

@@ -1,0 +1,227 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Speed limits keep the direction; rounding and saturation are honest."""
+
+import math
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from strategies import any_twists, finite
+
+from omnibot_driver.core.commands.limits import (
+    MAX_WORD,
+    SpeedLimits,
+    require_finite,
+    require_timely,
+    shorten,
+    slow,
+    to_nearest,
+)
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+
+limits = st.one_of(st.just(0.0), st.floats(1e-3, 200.0))
+vectors = st.lists(finite, min_size=2, max_size=3)
+ULPS = 1 + 1e-11
+
+
+def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
+    """Parallel to nine digits, and not opposite; a zero has every direction."""
+    largest_a, largest_b = max(map(abs, a)), max(map(abs, b))
+    if largest_a < 1e-290 or largest_b < 1e-290:
+        return True
+    unit_a, unit_b = [x / largest_a for x in a], [x / largest_b for x in b]
+    return all(
+        math.isclose(x, y, rel_tol=1e-9, abs_tol=1e-9) for x, y in zip(unit_a, unit_b, strict=True)
+    )
+
+
+def words_of(counts: list[float]) -> tuple[int, ...]:
+    """As a board is told them."""
+    return tuple(map(to_nearest, slow(counts, MAX_WORD)))
+
+
+@given(vectors, limits)
+@example([1e308, 1e308], 0.5)
+@example([1e308, -1e308, 1e308], 1.0)
+@example([5e-324, 0.0], 0.5)
+@example([1.7e308, 1.7e308, -1.7e308], 0.5)
+def test_a_shortened_vector_keeps_its_direction_and_the_limit(
+    vector: list[float], limit: float
+) -> None:
+    """However long it was."""
+    short = shorten(vector, limit)
+    assert math.hypot(*short) <= limit * ULPS
+    assert limit == 0 or same_direction(short, vector)
+    if math.hypot(*vector) > limit:
+        assert math.hypot(*short) == pytest.approx(limit)
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=3), limits)
+def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: float) -> None:
+    """To the last bit, and a longer one ends at the limit."""
+    length = math.hypot(*vector)
+    if length <= limit / ULPS:
+        assert shorten(vector, limit) == tuple(vector)
+    elif length >= limit * ULPS:
+        assert math.hypot(*shorten(vector, limit)) == pytest.approx(limit)
+
+
+@given(vectors, limits)
+@example([1e308, -1e308], 17.0)
+def test_slowed_wheels_keep_their_ratio_and_the_limit(values: list[float], limit: float) -> None:
+    """The fastest decides for all."""
+    slowed = slow(values, limit)
+    assert max(map(abs, slowed)) <= limit * ULPS
+    assert limit == 0 or same_direction(slowed, values)
+    if max(map(abs, values)) > limit:
+        assert max(map(abs, slowed)) == pytest.approx(limit)
+
+
+@given(any_twists)
+def test_a_limited_twist_is_within_every_limit_and_points_the_same_way(twist: BodyTwist) -> None:
+    """The linear velocity as a vector; the yaw rate keeps its sign."""
+    limited = SpeedLimits(linear_mps=0.5, angular_radps=0.7).twist(twist)
+    assert math.hypot(limited.vx_mps, limited.vy_mps) <= 0.5 * ULPS
+    assert abs(limited.yaw_rate_radps) <= 0.7
+    assert same_direction((limited.vx_mps, limited.vy_mps), [twist.vx_mps, twist.vy_mps])
+    assert limited.yaw_rate_radps * math.copysign(1, twist.yaw_rate_radps) >= 0
+
+
+@given(any_twists)
+def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
+    """And what is not is at a limit, or beyond it."""
+    limits = SpeedLimits(linear_mps=0.5, angular_radps=0.7)
+    if limits.allow(twist):
+        limited = limits.twist(twist)
+        assert (limited.vx_mps, limited.vy_mps) == pytest.approx((twist.vx_mps, twist.vy_mps))
+        assert limited.yaw_rate_radps == twist.yaw_rate_radps
+    else:
+        assert twist.faster_than(0.5 / ULPS, 0.7 / ULPS)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
+    """Not even without limits."""
+    values = [0.0, 0.1, -0.1]
+    values[place] = bad
+    none = SpeedLimits(linear_mps=math.inf, angular_radps=math.inf)
+    assert none.allow(BodyTwist(0.0, 0.1, -0.1))
+    assert not none.allow(BodyTwist(*values))
+
+
+def test_the_linear_speed_is_limited_as_a_vector_and_not_by_axis() -> None:
+    """3 and 4 m/s become 0.3 and 0.4, not 0.5 and 0.5; a turn is no part of it."""
+    limited = SpeedLimits().twist(BodyTwist(3.0, -4.0, 0.1))
+    assert limited == BodyTwist(pytest.approx(0.3), pytest.approx(-0.4), 0.1)
+
+
+def test_wheels_are_limited_by_the_fastest() -> None:
+    """34 rad/s halves all three."""
+    limited = SpeedLimits(wheel_radps=17.0).wheels((34.0, -17.0, 1.0))
+    assert limited == pytest.approx((17.0, -8.5, 0.5))
+
+
+def test_a_limit_of_zero_lets_nothing_through() -> None:
+    """Neither linear nor yaw nor wheel."""
+    none = SpeedLimits(linear_mps=0.0, angular_radps=0.0, wheel_radps=0.0)
+    assert none.twist(BodyTwist(1.0, -1.0, 1.0)) == BodyTwist(0.0, 0.0, 0.0)
+    assert none.wheels((1.0, -2.0, 3.0)) == (0.0, 0.0, 0.0)
+
+
+@given(st.lists(st.floats(-32767, 32767), min_size=3, max_size=3))
+@example([0.5, -0.5, 1.5])
+@example([0.49999999999999994, 2.5, -2.4999])
+def test_words_are_the_nearest_integers(counts: list[float]) -> None:
+    """Never cut off towards zero."""
+    for word, count in zip(words_of(counts), counts, strict=True):
+        assert isinstance(word, int)
+        assert abs(word - count) <= 0.5
+
+
+@given(st.lists(st.floats(-32767, 32767), min_size=3, max_size=3))
+def test_rounding_is_the_same_to_both_sides(counts: list[float]) -> None:
+    """A robot does not drift backwards."""
+    mirrored = words_of([-count for count in counts])
+    assert mirrored == tuple(-word for word in words_of(counts))
+
+
+def test_halves_are_rounded_away_from_zero() -> None:
+    """The even ones, too: 0.15 m/s are 10.5 LSB, and 11 on the wire."""
+    assert words_of([0.5, -0.5, 10.5]) == (1, -1, 11)
+
+
+@given(st.lists(finite, min_size=3, max_size=3))
+@example([1e308, -1e308, 5e307])
+@example([32768.0, 100.0, 0.0])
+def test_words_fit_16_bits_and_keep_the_direction(counts: list[float]) -> None:
+    """What is too large is scaled down as a whole, to half a count."""
+    words = words_of(counts)
+    assert all(-32768 <= word <= 32767 for word in words)
+    largest = max(map(abs, counts))
+    if largest > 32767:
+        for word, count in zip(words, counts, strict=True):
+            assert word == pytest.approx(count / largest * 32767, abs=0.500001)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_what_is_not_finite_is_refused_by_name(bad: float, place: int) -> None:
+    """Wherever it stands; the message says what to mend."""
+    values = [0.0, 1e308, -1.0]
+    values[place] = bad
+    with pytest.raises(CommandRefused, match=r"cmd_vel.*not finite"):
+        require_finite("cmd_vel", values)
+
+
+@given(st.lists(finite, max_size=4))
+def test_what_is_finite_is_not_refused(values: list[float]) -> None:
+    """Size is no reason."""
+    require_finite("wheel_cmd", values)
+
+
+@given(any_twists, any_twists, st.floats(0.01, 10.0), st.floats(0.0, 0.05))
+def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
+    now: BodyTwist, wanted: BodyTwist, acceleration: float, duration_s: float
+) -> None:
+    """The linear one as a vector, on the straight way; what is within reach is reached exactly."""
+    limits = SpeedLimits(linear_mps2=acceleration, angular_radps2=acceleration)
+    now, wanted = limits.twist(now), limits.twist(wanted)
+    after = limits.approach(now, wanted, duration_s)
+    step = (after.vx_mps - now.vx_mps, after.vy_mps - now.vy_mps)
+    way = [wanted.vx_mps - now.vx_mps, wanted.vy_mps - now.vy_mps]
+    assert math.hypot(*step) <= acceleration * duration_s + 1e-12
+    assert math.hypot(*step) < 1e-9 or math.isclose(
+        step[0] * way[0] + step[1] * way[1], math.hypot(*step) * math.hypot(*way), rel_tol=1e-6
+    )
+    if math.hypot(*way) <= acceleration * duration_s:
+        assert (after.vx_mps, after.vy_mps) == (wanted.vx_mps, wanted.vy_mps)
+    turn = wanted.yaw_rate_radps - now.yaw_rate_radps
+    assert abs(after.yaw_rate_radps - now.yaw_rate_radps) == pytest.approx(
+        min(abs(turn), acceleration * duration_s)
+    )
+
+
+def test_an_acceleration_of_zero_is_no_limit() -> None:
+    """0 switches it off."""
+    wanted = BodyTwist(0.5, -0.5, 0.5)
+    assert SpeedLimits().approach(BodyTwist(-0.5, 0.5, -0.5), wanted, 0.0) == wanted
+
+
+@pytest.mark.parametrize("age_s", [0.0, 0.5, -0.5])
+def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
+    """A clock that is ahead by as much is forgiven as well."""
+    require_timely("cmd_vel", age_s, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("age_s", "said"), [(0.51, r"0\.51 s old"), (-3.0, r"is 3\.00 s in the future")]
+)
+def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
+    age_s: float, said: str
+) -> None:
+    """And what to look at."""
+    with pytest.raises(CommandRefused, match=f"cmd_vel refused.*{said}.*clocks agree"):
+        require_timely("cmd_vel", age_s, 0.5)

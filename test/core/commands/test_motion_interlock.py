@@ -1,0 +1,71 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""When a robot that did not move as commanded may move again."""
+
+from omnibot_driver.core.commands.motion_interlock import MotionInterlock, Until
+
+TIMEOUT_S = 0.5
+
+
+def arrives(interlock: MotionInterlock, now: float, *, stands: bool = False) -> bool:
+    """A command; whether it is let through."""
+    return not interlock.arrive(now, TIMEOUT_S, stands=stands)
+
+
+def test_motion_is_allowed_until_something_trips() -> None:
+    """However often it is commanded."""
+    interlock = MotionInterlock()
+    assert all(arrives(interlock, 0.1 * step) for step in range(20))
+    assert interlock.reason(TIMEOUT_S) == ""
+
+
+def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
+    """Each refused command begins the silence anew."""
+    interlock = MotionInterlock()
+    arrives(interlock, 0.0)
+    interlock.trip(0.1)
+    assert not any(arrives(interlock, 0.1 + 0.49 * step) for step in range(1000))
+    assert interlock.until is Until.RELEASE
+
+
+def test_silence_for_the_timeout_ends_the_refusal() -> None:
+    """Counted from the last command, not from the trip."""
+    interlock = MotionInterlock()
+    arrives(interlock, 0.0)
+    interlock.trip(0.1)
+    assert arrives(interlock, 0.5)
+
+
+def test_a_zero_command_ends_the_refusal() -> None:
+    """And is let through itself."""
+    interlock = MotionInterlock()
+    arrives(interlock, 0.0)
+    interlock.trip(0.1)
+    assert arrives(interlock, 0.2, stands=True)
+    assert arrives(interlock, 0.21)
+
+
+def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
+    """Zero commands are still let through."""
+    interlock = MotionInterlock()
+    interlock.trip(0.0)
+    arrives(interlock, 1.0, stands=True)
+    interlock.trip(59.0)
+    assert arrives(interlock, 60.0, stands=True)
+    assert not arrives(interlock, 1000.0)
+    interlock.trip(2000.0)
+    assert interlock.until is Until.START
+    interlock.start()
+    assert arrives(interlock, 2000.1)
+
+
+def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
+    """And after ~/start too."""
+    interlock = MotionInterlock()
+    for now in (0.0, 61.0):
+        interlock.trip(now)
+        assert interlock.until is Until.RELEASE
+    interlock.start()
+    interlock.trip(62.0)
+    assert interlock.until is Until.RELEASE
+    assert interlock.trips == 3

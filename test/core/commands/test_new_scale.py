@@ -1,0 +1,106 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Scales of the board that change while the robot drives: the repeated command is said in them."""
+
+from robots import driving
+from session_bench import STOP, Bench, bare
+
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.simulator import BoardSettings
+
+RAMP = SpeedLimits(linear_mps2=0.5)
+
+
+def last(bench: Bench) -> bytes:
+    """The frame written last."""
+    return bare(bench.written[-1][1])
+
+
+def going_to(x_m: float) -> Bench:
+    """A board whose switch stands on position, on its way to a goal ahead."""
+    bench = Bench(BoardSettings(running=True, control="position"))
+    bench.open()
+    bench.run_until_state("nominal")
+    bench.run(1.5)
+    bench.go_to(x_m, 0.0, 0.0)
+    return bench
+
+
+def test_a_velocity_is_repeated_in_the_new_scale() -> None:
+    """0.4 m/s are 28 LSB at 70, and 40 at 100; nobody commands anew."""
+    bench = driving()
+    bench.drive(0.4)
+    bench.run(0.1)
+    assert last(bench) == bytes.fromhex("FF FE 01 00 1C 00 00 00 00")
+    bench.configure_board(linear_scale=100.0)
+    bench.run(0.1)
+    assert last(bench) == bytes.fromhex("FF FE 01 00 28 00 00 00 00")
+
+
+def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> None:
+    """10 rad/s of a wheel of 0.029 m are 20 LSB at 70 LSB per m/s; twice as large they are 41."""
+    bench = driving()
+    bench.turn_wheels(10.0, 0.0, -10.0)
+    bench.run(0.1)
+    assert last(bench) == bytes.fromhex("FF FE 02 00 14 00 00 FF EC")
+    bench.configure_board(wheel_radius_m=0.058)
+    bench.run(0.1)
+    assert last(bench) == bytes.fromhex("FF FE 02 00 29 00 00 FF D7")
+
+
+def test_a_goal_is_repeated_in_the_new_scale() -> None:
+    """1 m is 1000 LSB, then 500."""
+    bench = going_to(1.0)
+    assert last(bench) == bytes.fromhex("FF FE 01 03 E8 00 00 00 00")
+    bench.configure_board(position_scale=500.0)
+    bench.run(0.1)
+    assert last(bench) == bytes.fromhex("FF FE 01 01 F4 00 00 00 00")
+
+
+def test_a_goal_that_the_new_scale_cannot_say_ends_with_stop_and_a_sentence() -> None:
+    """10 m at 10,000 LSB per m are more than a word holds."""
+    bench = going_to(10.0)
+    bench.configure_board(position_scale=10_000.0)
+    assert last(bench) == bare(STOP)
+    assert "does not fit the new scale" in bench.notices[-1]
+    bench.run(2.0)
+    assert bench.still()
+
+
+def test_a_ramp_goes_on_from_where_it_was() -> None:
+    """In the new scale, without a step back or forwards."""
+    bench = Bench(BoardSettings(running=True), limits=RAMP)
+    bench.open()
+    bench.run_until_state("nominal")
+    bench.run(1.5)
+    for _ in range(10):
+        bench.drive(0.4)
+        bench.run(0.04)
+    before = int.from_bytes(last(bench)[3:5], "big")
+    bench.configure_board(linear_scale=84.0)
+    bench.run(0.02)
+    after = int.from_bytes(last(bench)[3:5], "big")
+    assert 1.2 * (before - 0.5) - 0.5 <= after <= 1.2 * (before + 2.2) + 0.5
+    for _ in range(20):
+        bench.drive(0.4)
+        bench.run(0.04)
+    assert last(bench) == bytes.fromhex("FF FE 01 00 22 00 00 00 00")
+
+
+def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
+    """Base vector control with zeros would be another command."""
+    bench = driving()
+    bench.drive(0.05)
+    bench.configure_board(linear_scale=5.0)
+    bench.run(0.1)
+    assert last(bench) == bare(STOP)
+
+
+def test_a_robot_that_nobody_commands_hears_nothing_of_it() -> None:
+    """The line stays quiet."""
+    bench = driving()
+    bench.run(3.0)
+    start = len(bench.written)
+    bench.configure_board(linear_scale=100.0)
+    bench.run(1.0)
+    assert len(bench.written) == start

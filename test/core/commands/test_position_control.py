@@ -1,0 +1,225 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Goals through a session to a simulated board whose switch stands on position."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+from robots import push, reconnect
+from session_bench import EMERGENCY_STOP, STOP, Bench, bare
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.simulator import BoardPose, BoardSettings
+
+ORIGIN = BoardPose()
+
+
+def at_position_control(
+    initial_pose: BoardPose = ORIGIN, *, imu_only: bool = False, **options: object
+) -> Bench:
+    """A board that runs, with its switch on position and its pose known to the driver."""
+    settings = BoardSettings(
+        running=True, control="position", initial_pose=initial_pose, imu_only=imu_only
+    )
+    bench = Bench(settings, **options)  # type: ignore[arg-type]
+    bench.open()
+    bench.run_until_state("imu_only" if imu_only else "nominal")
+    bench.run(1.5)
+    return bench
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return at_position_control()
+
+
+def where(bench: Bench) -> tuple[float, float, float]:
+    pose = bench.odometry[-1].pose
+    return pose.x_m, pose.y_m, pose.yaw_rad
+
+
+def words(bench: Bench) -> list[int]:
+    """Of the frame written last."""
+    data = bare(bench.written[-1][1])
+    assert data[:3] == b"\xff\xfe\x01"
+    return [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)]
+
+
+def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench: Bench) -> None:
+    """1 m, -0.5 m and a quarter turn; nothing acknowledges it, so it is said again, for ever."""
+    start = len(bench.written)
+    bench.go_to(1.0, -0.5, 1.571)
+    assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 03 E8 FE 0C 06 23")
+    bench.run(10.0)
+    assert len(bench.written) - start == pytest.approx(200, abs=2)
+    assert {data for _, data in bench.written[start:]} == {bench.written[start][1]}
+    assert where(bench) == pytest.approx((1.0, -0.5, 1.571), abs=0.005)
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])
+@pytest.mark.parametrize("heading", [0.0, 1571.0, -4000.0, 16000.0])
+def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
+    heading: float, signs: tuple[int, int, int]
+) -> None:
+    """Attached in the middle of its life, turned, with mirrored axes."""
+    bench = at_position_control(BoardPose(5000.0, -3000.0, heading), axis_signs=signs)
+    bench.go_to(0.8, 0.4, 0.9)
+    bench.run(8.0)
+    assert where(bench) == pytest.approx((0.8, 0.4, 0.9), abs=0.005)
+    bench.go_to(0.0, 0.0, -0.5)
+    bench.run(8.0)
+    assert where(bench) == pytest.approx((0.0, 0.0, -0.5), abs=0.005)
+
+
+@pytest.mark.parametrize("turns", [-2, 0, 3])
+def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
+    """The board's heading is unwrapped; a goal never winds it back."""
+    at = 1000 * math.tau * turns + 3000.0
+    bench = at_position_control(BoardPose(0.0, 0.0, at))
+    bench.go_to(0.0, 0.0, 0.4)
+    assert words(bench)[2] == pytest.approx(at + 400, abs=1)
+    bench.run(0.02)
+    bench.go_to(0.0, 0.0, -3.0)
+    assert words(bench)[2] == pytest.approx(at - 3000, abs=1)
+    bench.run(0.02)
+    bench.go_to(0.0, 0.0, 3.4)
+    assert words(bench)[2] == pytest.approx(at - 1000 * (math.tau - 3.4), abs=1)
+
+
+def test_a_goal_beyond_the_words_is_refused_and_the_old_one_stays(bench: Bench) -> None:
+    """Another place than the one that was meant is no compromise."""
+    bench.go_to(0.2, 0.0, 0.0)
+    for x in (33.0, 1e300, -1.7e308):
+        with pytest.raises(CommandRefused, match="no more than"):
+            bench.go_to(x, 0.0, 0.0)
+    bench.run(0.2)
+    assert words(bench) == [200, 0, 0]
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
+    """In any of its numbers."""
+    for goal in ((bad, 0.0, 0.0), (0.0, bad, 0.0), (0.0, 0.0, bad)):
+        with pytest.raises(CommandRefused, match="not finite"):
+            bench.go_to(*goal)
+
+
+def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench) -> None:
+    """0.3 m/s would be taken for the place 21 mm from the origin."""
+    start = len(bench.written)
+    for command in (lambda: bench.drive(0.3), lambda: bench.turn_wheels(1.0, 1.0, 1.0)):
+        with pytest.raises(CommandRefused, match="`control_method` is 'position'"):
+            command()
+    assert bench.written_since(start) == b""
+
+
+def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
+    """1 m would be taken for 14 m/s."""
+    bench = Bench(BoardSettings(running=True))
+    bench.open()
+    bench.run(1.5)
+    start = len(bench.written)
+    with pytest.raises(CommandRefused, match="`control_method` is 'velocity'"):
+        bench.go_to(1.0, 0.0, 0.0)
+    assert bench.written_since(start) == b""
+
+
+@pytest.mark.parametrize("options", [{"imu_only": True}, {"use_board_pose": False}])
+def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str, bool]) -> None:
+    """Without its poses nobody can say where a place in odom is for the board."""
+    bench = at_position_control(**options)  # type: ignore[arg-type]
+    with pytest.raises(CommandRefused, match="not known"):
+        bench.go_to(1.0, 0.0, 0.0)
+
+
+def test_a_goal_is_right_also_after_a_gap_and_before_the_next_pose(bench: Bench) -> None:
+    """What was lost on the line moves both frames' ideas of the robot alike."""
+    bench.go_to(1.0, 0.0, 0.0)
+    bench.run(0.5)
+    bench.speaks = False
+    bench.run(0.2)
+    bench.speaks = True
+    bench.run(0.06)
+    bench.go_to(0.5, 0.3, 0.2)
+    assert words(bench) == [500, 300, 200]
+
+
+def estop(bench: Bench) -> None:
+    bench.session.estop(True, bench.now)
+    bench.settle()
+    assert bench.written[-1][1] == 2 * (EMERGENCY_STOP + STOP)
+    bench.session.estop(False, bench.now)
+    bench.settle()
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        estop,
+        reconnect,
+        lambda bench: bench.session.reset_odometry(bench.now),
+        lambda bench: bench.board.reboot(),
+        lambda bench: bench.ask(Request.RESET, 10.0),
+        lambda bench: (bench.ask(Request.PAUSE, 5.0), bench.ask(Request.START, 5.0)),
+    ],
+    ids=["estop", "reconnect", "reset_odometry", "restart", "reset", "pause"],
+)
+def test_whatever_discards_a_command_discards_a_goal(
+    bench: Bench, event: Callable[[Bench], object]
+) -> None:
+    """The robot stands until a newer goal, which is in the frame as it lies then."""
+    bench.go_to(3.0, 0.0, 0.5)
+    bench.run(1.0)
+    event(bench)
+    bench.settle()
+    bench.run(3.0)
+    assert bench.session.state == "nominal"
+    assert bench.still()
+    x, y, yaw_rad = where(bench)
+    assert x < 1.0
+    bench.run(2.0)
+    assert where(bench)[0] == pytest.approx(x, abs=1e-3)
+    bench.go_to(x + 0.2, y + 0.1, yaw_rad - 0.3)
+    bench.run(4.0)
+    assert where(bench) == pytest.approx((x + 0.2, y + 0.1, yaw_rad - 0.3), abs=0.01)
+
+
+def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
+    """Never zeros in mode one: they are the way back to the origin."""
+    bench.go_to(3.0, 0.0, 0.0)
+    bench.run(1.0)
+    start = len(bench.written)
+    bench.session.reset_odometry(bench.now)
+    bench.settle()
+    bench.run(0.5)
+    assert {data for _, data in bench.written[start:]} == {STOP}
+    assert [text for text in bench.notices if "goal" in text]
+
+
+@pytest.mark.parametrize("goal", [(1.0, 0.0, 0.0), (0.3, -0.3, 0.0), (0.0, 0.0, 1.0)])
+def test_a_robot_that_drives_away_from_its_goal_is_stopped(
+    goal: tuple[float, float, float],
+) -> None:
+    """The switch stands on velocity, whatever the parameter says."""
+    bench = Bench(BoardSettings(running=True), control="position")
+    bench.open()
+    bench.run(1.5)
+    bench.go_to(*goal)
+    bench.run(4.0)
+    assert bench.still()
+    assert len([text for text in bench.notices if "switch" in text]) == 1
+
+
+def test_a_robot_that_is_pushed_a_little_keeps_its_goal(bench: Bench) -> None:
+    """It is held there, as it was asked to."""
+    bench.go_to(0.3, 0.0, 0.0)
+    bench.run(3.0)
+    pushed = bench.board.odometry
+    for _ in range(20):
+        push(bench, -0.01, 0.0, 0.015)
+        bench.run(0.04)
+    bench.run(3.0)
+    assert bench.board.odometry.x_mm == pytest.approx(pushed.x_mm, abs=2.0)
+    assert bench.notices == []

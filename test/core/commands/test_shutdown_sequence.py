@@ -1,0 +1,103 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The last bytes before the port is closed: the robot is stopped, and left as it was asked for."""
+
+import pytest
+from robots import driving, paused, standing
+from session_bench import EMERGENCY_STOP, PAUSE, RESET, STOP, TICK_S, Bench
+
+from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.simulator import BoardMode
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return standing()
+
+
+@pytest.mark.parametrize(
+    ("on_exit", "expected"), [("stop", b""), ("pause", STOP + PAUSE), ("reset", STOP + RESET)]
+)
+def test_the_farewell_stops_the_robot_whatever_else_it_does(
+    bench: Bench, on_exit: str, expected: bytes
+) -> None:
+    """Stop comes first."""
+    assert bench.session.farewell(on_exit) == 3 * STOP + expected
+
+
+def test_a_farewell_to_a_paused_board_does_not_unpause_it() -> None:
+    """P is a toggle."""
+    bench = paused()
+    assert bench.session.farewell("pause") == 3 * STOP
+
+
+def test_a_farewell_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
+    """P has been said and not yet shown: a second one alone would undo it."""
+    bench.session.request(Request.PAUSE, object(), bench.now)
+    bench.settle()
+    bench.speaks = False
+    while b"P" not in bench.written_since(0):
+        bench.speaks = True
+        bench.run(0.01)
+        bench.speaks = False
+    bench.board.receive(bench.session.farewell("pause"))
+    bench.hears = False
+    bench.run(1.0)
+    assert bench.board.mode is BoardMode.PAUSED
+
+
+def test_a_farewell_while_a_start_is_in_flight_ends_paused() -> None:
+    """The notice is still believed, but S is on its way."""
+    bench = paused()
+    bench.session.request(Request.START, object(), bench.now)
+    bench.settle()
+    bench.board.receive(bench.session.farewell("pause"))
+    bench.hears = False
+    bench.run(1.0)
+    assert bench.board.mode is BoardMode.PAUSED
+
+
+def test_a_farewell_under_estop_repeats_the_estop(bench: Bench) -> None:
+    """The last thing the board hears is that it must not move."""
+    bench.session.estop(True, bench.now)
+    assert bench.session.farewell("stop") == 3 * STOP + EMERGENCY_STOP
+
+
+def left(bench: Bench) -> None:
+    """As the link does it, until the robot is seen to stand."""
+    bench.session.leave(bench.now)
+    bench.settle()
+    while not bench.session.stands:
+        bench.run(TICK_S)
+
+
+def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
+    """Then nothing more is said that the line could damage."""
+    bench = driving()
+    left(bench)
+    assert bench.session.fall_silent(bench.now)
+    start = len(bench.written)
+    assert not bench.session.stands
+    bench.run(0.2)
+    assert bench.session.stands
+    assert bench.written_since(start) == b""
+    assert bench.session.farewell("stop") == b""
+
+
+def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
+    """A byte was added within it."""
+    bench = driving()
+    left(bench)
+    bench.board.receive(bytes(8) + bytes.fromhex("FF FE 02 00 20 00 20 00 20"))
+    assert bench.session.fall_silent(bench.now)
+    bench.run(0.2)
+    assert not bench.session.stands
+    assert bench.session.farewell("stop") == 3 * STOP
+
+
+def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
+    """Its motors are off."""
+    bench = paused()
+    left(bench)
+    assert not bench.session.fall_silent(bench.now)
+    assert bench.session.stands

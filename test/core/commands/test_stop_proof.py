@@ -1,0 +1,160 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""When a robot counts as standing, by its displacements."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from robots import driving
+from session_bench import Bench
+
+from omnibot_driver.core.board import DisplacementReading
+from omnibot_driver.core.commands.stop_proof import STILL_MPS, STILL_RADPS, StopProof
+from omnibot_driver.core.omnibot.frames import DELTA_HEADER
+
+PERIOD_S = 0.04
+
+
+def moved(speed_mps: float = 0.0, rate_radps: float = 0.0, lost: int = 0) -> DisplacementReading:
+    return DisplacementReading(
+        speed_mps * PERIOD_S,
+        0.0,
+        rate_radps * PERIOD_S,
+        frame="body",
+        duration_s=PERIOD_S,
+        lost=lost,
+    )
+
+
+def shown(proof: StopProof, *speeds: float, begin_s: float = 10.0) -> bool:
+    """After displacements, one each 40 ms, the first of them 0.1 s after Stop."""
+    for number, speed in enumerate(speeds):
+        proof.look(moved(speed), begin_s + 0.1 + number * PERIOD_S)
+    return proof.proved
+
+
+@pytest.fixture
+def proof() -> StopProof:
+    stopped = StopProof()
+    stopped.stopped(10.0)
+    return stopped
+
+
+def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof) -> None:
+    """0.12 s; two are not."""
+    assert not shown(proof, 0.0, 0.0)
+    assert shown(proof, 0.0, 0.0, 0.0)
+
+
+def test_one_displacement_alone_is_no_proof_however_long_it_is(proof: StopProof) -> None:
+    """Boards with a `delta_period` of 0.1 s send such."""
+    long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
+    proof.look(long, 10.1)
+    assert not proof.proved
+    proof.look(long, 10.2)
+    assert proof.proved
+
+
+def test_without_stop_standing_still_proves_nothing() -> None:
+    """A command may be on its way to the wheels."""
+    assert not shown(StopProof(), *[0.0] * 50)
+
+
+def test_a_command_to_move_ends_the_proof(proof: StopProof) -> None:
+    """Whatever the displacements go on to show, until Stop."""
+    assert shown(proof, 0.0, 0.0, 0.0)
+    proof.moved()
+    assert not proof.proved
+    assert not shown(proof, *[0.0] * 50)
+
+
+def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopProof) -> None:
+    """A displacement that arrives within 50 ms may have ended before Stop arrived."""
+    for _ in range(10):
+        proof.look(moved(), 10.049)
+    assert not proof.proved
+
+
+def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProof) -> None:
+    """A new line does not settle the debt; neither does Stop alone."""
+    assert not proof.owed
+    proof.moved()
+    proof.stopped(10.0)
+    proof.begin()
+    assert proof.owed
+    proof.stopped(10.0)
+    assert shown(proof, 0.0, 0.0, 0.0)
+    assert not proof.owed
+
+
+@pytest.mark.parametrize("moving", [moved(0.011), moved(0.0, 0.031), moved(-0.3), moved(0.0, -1.0)])
+def test_a_robot_that_moves_is_not_proved_to_stand(
+    proof: StopProof, moving: DisplacementReading
+) -> None:
+    """Also one that was, and is pushed."""
+    assert shown(proof, 0.0, 0.0, 0.0)
+    proof.look(moving, 11.0)
+    assert not proof.proved
+
+
+def test_a_displacement_of_unknown_duration_is_no_evidence(proof: StopProof) -> None:
+    """The first after a pause holds all motion since."""
+    for number in range(50):
+        unknown = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=None, lost=0)
+        proof.look(unknown, 10.1 + number * PERIOD_S)
+    assert not proof.proved
+
+
+def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
+    """It needs no displacement to show it."""
+    proof.paused()
+    assert proof.proved
+
+
+@given(
+    st.lists(st.floats(0.0, 0.5)),
+    st.floats(0.0, STILL_MPS * 0.9),
+    st.floats(0.0, STILL_RADPS * 0.9),
+)
+def test_whatever_came_before_standing_for_long_enough_proves_it(
+    before: list[float], speed_mps: float, rate_radps: float
+) -> None:
+    """An encoder that trembles by a count stands."""
+    proof = StopProof()
+    proof.stopped(10.0)
+    shown(proof, *before)
+    for number in range(4):
+        proof.look(moved(speed_mps, rate_radps), 100.0 + number * PERIOD_S)
+    assert proof.proved
+
+
+def without_deltas(bench: Bench) -> None:
+    """All of them are lost from now on; IMU frames and poses arrive."""
+    step = bench.board.step
+
+    def heard() -> bytes:
+        step()
+        sent = [each.data for each in bench.board.sent if each.tick == bench.board.tick]
+        return b"".join(data for data in sent if not data.startswith(DELTA_HEADER))
+
+    bench.board.step = heard  # type: ignore[method-assign]
+
+
+def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it() -> None:
+    """It stood, and was said to move, as all odometry frames were lost."""
+    bench = driving()
+    without_deltas(bench)
+    bench.run(8.0)
+    assert bench.still()
+    (said,) = (text for text in bench.notices if "unconfirmed" in text)
+    assert "no odometry frames come" in said
+
+
+def test_the_log_says_that_a_robot_moves_where_displacements_show_it() -> None:
+    """It does not hear Stop, and no motion monitor says so."""
+    bench = driving()
+    bench.configure(motion_monitor=False)
+    bench.hears = False
+    bench.run(8.0)
+    (said,) = (text for text in bench.notices if "unconfirmed" in text)
+    assert "still moves" in said

@@ -1,0 +1,89 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Robots that do not do what they are commanded, and how long it takes until they are stopped."""
+
+import math
+from collections.abc import Callable
+
+from session_bench import STOP, TICK_S, Bench
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.simulator import BoardPose, BoardSettings
+
+Triple = tuple[float, float, float]
+PERIOD_S = 0.1
+"""Of the commands."""
+SLOWLY: Triple = (0.05, 0.0, 0.0)
+
+
+def started(board: BoardSettings, **options: object) -> Bench:
+    """A robot that stands, on its side of the line as configured."""
+    bench = Bench(board, **options)  # type: ignore[arg-type]
+    bench.open()
+    bench.run_until_state("nominal")
+    bench.run(2.0)
+    bench.events.clear()
+    return bench
+
+
+def by_velocity(bench: Bench, command: Triple) -> None:
+    bench.drive(*command)
+
+
+def by_wheels(bench: Bench, command: Triple) -> None:
+    """Rates that make this twist."""
+    x, y, yaw = command
+    along_x, along_y, turn = math.cos(math.radians(30)) * x, y / 2, 0.143 * yaw
+    bench.turn_wheels(
+        (-along_x - along_y - turn) / 0.029,
+        (along_x - along_y - turn) / 0.029,
+        (y - turn) / 0.029,
+    )
+
+
+def goes_astray(bench: Bench, command: Triple) -> bool:
+    """Whether it is 0.05 m/s or 0.15 rad/s from everything between rest and the command."""
+    truth, (x, y, yaw) = bench.board.truth, command
+    square = x * x + y * y
+    part = (truth.vx_mps * x + truth.vy_mps * y) / square if square else 0.0
+    part = max(0.0, min(1.0, part))
+    turn = max(min(0.0, yaw), min(max(0.0, yaw), truth.yaw_rate))
+    off_mps = math.hypot(truth.vx_mps - part * x, truth.vy_mps - part * y)
+    return off_mps >= 0.05 or abs(truth.yaw_rate - turn) >= 0.15
+
+
+def stopped_after_s(
+    bench: Bench, command: Triple, by: Callable[[Bench, Triple], None] = by_velocity
+) -> float:
+    """Board time from the first tick in which it goes astray until Stop is on the wire."""
+    begun, astray, mark = bench.now, math.inf, len(bench.written)
+    while bench.now < begun + 3.0:
+        if bench.board.tick % 10 == 0:
+            by(bench, command)
+        bench.run(TICK_S)
+        if goes_astray(bench, command):
+            astray = min(astray, bench.now)
+        if any(data == STOP for _, data in bench.written[mark:]):
+            return max(0.0, bench.now - astray)
+    raise AssertionError("never stopped")
+
+
+def on_the_wrong_switch(frame: str) -> Bench:
+    """It stands on position, and the robot has been driven 3 m from its origin."""
+    board = BoardSettings(
+        running=True, control="position", frame=frame, initial_pose=BoardPose(3000.0, 0.0, 0.0)
+    )
+    return started(board, control="velocity")
+
+
+def try_to_drive(bench: Bench, seconds: float) -> int:
+    """A sender that goes on at 10 Hz; how many of its commands are taken."""
+    taken = 0
+    for _ in range(round(seconds / PERIOD_S)):
+        try:
+            bench.drive(*SLOWLY)
+            taken += 1
+        except CommandRefused:
+            assert bench.session.figures(bench.now).commands.interlock
+        bench.run(PERIOD_S)
+    return taken

@@ -1,0 +1,81 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The wheels' geometry against the manual's equations, typed by hand."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import twists, wheel_rates
+
+from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
+
+R, L = 0.029, 0.143
+MANUAL = OmniKinematics(wheel_radius_m=R, base_radius_m=L)
+SQRT3 = 1.7320508075688772
+
+
+def close(values: tuple[float, ...], rel: float = 1e-12, abs_: float = 1e-9) -> object:
+    return pytest.approx(values, rel=rel, abs=abs_)
+
+
+def as_tuple(twist: BodyTwist) -> tuple[float, float, float]:
+    return twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps
+
+
+@given(twists)
+def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) -> None:
+    """v = ∓cos 30° Vx − sin 30° Vy − L Ω for A and B, Vy − L Ω for C; over r, in rad/s."""
+    vx, vy, omega = as_tuple(twist)
+    rim_a = -0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
+    rim_b = 0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
+    rim_c = vy - 0.143 * omega
+    assert MANUAL.wheel_rates(twist) == close((rim_a / R, rim_b / R, rim_c / R))
+
+
+@given(wheel_rates)
+def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
+    rates: tuple[float, float, float],
+) -> None:
+    """The matrix with 1/(2 cos 30°), not the expansion that is 4/3 off."""
+    a, b, c = (rate * 0.029 for rate in rates)
+    one = 0.5773502691896258
+    expected = (
+        -one * a + one * b + 0.0 * c,
+        -0.3333333333333333 * a - 0.3333333333333333 * b + 0.6666666666666666 * c,
+        -2.331002331002331 * (a + b + c),
+    )
+    assert as_tuple(MANUAL.body_twist(rates)) == close(expected)
+
+
+@given(twists, st.floats(0.001, 1.0), st.floats(0.01, 2.0))
+def test_wheels_and_back_is_the_same_twist(twist: BodyTwist, radius: float, base: float) -> None:
+    """For any size of robot."""
+    kinematics = OmniKinematics(wheel_radius_m=radius, base_radius_m=base)
+    back = kinematics.body_twist(kinematics.wheel_rates(twist))
+    assert as_tuple(back) == close(as_tuple(twist), rel=1e-9)
+
+
+@given(wheel_rates, st.floats(0.001, 1.0), st.floats(0.01, 2.0))
+def test_body_and_back_is_the_same_wheels(
+    rates: tuple[float, float, float], radius: float, base: float
+) -> None:
+    """Three wheels, three degrees of freedom: nothing is lost."""
+    kinematics = OmniKinematics(wheel_radius_m=radius, base_radius_m=base)
+    assert kinematics.wheel_rates(kinematics.body_twist(rates)) == close(rates, rel=1e-9, abs_=1e-7)
+
+
+def test_forward_turns_a_back_and_b_forth_and_leaves_c_alone() -> None:
+    """1 m/s ahead: ∓cos 30° at the rims."""
+    a, b, c = MANUAL.wheel_rates(BodyTwist(1.0, 0.0, 0.0))
+    assert (a, b, c) == close((-SQRT3 / 2 / R, SQRT3 / 2 / R, 0.0))
+
+
+def test_left_turns_c_forth_and_a_and_b_back_at_half_its_rate() -> None:
+    """1 m/s to the left: Vy at C, −sin 30° Vy at A and B."""
+    assert MANUAL.wheel_rates(BodyTwist(0.0, 1.0, 0.0)) == close((-0.5 / R, -0.5 / R, 1.0 / R))
+
+
+def test_a_left_turn_turns_all_wheels_back_alike() -> None:
+    """1 rad/s counter-clockwise: −L at every rim; the appendix's «rotate all» turns right."""
+    assert MANUAL.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == close((-L / R, -L / R, -L / R))
+    assert MANUAL.body_twist((1.0, 1.0, 1.0)).yaw_rate_radps < 0

@@ -1,0 +1,34 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The integral of a constant twist, and its inverse."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import small_moves
+from synthetic_board import arc, close, xyyaw
+
+from omnibot_driver.core.geometry.se2 import Pose, roll, unroll
+
+
+@given(small_moves)
+def test_roll_is_the_integral_of_a_constant_twist(tangent: Pose) -> None:
+    """As in the textbook."""
+    chord = roll(tangent)
+    expected = arc(tangent.x_m, tangent.y_m, tangent.yaw_rad)
+    assert (chord.x_m, chord.y_m) == pytest.approx(expected, abs=1e-9)
+    assert chord.yaw_rad == tangent.yaw_rad
+
+
+@given(st.builds(Pose, st.floats(-10, 10), st.floats(-10, 10), st.floats(-3.2767, 3.2767)))
+def test_unroll_and_roll_are_inverse(displacement: Pose) -> None:
+    """For every turn that a delta frame can hold."""
+    assert xyyaw(roll(unroll(displacement))) == close(xyyaw(displacement))
+    assert xyyaw(unroll(roll(displacement))) == close(xyyaw(displacement))
+
+
+@pytest.mark.parametrize("turn", [0.0, 5e-324, 1e-300, -1e-300, 1e-9, -1e-9])
+def test_a_turn_of_almost_nothing_is_no_trouble(turn: float) -> None:
+    """No division by zero, no loss of digits."""
+    assert xyyaw(roll(Pose(0.1, 0.2, turn))) == close((0.1, 0.2, turn), 1e-9)
+    assert xyyaw(unroll(Pose(0.1, 0.2, turn))) == close((0.1, 0.2, turn), 1e-9)

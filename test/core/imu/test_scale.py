@@ -1,0 +1,80 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From the MPU6050's counts to SI units."""
+
+import math
+
+import pytest
+from hypothesis import given
+from strategies import triples
+
+from omnibot_driver.core.imu.scale import ImuScale, gravity_advice
+
+Triple = tuple[int, int, int]
+
+
+@pytest.mark.parametrize(("range_g", "counts"), [(2, 16384), (4, 8192), (8, 4096), (16, 2048)])
+def test_one_g_is_the_datasheets_counts(range_g: int, counts: int) -> None:
+    """Sensitivity scale factors of section 6.2, at standard gravity."""
+    scale = ImuScale(accel_range_g=range_g)
+    assert scale.specific_force((counts, -counts, 0)) == pytest.approx((9.80665, -9.80665, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("range_dps", "counts_per_10_dps"), [(250, 1310), (500, 655), (1000, 328), (2000, 164)]
+)
+def test_ten_degrees_a_second_are_the_datasheets_counts(
+    range_dps: int, counts_per_10_dps: int
+) -> None:
+    """Sensitivity scale factors of section 6.1."""
+    scale = ImuScale(gyro_range_dps=range_dps)
+    assert scale.angular_velocity((0, counts_per_10_dps, -counts_per_10_dps)) == pytest.approx(
+        (0.0, 0.17453292519943295, -0.17453292519943295)
+    )
+
+
+def test_two_g_and_250_degrees_a_second_are_the_default() -> None:
+    """What the sensor wakes up with."""
+    assert ImuScale().specific_force((0, 0, 16384))[2] == pytest.approx(9.80665)
+    assert ImuScale().angular_velocity((131, 0, 0))[0] == pytest.approx(math.radians(1.0))
+
+
+@given(triples)
+def test_axes_stay_the_sensors_own(counts: Triple) -> None:
+    """No axis is turned, swapped or shifted."""
+    for measured in (ImuScale().specific_force(counts), ImuScale().angular_velocity(counts)):
+        for value, count in zip(measured, counts, strict=True):
+            assert math.copysign(1, value) == math.copysign(1, count)
+            assert (value == 0) == (count == 0)
+
+
+def test_full_scale_is_the_range() -> None:
+    """32768 counts are 2 g in the smallest range and 16 g in the largest."""
+    assert ImuScale(accel_range_g=2).specific_force((-32768, 0, 0))[0] == pytest.approx(-19.6133)
+    assert ImuScale(accel_range_g=16).specific_force((-32768, 0, 0))[0] == pytest.approx(-156.9064)
+
+
+@pytest.mark.parametrize(("accel", "gyro"), [(3, 250), (2, 300)])
+def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int) -> None:
+    """Nothing is guessed."""
+    scale = ImuScale(accel_range_g=accel, gyro_range_dps=gyro)
+    with pytest.raises(KeyError):
+        (scale.specific_force((0, 0, 0)), scale.angular_velocity((0, 0, 0)))
+
+
+@pytest.mark.parametrize("actual_g", [2, 4, 8, 16])
+@pytest.mark.parametrize("believed_g", [2, 4, 8, 16])
+def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_g: int) -> None:
+    """By its length at rest, within a tenth."""
+    for error in (0.92, 1.0, 1.08):
+        text = gravity_advice(error * 9.80665 * believed_g / actual_g, believed_g)
+        assert bool(text) == (actual_g != believed_g)
+        assert not text or text.endswith(f"set `accel_range` to {actual_g}")
+
+
+@pytest.mark.parametrize("gravity", [0.0, 7.0, 12.0, 100.0])
+def test_what_is_gravity_in_no_range_is_a_bias_or_a_broken_sensor(gravity: float) -> None:
+    """Nothing is guessed."""
+    assert gravity_advice(gravity, 2).endswith(
+        "check `accel_range` and `accel_bias`, or the sensor"
+    )

@@ -1,0 +1,150 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Measurements of a whole session: SI units, stamps, and a pose that goes on."""
+
+import itertools
+import math
+
+import pytest
+from robots import standing
+from session_bench import Bench, bare
+
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.simulator import BoardPose, BoardSettings
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return standing()
+
+
+def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
+    """Upside down and at rest: minus one g on z. One may have been in doubt before."""
+    start = bench.now
+    bench.run(1.0)
+    imu = [
+        event for event in bench.events if isinstance(event, ImuEstimate) and event.stamp_s > start
+    ]
+    assert 98 <= len(imu) <= 101
+    mean = sum(estimate.specific_force[2] for estimate in imu) / len(imu)
+    assert mean == pytest.approx(-9.8, abs=0.1)
+
+
+def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
+    """Also the displacements that waited for the first pose."""
+    stamps = {event.stamp_s for event in bench.events if isinstance(event, ImuEstimate)}
+    assert len(bench.odometry) > 30
+    assert {estimate.stamp_s for estimate in bench.odometry} <= stamps
+
+
+def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
+    """And after both, a tick is 10 ms again."""
+    bench.board.reboot()
+    bench.run_until_state("paused")
+    bench.run_until_state("nominal")
+    bench.run(1.0)
+    bench.close()
+    bench.run(0.5)
+    bench.open()
+    bench.run(1.0)
+    stamps = [event.stamp_s for event in bench.events if isinstance(event, ImuEstimate)]
+    assert all(before < after for before, after in itertools.pairwise(stamps))
+    assert stamps[-1] <= bench.now
+    ends = zip(stamps[-50:], stamps[-49:], strict=False)
+    assert all(after - before == pytest.approx(0.01, abs=1e-6) for before, after in ends)
+
+
+def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
+    """Half-way through a straight line."""
+    for _ in range(10):
+        bench.drive(0.5)
+        bench.run(0.1)
+    way_before = bench.board.truth.x_m
+    bench.session.reset_odometry(bench.now)
+    for _ in range(10):
+        bench.drive(0.5)
+        bench.run(0.1)
+    bench.run(1.0)
+    way = bench.board.truth.x_m - way_before
+    unreported = 0.04 * 0.5
+    assert bench.odometry[-1].pose.x_m == pytest.approx(way, abs=unreported)
+
+
+def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench) -> None:
+    """A hundred lost frames are not a hundred lines."""
+    for _ in range(30):
+        bench.speaks = False
+        bench.run(0.08)
+        bench.speaks = True
+        bench.run(0.4)
+    losses = [text for text in bench.notices if "lost" in text]
+    assert 1 <= len(losses) <= 2
+    assert "lost on the line" in losses[0]
+
+
+def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> None:
+    """The kernel counted an overrun."""
+    bench.run(0.4)
+    bench.session.overran(1)
+    bench.speaks = False
+    bench.run(0.08)
+    bench.speaks = True
+    bench.run(0.4)
+    (loss,) = [text for text in bench.notices if "lost" in text]
+    assert "in this computer" in loss
+
+
+def test_motion_during_a_pause_moves_the_pose_and_is_no_speed(bench: Bench) -> None:
+    """The robot rolled to a halt while nobody was told; afterwards it stands."""
+    bench.drive(0.5)
+    bench.run(0.4)
+    bench.ask(Request.PAUSE, 5.0)
+    count = len(bench.odometry)
+    bench.run(1.0)
+    bench.ask(Request.START, 5.0)
+    bench.run(1.0)
+    after = bench.odometry[count:]
+    assert after[0].twist is None
+    assert all(abs(item.twist.vx_mps) < 0.01 for item in after[1:] if item.twist)
+    assert after[-1].pose.x_m == pytest.approx(bench.board.truth.x_m, abs=2e-3)
+
+
+@pytest.mark.parametrize("signs", list(itertools.product([1, -1], repeat=3)))
+@pytest.mark.parametrize("frame", ["earth", "body"])
+def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
+    signs: tuple[int, int, int], frame: str
+) -> None:
+    """A curve to the left, on a board whose own heading is something else."""
+    bench = Bench(
+        BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 2000.0), running=True),
+        axis_signs=signs,
+    )
+    bench.open()
+    bench.run(1.0)
+    for _ in range(20):
+        bench.drive(0.3, 0.1, 0.5)
+        bench.run(0.1)
+    pose, twist = bench.odometry[-1].pose, bench.odometry[-1].twist
+    assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx((0.37, 0.43, 0.95), abs=0.06)
+    assert (twist.vx_mps, twist.vy_mps) == pytest.approx((0.3, 0.1), abs=0.03)
+    assert bare(bench.written[-1][1])[3] == (0 if signs[0] > 0 else 0xFF)
+
+
+def test_a_robot_that_drove_on_unheard_is_where_it_is_once_it_is_heard_again() -> None:
+    """The cable is out for three seconds while the board carries out its last command."""
+    bench = Bench(BoardSettings(initial_pose=BoardPose(4000.0, 0.0, 1571.0), running=True))
+    bench.open()
+    bench.run(1.0)
+    bench.drive(0.3, 0.0, 0.4)
+    bench.run(0.3)
+    bench.speaks = bench.hears = False
+    bench.close()
+    bench.run(3.0)
+    bench.speaks = bench.hears = True
+    bench.open()
+    bench.run(2.0)
+    truth, pose = bench.board.truth, bench.odometry[-1].pose
+    assert math.hypot(truth.x_m, truth.y_m) > 0.7
+    assert math.hypot(pose.x_m - truth.x_m, pose.y_m - truth.y_m) < 0.005
+    assert pose.yaw_rad == pytest.approx(truth.yaw_rad, abs=0.005)

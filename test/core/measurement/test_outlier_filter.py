@@ -1,0 +1,241 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Readings that cannot be true: refused alone, and nothing else is."""
+
+import math
+from dataclasses import replace
+from itertools import chain
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.core.board import (
+    DisplacementReading,
+    ImuReading,
+    PausedReading,
+    PoseReading,
+    Reading,
+)
+from omnibot_driver.core.measurement.outlier_filter import MotionLimits, Plausibility
+
+PERIOD_S, TICK_S, G = 0.04, 0.01, 9.80665
+
+
+def imu(ax: float = 0.0, ay: float = 0.0, az: float = G, *rates: float) -> ImuReading:
+    wx, wy, wz = rates or (0.0, 0.0, 0.0)
+    return ImuReading((ax, ay, az), (wx, wy, wz))
+
+
+def ahead(dx: float = 0.01, turn: float = 0.0, lost: int = 0) -> DisplacementReading:
+    return DisplacementReading(dx, 0.0, turn, "earth", PERIOD_S, lost)
+
+
+def gate() -> Plausibility:
+    return Plausibility(MotionLimits(), TICK_S)
+
+
+def admitted(readings: list[Reading], through: Plausibility) -> list[list[Reading]]:
+    """What each of them brings out."""
+    return [
+        [found for found, _ in through.admit(reading, number * TICK_S)]
+        for number, reading in enumerate(readings)
+    ]
+
+
+def trembling(random: Random) -> list[float]:
+    """What a sensor at rest adds."""
+    return [random.gauss(0.0, 0.03) for _ in range(3)] + [random.gauss(0.0, 9e-4) for _ in range(3)]
+
+
+def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
+    """Noise about 1 g upwards, and at some readings some words off by so much."""
+    random, found = Random(seed), list[Reading]()
+    for number in range(count):
+        words = trembling(random)
+        words[2] += G
+        for word, leap in leaps.get(number, {}).items():
+            words[word] += leap
+        found.append(ImuReading((words[0], words[1], words[2]), (words[3], words[4], words[5])))
+    return found
+
+
+# The IMU
+
+
+@pytest.mark.parametrize(
+    ("word", "leap"), [(0, 4.903), (1, -9.807), (2, -19.613), (3, 0.545), (4, -1.09), (5, 8.7)]
+)
+def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
+    word: int, leap: float
+) -> None:
+    """The topmost bits of a word, at 2 g and 250 degrees per second."""
+    readings, through = row(60, {50: {word: leap}}), gate()
+    came = admitted(readings, through)
+    assert came[50] == []
+    assert came[51] == [readings[51]]
+    assert list(chain(*came)) == readings[:50] + readings[51:]
+    assert through.refused_imu == 1
+
+
+def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
+    """A robot that is set down on a slope."""
+    readings, through = row(60, {number: {0: 4.9} for number in range(50, 60)}), gate()
+    came = admitted(readings, through)
+    assert came[50] == []
+    assert came[51] == readings[50:52]
+    assert list(chain(*came)) == readings
+    assert through.refused_imu == 0
+
+
+def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
+    """Words of another frame in place of the gyro's."""
+    leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
+    readings, through = row(60, {50: leaps}), gate()
+    came = admitted(readings, through)
+    assert came[50:52] == [[], [readings[51]]]
+    assert through.refused_imu == 1
+
+
+@pytest.mark.parametrize("across", [0.0, 0.05, -0.3])
+@pytest.mark.parametrize("knock", [12.0, -7.0, 5.6, -4.2])
+def test_a_knock_of_one_reading_that_is_no_bit_comes_out_at_once(
+    knock: float, across: float
+) -> None:
+    """However short it is, and in one axis alone."""
+    readings, through = row(60, {50: {1: knock, 0: knock * across}}), gate()
+    assert [len(found) for found in admitted(readings, through)] == [1] * 60
+
+
+def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
+    """From 1 g upwards to the end of the scale it is 1 g, but for the noise."""
+    readings, through = row(60, {}), gate()
+    readings[50] = imu(0.0, 0.0, 2 * G)
+    assert [len(found) for found in admitted(readings, through)] == [1] * 60
+
+
+@pytest.mark.parametrize(("scale_g", "leap"), [(4, 19.613), (16, 4.903), (16, 78.45)])
+def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
+    """``full_scale_mps2`` says how much."""
+    through = Plausibility(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
+    came = admitted(row(60, {50: {1: leap}}), through)
+    assert came[50] == []
+    assert through.refused_imu == 1
+
+
+@pytest.mark.parametrize("ring", [[15, -12, 9, -6, 3], [15, 14, -9, 5], [8, 15, 20, 3], [15, 5]])
+def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) -> None:
+    """It is not back at once where it was."""
+    readings = row(60, {40 + number: {1: value} for number, value in enumerate(ring)})
+    through = gate()
+    assert list(chain(*admitted(readings, through))) == readings
+    assert through.refused_imu == 0
+
+
+@pytest.mark.parametrize("g_rms", [0.003, 0.02, 0.1, 0.5])
+def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
+    """Ten minutes of it, without any order from one reading to the next."""
+    random, through = Random(1), gate()
+    for number in range(60_000):
+        force = [random.gauss(0.0, g_rms * G) for _ in range(3)]
+        rate = [random.gauss(0.0, 0.2 * g_rms) for _ in range(3)]
+        through.admit(imu(force[0], force[1], force[2] + G, *rate), number * TICK_S)
+    assert through.refused_imu == 0
+
+
+# Displacements
+
+
+@pytest.mark.parametrize(
+    "fast", [ahead(0.081), ahead(-3.2), ahead(0.0, 0.33), ahead(math.nan), ahead(0.0, -3.2)]
+)
+def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
+    """2 m/s and 8 rad/s are the limits; the next one tells of one more that is missing."""
+    through = gate()
+    came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
+    assert came == [[ahead()], [], [ahead(lost=4)], [ahead()]]
+    assert through.refused_displacements == 1
+
+
+def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
+    """So that it is not bridged twice."""
+    pose = PoseReading(0.0, 0.0, 0.0)
+    came = admitted([ahead(), ahead(1.0), pose, ahead()], gate())
+    assert came == [[ahead()], [], [replace(pose, lost=1)], [ahead()]]
+
+
+def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
+    """From 0.25 to 1.5 m/s and back in 80 ms: poses wait with it."""
+    pose, through = PoseReading(0.0, 0.0, 0.0), gate()
+    came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
+    assert came[3:] == [[], [], [replace(pose, lost=1), ahead(0.011)], [ahead()]]
+    assert through.refused_displacements == 1
+
+
+def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
+    """Whatever threw the robot."""
+    pose, through = PoseReading(0.0, 0.0, 0.0), gate()
+    came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.05), ahead(0.05)], through)
+    assert came[3:] == [[], [], [ahead(0.06), pose, ahead(0.05)], [ahead(0.05)]]
+    assert through.refused_displacements == 0
+
+
+def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
+    """That it has restarted, and that nobody knows how long it stood for."""
+    first = replace(ahead(9.0), duration_s=None, restarted=True)
+    came = admitted([ahead(), first, ahead(), ahead()], gate())
+    assert came[2:] == [[replace(ahead(), duration_s=None, restarted=True)], [ahead()]]
+
+
+def test_all_motion_of_a_pause_may_be_in_one_displacement() -> None:
+    """As far as the robot can have gone meanwhile."""
+    through = gate()
+    through.admit(ahead(), 1.0)
+    rolled_out = replace(ahead(0.5), duration_s=None)
+    assert [found for found, _ in through.admit(rolled_out, 2.0)] == [rolled_out]
+    assert through.admit(rolled_out, 2.1) == []
+
+
+# All of them
+
+values = st.floats(-20.0, 20.0)
+readings = st.one_of(
+    st.builds(imu, values, values, values, values, values, values),
+    st.builds(
+        DisplacementReading,
+        *[st.floats(-0.1, 0.1)] * 3,
+        st.sampled_from(["earth", "body"]),
+        st.sampled_from([None, PERIOD_S]),
+        st.integers(0, 3),
+        st.booleans(),
+    ),
+    st.builds(PoseReading, values, values, values),
+    st.just(PausedReading()),
+)
+
+
+@given(st.lists(readings, max_size=60))
+def test_what_is_not_refused_comes_out_once_in_order_and_unchanged(given: list[Reading]) -> None:
+    """Each kind by itself; losses, restarts and unknown times are handed on, the rest stays."""
+    through = gate()
+    came = list(chain(*admitted(given, through)))
+    came += [reading for reading, _ in through.release()]
+    for kinds, refused in (
+        ((ImuReading, PausedReading), through.refused_imu),
+        ((DisplacementReading, PoseReading, PausedReading), through.refused_displacements),
+    ):
+        sent = [bare(reading) for reading in given if isinstance(reading, kinds)]
+        got = [bare(reading) for reading in came if isinstance(reading, kinds)]
+        assert len(got) == len(sent) - refused
+        rest = iter(sent)
+        assert all(reading in rest for reading in got)
+    lost = sum(r.lost for r in came if isinstance(r, DisplacementReading | PoseReading))
+    known = [r for r in given if isinstance(r, DisplacementReading | PoseReading)]
+    assert lost <= sum(r.lost for r in known) + through.refused_displacements
+
+
+def bare(reading: Reading) -> Reading:
+    if isinstance(reading, DisplacementReading):
+        return replace(reading, lost=0, restarted=False, duration_s=None)
+    return replace(reading, lost=0) if isinstance(reading, PoseReading) else reading

@@ -1,0 +1,349 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A robot that does not do what it is commanded, on a whole session: stopped, and said why."""
+
+import pytest
+from disobedient_robots import (
+    PERIOD_S,
+    SLOWLY,
+    Triple,
+    by_wheels,
+    on_the_wrong_switch,
+    started,
+    stopped_after_s,
+    try_to_drive,
+)
+from robots import drive_on, driving, estop, push, standing
+from session_bench import STOP, TICK_S, Bench
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.simulator import BoardPose, BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.motors import WheelGains
+
+WITHIN_S = 0.3
+
+FORWARD, TURN, TURN_SLOWLY = (0.5, 0.0, 0.0), (0.0, 0.0, 0.5), (0.0, 0.0, 0.15)
+A_AND_B = {"motor_wiring": (2, 1, 3)}
+A_REVERSED = {"motor_wiring": (-1, 2, 3)}
+ALL_REVERSED = {"motor_wiring": (-1, -2, -3)}
+FAST = {"linear_scale": 70 / 2.38}
+FAST_TURNS = {"angular_scale": 500 / 2.38}
+DISOBEYING = {
+    "too fast": (FAST, FORWARD, "moves faster", "`linear_scale`"),
+    "too fast, slowly": (FAST, SLOWLY, "moves faster", "`linear_scale`"),
+    "too fast, sideways": (FAST, (0.0, -0.2, 0.0), "moves faster", "`linear_scale`"),
+    "turns too fast": (FAST_TURNS, TURN, "turns faster", "`angular_scale`"),
+    "turns too fast, slowly": (FAST_TURNS, TURN_SLOWLY, "turns faster", "`angular_scale`"),
+    "motors A and B swapped": (A_AND_B, SLOWLY, "wrong direction", "wiring of the wheels"),
+    "motor A reversed": (A_REVERSED, SLOWLY, "wrong direction", "wiring of the wheels"),
+    "all reversed": (ALL_REVERSED, TURN_SLOWLY, "wrong direction", "wiring of the wheels"),
+}
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return driving()
+
+
+@pytest.mark.parametrize("frame", ["earth", "body", "wheel_counts"])
+@pytest.mark.parametrize(
+    ("board", "command", "what", "advice"), DISOBEYING.values(), ids=DISOBEYING
+)
+def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
+    board: dict[str, object], command: Triple, what: str, advice: str, frame: str
+) -> None:
+    """And the log says what was seen, and what to look at."""
+    bench = started(BoardSettings(running=True, frame=frame, **board))  # type: ignore[arg-type]
+    assert stopped_after_s(bench, command) <= WITHIN_S
+    (notice,) = bench.notices
+    assert what in notice
+    assert advice in notice
+
+
+@pytest.mark.parametrize(
+    ("board", "command"),
+    [(FAST, FORWARD), (FAST, SLOWLY), (A_REVERSED, SLOWLY), (ALL_REVERSED, TURN_SLOWLY)],
+)
+def test_with_a_displacement_every_0_1_s_two_of_them_are_enough(
+    board: dict[str, object], command: Triple
+) -> None:
+    """And the one that began before."""
+    bench = started(BoardSettings(running=True, delta_period_s=0.1, **board))  # type: ignore[arg-type]
+    assert stopped_after_s(bench, command) <= 0.4
+
+
+def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
+    """As a calibration needs it, which measures what is wrong."""
+    bench = started(BoardSettings(running=True, **A_REVERSED))  # type: ignore[arg-type]
+    stopped_after_s(bench, SLOWLY)
+    bench.configure(motion_monitor=False)
+    assert try_to_drive(bench, 2.0) == 20
+    assert not bench.session.figures(bench.now).commands.monitored
+    bench.configure(motion_monitor=True)
+    assert stopped_after_s(bench, SLOWLY) <= 1.0
+    assert bench.session.figures(bench.now).commands.interlock
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
+def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) -> None:
+    """It drives back to its origin, 3 m away; it gets 5 cm far."""
+    bench = on_the_wrong_switch(frame)
+    before = bench.board.truth.x_m
+    assert stopped_after_s(bench, SLOWLY) <= WITHIN_S
+    bench.run(2.0)
+    assert bench.still()
+    assert abs(bench.board.truth.x_m - before) < 0.05
+    assert "wrong direction" in bench.notices[0]
+    assert "`control_method`" in bench.notices[0]
+
+
+@pytest.mark.parametrize("board", [FAST, A_AND_B])
+def test_wheel_commands_are_watched_as_well(board: dict[str, object]) -> None:
+    """By the twist that the wheels make together."""
+    bench = started(BoardSettings(running=True, **board))  # type: ignore[arg-type]
+    assert stopped_after_s(bench, (0.3, 0.0, 0.0), by_wheels) <= WITHIN_S
+
+
+def test_wheel_commands_that_are_obeyed_are_not_noticed() -> None:
+    """Each wheel by itself, and all together."""
+    bench = started(BoardSettings(running=True))
+    for rates in ((10.0, 0.0, 0.0), (0.0, -10.0, 0.0), (0.0, 0.0, 5.0), (17.0, 17.0, -17.0)):
+        for _ in range(10):
+            bench.turn_wheels(*rates)
+            bench.run(0.1)
+    assert bench.notices == []
+
+
+def test_the_log_gives_the_robots_axes_where_the_boards_are_others() -> None:
+    """Forward is forward, whatever goes over the wire."""
+    bench = started(BoardSettings(running=True, **FAST), axis_signs=(-1, 1, -1))  # type: ignore[arg-type]
+    stopped_after_s(bench, FORWARD)
+    assert "commanded 0.50, 0.00 m/s" in bench.notices[0]
+    assert "measured 1." in bench.notices[0]
+
+
+def test_a_wrong_delta_frame_is_among_what_to_check() -> None:
+    """The robot obeys, but its displacements are read in the other frame; it was not named."""
+    bench = Bench(BoardSettings(running=True, initial_pose=BoardPose(0.0, 0.0, 1571.0)))
+    bench.read_deltas_as("body")
+    bench.open()
+    bench.run(2.0)
+    try_to_drive(bench, 2.0)
+    (text,) = (text for text in bench.notices if "wrong direction" in text)
+    assert "`delta_frame`" in text
+
+
+def test_a_setting_that_the_boards_own_frames_contradict_is_what_to_check() -> None:
+    """Every velocity is too large where deltas come more rarely than the settings have it."""
+    bench = Bench(BoardSettings(running=True))
+    bench.board = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
+    bench.open()
+    bench.run(2.0)
+    try_to_drive(bench, 2.0)
+    (text,) = (text for text in bench.notices if "robot stopped" in text)
+    assert "set the parameter `delta_period` to 0.1; otherwise check `control_method`" in text
+
+
+def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
+    """Signs that are wrong for commands and displacements alike show in neither."""
+    bench = started(BoardSettings(running=True, axis_signs=(-1, 1, 1)))
+    for _ in range(10):
+        bench.drive(0.3)
+        bench.run(0.1)
+    assert bench.notices == []
+    assert bench.board.truth.x_m < -0.1
+
+
+def test_a_refused_command_says_why() -> None:
+    """And what to do."""
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    with pytest.raises(CommandRefused, match="the motion monitor has stopped the robot; send a"):
+        bench.drive(*SLOWLY)
+
+
+def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
+    """A zero command does, once; after the second time within a minute only ~/start."""
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    assert try_to_drive(bench, 3.0) == 0
+    where = bench.board.truth.x_m
+    assert try_to_drive(bench, 3.0) == 0
+    assert bench.board.truth.x_m == pytest.approx(where, abs=0.001)
+    bench.drive()
+    assert 0 < try_to_drive(bench, 2.0) < 12
+    assert "until ~/start" in bench.notices[-1]
+    bench.drive()
+    bench.run(1.0)
+    assert try_to_drive(bench, 2.0) == 0
+    assert bench.session.figures(bench.now).commands.trips == 2
+    assert bench.ask(Request.START, 5.0).success
+    assert try_to_drive(bench, 1.0) > 0
+
+
+def test_silence_for_the_timeout_lets_it_move_again() -> None:
+    """The sender has let go."""
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    assert try_to_drive(bench, 2.0) == 0
+    assert bench.session.figures(bench.now).commands.interlock
+    bench.run(0.6)
+    assert try_to_drive(bench, 0.1) == 1
+    assert not bench.session.figures(bench.now).commands.interlock
+
+
+def test_the_e_stop_works_while_motion_is_refused() -> None:
+    """And its release does not end the refusal."""
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    assert estop(bench, True) == "e-stop latched"
+    estop(bench, False)
+    assert try_to_drive(bench, 0.3) == 0
+
+
+def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
+    """A sender of goals must not restart it in jerks."""
+    bench = started(BoardSettings(running=True, control="velocity"), control="position")
+    bench.go_to(-0.5, 0.0, 0.0)
+    bench.board.grip(0.4, 0.0, 0.0)
+    bench.run(2.0)
+    assert "drives away" in bench.notices[0]
+    assert bench.session.figures(bench.now).commands.trips == 1
+
+
+def test_a_robot_that_is_faster_than_it_can_be_is_stopped() -> None:
+    """None of its displacements is believed, and so none is compared."""
+    bench = driving()
+    for _ in range(5):
+        bench.drive(0.4)
+        bench.run(0.1)
+    bench.board.grip(2.5, 0.0, 0.0)
+    mark, begun = len(bench.written), bench.now
+    while bench.now < begun + 1.0 and not bench.written_since(mark).endswith(STOP):
+        bench.drive(0.4)
+        bench.run(TICK_S)
+    assert bench.now - begun <= WITHIN_S
+    assert [text for text in bench.notices if "`fastest_linear_speed`" in text]
+    assert bench.session.figures(bench.now).commands.trips == 1
+
+
+def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
+    """Blocked wheels, no motor power, or a switch that stands on position; it is not stopped."""
+    bench = started(BoardSettings(running=True, control="position"), control="velocity")
+    for _ in range(10):
+        drive_on(bench)
+    assert len(bench.notices) == 1
+    assert "`control_method`" in bench.notices[0]
+    assert bench.session.figures(bench.now).commands.trips == 0
+
+
+@pytest.mark.parametrize("held_s", [0.3, 0.8, 3.0])
+@pytest.mark.parametrize("gains", [WheelGains(), WheelGains(proportional=0.0, integral=0.3)])
+def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
+    held_s: float, gains: WheelGains
+) -> None:
+    """Its wheel controllers have wound up, and Stop would not unwind them."""
+    bench = driving(wheel_gains=gains)
+    bench.board.grip()
+    for _ in range(round(held_s / PERIOD_S)):
+        bench.drive(0.4)
+        bench.run(PERIOD_S)
+    bench.board.let_go()
+    for _ in range(20):
+        bench.drive(0.4)
+        bench.run(PERIOD_S)
+    assert len(bench.notices) == (held_s > 1.0)
+    assert bench.session.figures(bench.now).commands.trips == 0
+
+
+def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
+    """The cable to it was cut twice."""
+    bench = standing()
+    for hears in (False, True, False):
+        bench.hears = hears
+        for _ in range(10):
+            drive_on(bench)
+        bench.drive()
+        bench.run(3.0)
+        bench.hears = True
+        bench.run(3.0)
+    assert len([text for text in bench.notices if "does not move" in text]) == 2
+
+
+def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
+    """Within the noise nobody can tell."""
+    for _ in range(40):
+        bench.drive(0.001, 0.0, 0.01)
+        bench.run(0.1)
+    for _ in range(40):
+        bench.drive()
+        bench.run(0.1)
+    assert bench.notices == []
+
+
+def test_in_imu_only_mode_nothing_is_found() -> None:
+    """No displacement tells anything."""
+    bench = Bench(BoardSettings(running=True, imu_only=True, **FAST))  # type: ignore[arg-type]
+    bench.open()
+    bench.run_until_state("imu_only")
+    for _ in range(10):
+        drive_on(bench)
+    bench.run(5.0)
+    assert not [text for text in bench.notices if text.startswith("robot")]
+    assert bench.session.figures(bench.now).commands.trips == 0
+
+
+def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench: Bench) -> None:
+    """The cut outlasts the first Stops; its deltas show that it drives on."""
+    bench.hears = False
+    bench.run(20.0)
+    assert not bench.still()
+    assert len([text for text in bench.notices if "without a command" in text]) == 1
+    bench.hears = True
+    bench.run(0.5)
+    assert bench.still()
+    bench.run(3.0)
+    start = len(bench.written)
+    bench.run(3.0)
+    assert bench.written_since(start) == b""
+
+
+def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> None:
+    """Standing takes a moment, and whoever bumps into it does not drive it."""
+    bench.run(4.0)
+    for _ in range(5):
+        push(bench, 0.005, 0.0, 0.0)
+        bench.run(0.4)
+    assert bench.notices == []
+
+
+def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
+    """Stop at once, then ever more rarely; nothing is refused afterwards."""
+    bench = standing()
+    bench.board.grip(0.3, 0.0, 0.2)
+    start = len(bench.written)
+    begun = bench.now
+    while bench.written_since(start) == b"":
+        bench.run(TICK_S)
+    assert bench.now - begun <= WITHIN_S
+    bench.run(80.0)
+    times = [at - begun for at, _ in bench.written[start:]]
+    assert sum(40.0 < at < 80.0 for at in times) <= 150
+    assert len([text for text in bench.notices if "without a command" in text]) == 1
+    bench.board.let_go()
+    bench.run(1.0)
+    drive_on(bench)
+    assert not bench.still()
+
+
+def test_the_stops_for_a_robot_that_moves_without_a_command_do_not_hinder_the_next_one(
+    bench: Bench,
+) -> None:
+    """They are harmless, and a command replaces them."""
+    bench.hears = False
+    bench.run(4.0)
+    bench.hears = True
+    drive_on(bench)
+    assert not bench.still()
+    assert bench.written[-1][1] != STOP

@@ -1,0 +1,153 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Which velocities recent set-points explain, and which of them are recent."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from strategies import twists
+
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.motion_monitor.envelope import NOISE_MPS, on_the_way, outside
+from omnibot_driver.core.motion_monitor.set_point_history import (
+    AT_REST,
+    FADED_S,
+    HELD_S,
+    SetpointHistory,
+)
+from omnibot_driver.core.motion_monitor.wind_up import MOST_M, WindUp
+
+FORWARD = BodyTwist(0.4, 0.0, 0.0)
+
+
+def plain(twist: BodyTwist) -> tuple[float, float, float]:
+    return twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps
+
+
+@given(st.lists(st.tuples(twists, st.floats(0.0, 1.0)), min_size=1, max_size=6))
+def test_what_lies_between_rest_and_the_set_points_is_inside(
+    setpoints: list[tuple[BodyTwist, float]],
+) -> None:
+    """Any mean of them, and of standing still."""
+    weight = max(1.0, sum(part for _, part in setpoints))
+    motion = BodyTwist(
+        sum(part * each.vx_mps for each, part in setpoints) / weight,
+        sum(part * each.vy_mps for each, part in setpoints) / weight,
+        sum(part * each.yaw_rate_radps for each, part in setpoints) / weight,
+    )
+    hull = [plain(each) for each, _ in setpoints]
+    for heading_known in (True, False):
+        way_mps, turn_radps = outside(motion, hull, heading_known=heading_known)
+        assert way_mps <= 0.0
+        assert turn_radps <= 0.0
+
+
+near_by = st.tuples(*[st.floats(-0.03, 0.03)] * 3)
+
+
+@given(st.lists(twists, min_size=1, max_size=4), st.floats(0.0, 1.0), near_by)
+def test_what_is_on_the_way_is_inside(
+    setpoints: list[BodyTwist], part: float, off: tuple[float, float, float]
+) -> None:
+    """The short cut tells nothing else than the whole way."""
+    one, other = setpoints[0], setpoints[-1]
+    x, y, yaw = off
+    motion = BodyTwist(
+        part * one.vx_mps + (1 - part) * other.vx_mps + x,
+        part * one.vy_mps + (1 - part) * other.vy_mps + y,
+        part * one.yaw_rate_radps + (1 - part) * other.yaw_rate_radps + yaw,
+    )
+    if on_the_way(motion, setpoints):
+        assert max(outside(motion, [*map(plain, setpoints)], heading_known=True)) <= 0.0
+    if len(setpoints) <= 2 and max(map(abs, off)) < 0.01:
+        assert on_the_way(motion, setpoints)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.1, 1.0, math.pi, -2.0])
+def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> None:
+    """Less the margin; the direction matters little."""
+    away = BodyTwist(-0.3 * math.cos(angle), -0.3 * math.sin(angle), 0.0)
+    way_mps, turn_radps = outside(
+        away, [(0.1 * math.cos(angle), 0.1 * math.sin(angle), 0.0)], heading_known=True
+    )
+    assert way_mps == pytest.approx(0.3 - NOISE_MPS - 0.01, rel=0.03)
+    assert turn_radps < 0.0
+
+
+def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
+    """All of its velocity at first, nothing after a second."""
+    history = SetpointHistory()
+    history.add(AT_REST, 0.0)
+    history.add(FORWARD, 10.0)
+    history.add(AT_REST, 20.0)
+    speeds = [
+        max(math.hypot(x, y) for x, y, _ in history.explained(20.0 + age_s))
+        for age_s in (0.0, HELD_S, HELD_S + 0.2, FADED_S + 0.01)
+    ]
+    assert speeds == pytest.approx([0.4, 0.4, 0.4 / math.e, 0.0])
+    assert history.explained(20.0 + FADED_S + 0.01) == [plain(AT_REST)]
+
+
+def test_a_set_point_that_was_short_counts_as_well() -> None:
+    """One of a single tick, between two displacements."""
+    history = SetpointHistory()
+    history.add(AT_REST, 0.0)
+    history.add(FORWARD, 10.0)
+    history.add(AT_REST, 10.01)
+    assert plain(FORWARD) in history.explained(10.04)
+    assert FORWARD in history.since(10.0)
+    assert history.since(10.02) == [AT_REST]
+
+
+def test_nothing_is_known_before_the_first_set_point() -> None:
+    """Nor for a while after it, nor on the way to a goal."""
+    history = SetpointHistory()
+    assert not history.known(0.0)
+    history.add(AT_REST, 10.0)
+    assert not history.known(10.5)
+    assert history.known(10.7)
+    history.add(None, 20.0)
+    history.add(FORWARD, 30.0)
+    assert not history.known(30.5)
+    assert history.explained(30.7) == [plain(FORWARD)]
+
+
+def test_the_history_does_not_grow_without_end() -> None:
+    """A ramp of an hour, a frame in each tick."""
+    history = SetpointHistory()
+    for tick in range(10_000):
+        history.add(BodyTwist(1e-6 * tick, 0.0, 0.0), 0.01 * tick)
+    assert len(history.since(-math.inf)) < 400
+
+
+def test_a_held_robot_winds_up_by_what_it_loses() -> None:
+    """Up to what an integrator holds; one that moves as commanded unwinds in the end."""
+    wind_up = WindUp()
+    for _ in range(10):
+        wind_up.follow(AT_REST, 0.04, [FORWARD], heading_known=True)
+    assert wind_up.way_m == pytest.approx(0.16)
+    for _ in range(100):
+        wind_up.follow(AT_REST, 0.04, [FORWARD], heading_known=True)
+    assert wind_up.way_m == MOST_M
+    for _ in range(1000):
+        wind_up.follow(FORWARD, 0.04, [FORWARD], heading_known=True)
+    assert wind_up.way_m < 1e-3
+
+
+def test_a_robot_that_speeds_up_is_not_held() -> None:
+    """It has not reached the set-point yet, and it was at rest a moment ago."""
+    wind_up = WindUp()
+    wind_up.follow(AT_REST, 0.04, [FORWARD, AT_REST], heading_known=True)
+    assert wind_up.way_m == 0.0
+
+
+def test_what_is_made_good_is_paid_for() -> None:
+    """And then it is gone."""
+    wind_up = WindUp()
+    wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)
+    assert wind_up.pay(0.5, 0.0, 0.1)
+    assert wind_up.way_m == pytest.approx(0.05)
+    assert not wind_up.pay(0.5, 0.2, 0.1)
+    assert wind_up.way_m == 0.0

@@ -1,0 +1,186 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The covariance of the odometry: its form, its growth, and the truth of it."""
+
+import math
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lossy_drives import attached
+from lossy_odometry import Line
+from strategies import displacements
+from synthetic_board import (
+    PERIOD_S,
+    SETTINGS,
+    Triple,
+    arc,
+    body,
+)
+
+from omnibot_driver.core.board import DisplacementReading, PoseReading
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
+from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.simulator import BoardSettings
+
+
+def minors(c: Covariance) -> Triple:
+    """The leading principal minors: all positive exactly for a positive definite matrix."""
+    first = c.xx
+    second = c.xx * c.yy - c.xy**2
+    third = (
+        c.xx * (c.yy * c.yaw_yaw - c.y_yaw**2)
+        - c.xy * (c.xy * c.yaw_yaw - c.y_yaw * c.x_yaw)
+        + c.x_yaw * (c.xy * c.y_yaw - c.yy * c.x_yaw)
+    )
+    return first, second, third
+
+
+@given(st.lists(displacements("body"), max_size=60))
+def test_the_covariance_is_positive_definite_and_grows(readings: list[DisplacementReading]) -> None:
+    """Its volume and the variance of the yaw never shrink: nothing corrects slip."""
+    odometry = Odometry(OdometrySettings(noise=OdometryNoise(wheel_scale=0.0, wheel_slip=0.0)))
+    before = Covariance()
+    for reading in readings:
+        (estimate,) = odometry.displace(reading, 0.0)
+        now = estimate.covariance
+        assert min(minors(now)) > 0
+        assert now.yaw_yaw >= before.yaw_yaw
+        assert minors(now)[2] >= minors(before)[2] * (1 - 1e-6)
+        before = now
+
+
+def test_a_robot_at_rest_grows_no_less_sure() -> None:
+    """No way, no slip."""
+    odometry = Odometry(SETTINGS)
+    for _ in range(100):
+        (estimate,) = odometry.displace(body(0.0, 0.0), 0.0)
+    assert estimate.covariance == Covariance()
+
+
+def test_the_covariance_is_a_random_walk_over_the_way() -> None:
+    """Straight ahead, A and B roll 0.87 m to a metre, whatever the step; their errors add up."""
+    noise = OdometryNoise(wheel_drift=0.01, wheel_scale=0.0, wheel_slip=0.0)
+    for steps in (10, 100):
+        odometry = Odometry(OdometrySettings(noise=noise))
+        for _ in range(steps):
+            (ahead,) = odometry.displace(body(1.0 / steps, 0.0), 0.0)
+        of_a_metre = 0.01**2 * math.cos(math.pi / 6) * 2
+        assert ahead.covariance.xx == pytest.approx(of_a_metre / 3 + 1e-6, rel=0.01)
+        assert ahead.covariance.yaw_yaw == pytest.approx(of_a_metre / (3 * 0.143) ** 2, rel=0.01)
+
+
+def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
+    """Sampled: 2000 robots whose wheels go wrong at random, through the manual's matrix."""
+    random, deviation, n, steps = Random(1), 0.003, 2000, 25
+    noise = OdometryNoise(wheel_drift=deviation, wheel_scale=0.0, wheel_slip=0.0)
+    odometry = Odometry(OdometrySettings(noise=noise))
+    for _ in range(steps):
+        (estimate,) = odometry.displace(body(0.06, 0.04, 0.05), 0.0)
+    c, radius = math.cos(math.pi / 6), 0.143
+    rims = (-c * 0.06 - 0.02 - radius * 0.05, c * 0.06 - 0.02 - radius * 0.05, 0.04 - radius * 0.05)
+    ends = []
+    for _ in range(n):
+        x, y, yaw = (random.gauss(0.0, 1e-3) for _ in range(3))
+        for _ in range(steps):
+            a, b, d = (rim + random.gauss(0.0, deviation * math.sqrt(abs(rim))) for rim in rims)
+            dx, dy, turn = (b - a) / (2 * c), (2 * d - a - b) / 3, -(a + b + d) / (3 * radius)
+            ahead, left = arc(dx, dy, turn)
+            x, y = (
+                x + math.cos(yaw) * ahead - math.sin(yaw) * left,
+                y + math.sin(yaw) * ahead + math.cos(yaw) * left,
+            )
+            yaw += turn
+        off = estimate.pose
+        ends.append((x - off.x_m, y - off.y_m, yaw - off.yaw_rad))
+    pairs = {"xx": (0, 0), "xy": (0, 1), "x_yaw": (0, 2), "yy": (1, 1), "y_yaw": (1, 2)}
+    for name, (i, j) in {**pairs, "yaw_yaw": (2, 2)}.items():
+        products = [end[i] * end[j] for end in ends]
+        mean = sum(products) / n
+        error = math.sqrt(sum((product - mean) ** 2 for product in products)) / n
+        assert getattr(estimate.covariance, name) == pytest.approx(mean, abs=4 * error), name
+
+
+def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
+    """Ten metres: ten times the deviation of one, and none of it where it began."""
+    noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
+    deviations = []
+    odometry = Odometry(OdometrySettings(noise=noise))
+    for step in [0.02] * 500 + [-0.02] * 500:
+        (estimate,) = odometry.displace(body(step, 0.0), 0.0)
+        deviations.append(math.sqrt(estimate.covariance.yaw_yaw - 1e-6))
+    assert deviations[499] == pytest.approx(10 * deviations[49], rel=1e-6)
+    assert deviations[49] == pytest.approx(0.01 * math.sqrt(2 / 3) / 2 / 0.143, rel=0.01)
+    assert deviations[999] == pytest.approx(0.0, abs=1e-7)
+    assert estimate.covariance.yy < 1e-3
+
+
+def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None:
+    """Wheels of wrong size (1 %) that slip (2 %): 80 drives, squared errors by their covariance.
+
+    Their mean is 3 (x, y, yaw) for a true covariance, and with 80 of them within 2.49 and 3.56
+    nineteen times out of twenty (chi-squared of 240).
+    """
+    total = 0.0
+    for seed in range(80):
+        random = Random(seed)
+        a, b, c = (1 + random.gauss(0.0, 0.01) for _ in range(3))
+        board = BoardSettings(seed=seed, running=True, slip=0.02, wheel_radius_scale=(a, b, c))
+        on = Line(board, seed=seed)
+        estimate = on.run(12.0)[-1]
+        true = on.board.truth
+        off = estimate.pose - Pose(true.x_m, true.y_m, true.yaw_rad)
+        total += squared(off, estimate)
+    assert 2.49 < total / 80 < 3.56
+
+
+def squared(off: Pose, estimate: OdometryEstimate) -> float:
+    """The error squared over its covariance, by elimination."""
+    c = estimate.covariance
+    rows = [
+        [c.xx, c.xy, c.x_yaw, off.x_m],
+        [c.xy, c.yy, c.y_yaw, off.y_m],
+        [c.x_yaw, c.y_yaw, c.yaw_yaw, off.yaw_rad],
+    ]
+    total = 0.0
+    for pivot in range(3):
+        head = rows[pivot]
+        total += head[3] ** 2 / head[pivot]
+        for row in rows[pivot + 1 :]:
+            factor = row[pivot] / head[pivot]
+            row[:] = [value - factor * above for value, above in zip(row, head, strict=True)]
+    return total
+
+
+def test_settling_removes_nothing_but_the_gap() -> None:
+    """Drift is what the wheels do not tell, and the board's pose tells no more than they do."""
+    odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
+    ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)
+    for number in range(50):
+        (before,) = odometry.displace(ahead, 0.0)
+        odometry.settle(PoseReading(0.02 * (number + 1), 0.0, 0.0))
+    still = DisplacementReading(0.0, 0.0, 0.0, "earth", PERIOD_S, 0)
+    (after,) = odometry.displace(still, 0.0)
+    assert after.covariance.xx == pytest.approx(before.covariance.xx)
+    assert after.covariance.yaw_yaw == pytest.approx(before.covariance.yaw_yaw)
+
+
+def test_the_twist_is_as_good_as_its_default_covariance_says() -> None:
+    """Against the true velocity of robots that slip, speed up and brake: 0.02 m/s, 0.025 rad/s."""
+    linear, angular, n = 0.0, 0.0, 0
+    for seed in range(8):
+        random = Random(seed)
+        a, b, c = (1 + random.gauss(0.0, 0.01) for _ in range(3))
+        board = BoardSettings(seed=seed, running=True, slip=0.02, wheel_radius_scale=(a, b, c))
+        on = Line(board, seed=seed)
+        on.run(1.0)
+        for _ in range(100):
+            twist, true = on.run(PERIOD_S)[-1].twist, on.board.truth
+            assert twist is not None
+            linear += ((twist.vx_mps - true.vx_mps) ** 2 + (twist.vy_mps - true.vy_mps) ** 2) / 2
+            angular += (twist.yaw_rate_radps - true.yaw_rate) ** 2
+            n += 1
+    assert 0.2 * 0.02 < math.sqrt(linear / n) < 0.02
+    assert 0.2 * 0.025 < math.sqrt(angular / n) < 0.025

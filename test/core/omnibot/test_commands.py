@@ -1,0 +1,186 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Wishes in SI units as the board's bytes."""
+
+import math
+import re
+import struct
+
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+from session_bench import bare
+from strategies import twists, words
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+
+STOP = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+
+HARMFUL = re.compile(rb"[SPR]|\xff\xfe")
+"""What acts by itself where the header before it is lost."""
+
+
+def bot(**settings: object) -> OmniBot:
+    return OmniBot(OmniBotSettings(**settings))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("twist", "typed"),
+    [
+        ((0.5, 0.0, 0.0), "FF FE 01 00 23 00 00 00 00"),
+        ((0.0, -0.5, 0.0), "FF FE 01 00 00 FF DD 00 00"),
+        ((0.0, 0.0, 0.5), "FF FE 01 00 00 00 00 00 FA"),
+        ((0.1, 0.2, -0.3), "FF FE 01 00 07 00 0E FF 6A"),
+    ],
+)
+def test_a_velocity_is_70_lsb_for_a_metre_and_500_for_a_radian(
+    twist: tuple[float, float, float], typed: str
+) -> None:
+    """The vendor's scales, in mode 1."""
+    assert bare(bot().velocity(BodyTwist(*twist))) == bytes.fromhex(typed)
+
+
+def test_the_scales_are_those_of_the_settings() -> None:
+    """100 LSB per m/s, 200 per rad/s."""
+    board = bot(linear_scale=100.0, angular_scale=200.0)
+    typed = bytes.fromhex("FF FE 01 00 64 FF 38 00 C8")
+    assert bare(board.velocity(BodyTwist(1.0, -2.0, 1.0))) == typed
+
+
+def test_wheel_rates_are_rim_speeds_in_the_linear_unit() -> None:
+    """10 rad/s at 29 mm is 0.29 m/s: 20.3 LSB; mode 2."""
+    assert bare(bot().wheels((10.0, -10.0, 1.0))) == bytes.fromhex("FF FE 02 00 14 FF EC 00 02")
+    wide = bot(wheel_radius_m=0.058)
+    assert bare(wide.wheels((10.0, 0.0, 0.0))) == bytes.fromhex("FF FE 02 00 29 00 00 00 00")
+
+
+def test_commands_are_rounded_to_the_nearest() -> None:
+    """0.0493 m/s is 3.451 LSB, 0.0508 m/s is 3.556."""
+    assert bare(bot().velocity(BodyTwist(0.0493, -0.0508, 0.0)))[3:7] == bytes.fromhex(
+        "00 03 FF FC"
+    )
+
+
+@given(twists)
+def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -> None:
+    """Zeros in mode 1 would mean: drive to the origin, with the switch on position."""
+    command = bare(bot().velocity(twist))
+    assert command != bytes.fromhex("FF FE 01 00 00 00 00 00 00")
+    counts = (70 * twist.vx_mps, 70 * twist.vy_mps, 500 * twist.yaw_rate_radps)
+    if max(map(abs, counts)) < 0.5:
+        assert command == bare(STOP)
+    else:
+        assert command[2] == 1 or max(map(abs, counts)) == 0.5
+
+
+@pytest.mark.parametrize("tiny", [0.0, -0.0, 0.005, -0.007, 5e-324])
+def test_almost_nothing_is_the_stop_frame(tiny: float) -> None:
+    """Body and wheels."""
+    assert bot().velocity(BodyTwist(tiny, -tiny, tiny / 10)) == STOP
+    assert bot().wheels((tiny, -tiny, tiny)) == STOP
+
+
+@given(st.tuples(*[st.floats(-1e308, 1e308)] * 3).filter(lambda v: max(map(abs, v)) < 1e305))
+def test_a_command_too_large_for_the_wire_keeps_its_direction(
+    values: tuple[float, float, float],
+) -> None:
+    """Scaled down as a whole; never an exception, never a word that wraps round."""
+    command = bare(bot().velocity(BodyTwist(*values)))
+    counts = (70 * values[0], 70 * values[1], 500 * values[2])
+    largest = max(1.0, max(map(abs, counts)) / 32767)
+    sent = [int.from_bytes(command[n : n + 2], "big", signed=True) for n in (3, 5, 7)]
+    fitting = [count / largest for count in counts]
+    off = 512.5 if HARMFUL.search(struct.pack(">3h", *map(round, fitting))) else 0.500001
+    for word, count in zip(sent, fitting, strict=True):
+        assert word == pytest.approx(count, abs=off)
+
+
+@given(words, words, words)
+def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int) -> None:
+    """Whole counts survive scaling, rounding and the wire, but for what could act by itself."""
+    x, y, omega = (max(-32767, word) for word in (x, y, omega))
+    assume(not HARMFUL.search(struct.pack(">3h", x, y, omega)))
+    command = bare(bot().velocity(BodyTwist(x / 70, y / 70, omega / 500)))
+    sent = tuple(int.from_bytes(command[n : n + 2], "big", signed=True) for n in (3, 5, 7))
+    assert sent == (x, y, omega)
+
+
+@pytest.mark.parametrize(
+    ("pose", "typed"),
+    [
+        ((1.0, -0.5, 1.571), "FF FE 01 03 E8 FE 0C 06 23"),
+        ((32.767, -32.767, 0.0), "FF FE 01 7F FF 80 01 00 00"),
+        ((0.0, 0.0, 0.0), "FF FE 01 00 00 00 00 00 00"),
+        ((0.0006, -0.0006, 0.0), "FF FE 01 00 01 FF FF 00 00"),
+    ],
+)
+def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
+    pose: tuple[float, float, float], typed: str
+) -> None:
+    """In mode 1; the origin is a place like any other."""
+    assert bare(bot().drive_to(Pose(*pose))) == bytes.fromhex(typed)
+
+
+@pytest.mark.parametrize("far", [33.0, -33.0, 1e300, math.inf, math.nan])
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
+    far: float, place: int
+) -> None:
+    """32.77 m and 32.77 rad are the end of the words."""
+    values = [0.0, 0.0, 0.0]
+    values[place] = far
+    with pytest.raises(CommandRefused, match=r"32\.77 m and 32\.77 rad.*~/reset"):
+        bot().drive_to(Pose(*values))
+
+
+def test_commands_that_do_not_fit_the_wire_are_counted() -> None:
+    """One at the very end of it is not."""
+    board = bot(linear_scale=10_000.0)
+    board.velocity(BodyTwist(3.2767, 0.0, 0.0))
+    assert board.figures.saturated == 0
+    board.velocity(BodyTwist(3.3, 0.0, 0.0))
+    assert board.figures.saturated == 1
+    sent = bare(board.velocity(BodyTwist(6.5534, 2.0, 0.0)))
+    assert sent == bytes.fromhex("FF FE 01 7F FF 27 10 00 00")  # twice too fast: slowed as a whole
+
+
+def test_settings_may_be_replaced_while_it_runs() -> None:
+    """Scales hold from the next command on."""
+    board = bot()
+    board.settings = OmniBotSettings(linear_scale=100.0)
+    assert bare(board.velocity(BodyTwist(1.0, 0.0, 0.0)))[3:5] == b"\x00\x64"
+
+
+@pytest.mark.parametrize(
+    ("typed", "twist"),
+    [
+        ("FF FE 01 00 23 00 00 00 00", (0.5, 0.0, 0.0)),
+        ("FF FE 01 FF F9 00 0E FF 6A", (-0.1, 0.2, -0.3)),
+        ("FF FE 02 00 00 00 00 00 00", (0.0, 0.0, 0.0)),
+        ("FF FE 10 00 00 00 00 00 00", (0.0, 0.0, 0.0)),
+        ("FF FE 02 FF F2 FF F2 FF F2", (0.0, 0.0, 0.2 / 0.143)),
+        ("FF FE 02 00 00 00 00 00 15", (0.0, 0.2, -0.1 / 0.143)),
+        ("53", (0.0, 0.0, 0.0)),
+        ("FF FE 01 00 23 00 00 00 00 FF FE 02 00 00 00 00 00 00", (0.0, 0.0, 0.0)),
+    ],
+)
+def test_a_frame_means_the_velocity_that_it_commands(
+    typed: str, twist: tuple[float, float, float]
+) -> None:
+    """The last one that was written; zeros before it mean nothing."""
+    found = bot().meaning(bytes(8) + bytes.fromhex(typed))
+    assert (found.vx_mps, found.vy_mps, found.yaw_rate_radps) == pytest.approx(twist, abs=1e-9)
+
+
+@settings(suppress_health_check=[HealthCheck.filter_too_much])
+@given(twists)
+def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
+    """Half a unit, or one and a half where a byte would be a letter."""
+    found = bot().meaning(bot().velocity(twist))
+    assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)
+    assert found.vx_mps == pytest.approx(twist.vx_mps, abs=1.51 / 70)
+    assert found.vy_mps == pytest.approx(twist.vy_mps, abs=1.51 / 70)
+    assert found.yaw_rate_radps == pytest.approx(twist.yaw_rate_radps, abs=1.51 / 500)

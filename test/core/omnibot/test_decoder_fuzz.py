@@ -1,0 +1,170 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Whatever comes in, at whatever times, in whatever chunks, the decoder
+
+* never raises;
+* gives out frames that stand in the stream, byte for byte, in that order, none of them overlapping;
+* holds less than ``DOUBT_BYTES`` between calls, and nothing after ``flush``;
+* does work in proportion to the bytes, however they are chosen and cut;
+
+and of a stream in which nothing is lost or added, the same frames in any chunking: all of them.
+
+How rarely a frame is wrong that stands in a damaged stream is measured in ``test/integrity``.
+"""
+
+from typing import Any
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from strategies import any_streams, believable_frames, calm_frames, chunkings, paused_frames
+
+from omnibot_driver.core.omnibot import FrameDecoder, ImuFrame, decoder, encode, trellis
+from omnibot_driver.core.omnibot.decoder import DOUBT_BYTES
+from omnibot_driver.core.omnibot.frames import LENT, Frame, decode_measured, measure
+
+REST = encode(ImuFrame((120, -80, -16384), (1, 2, 3)))
+MOST_WORK = 250
+"""For a byte, when each comes alone and every second begins a header."""
+times_s = st.sampled_from([0.0, 1e-4, 0.005, 0.01, 0.016, 0.099, 0.2, 5.0])
+
+
+def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
+    """Compared as text, for a pose may hold a NaN."""
+    at = 0
+    for frame in found:
+        while at < len(stream):
+            length = measure(stream, at)
+            if length > 0 and repr(decode_measured(stream[at : at + length])) == repr(frame):
+                at += length
+                break
+            at += 1
+        else:
+            pytest.fail(f"{frame} is not in the stream, or not there")
+
+
+@given(any_streams, st.data())
+@settings(max_examples=300)
+def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
+    stream: bytes, data: st.DataObject
+) -> None:
+    """Nothing raises, little is held."""
+    made, now, found = FrameDecoder(), 0.0, []
+    for chunk in data.draw(chunkings(stream)):
+        now += data.draw(times_s)
+        found += made.feed(chunk, now)
+        assert len(made._held) < DOUBT_BYTES
+    found += made.flush(now)
+    assert not made._held
+    assert_stand_in_order(found, stream)
+
+
+@given(st.lists(st.lists(st.one_of(believable_frames, paused_frames), max_size=6)), st.data())
+def test_all_frames_between_silences_come_in_any_chunks(
+    bursts: list[list[Frame]], data: st.DataObject
+) -> None:
+    """A board that is paused and un-paused: texts between frames, cut anywhere."""
+    made, now = FrameDecoder(), 0.0
+    found = made.feed(REST * 2, now)[2:]
+    for burst in bursts:
+        now += 1.0
+        for chunk in data.draw(chunkings(b"".join(map(encode, burst)))):
+            found += made.feed(chunk, now)
+    found += made.flush(now)
+    assert found == [frame for burst in bursts for frame in burst]
+
+
+@given(calm_frames)
+def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
+    """Near the one before, counted on: unless it ends in a byte that the next header may lend."""
+    made, came = FrameDecoder(), 0
+    made.feed(REST * 2, 0.0)
+    for number, frame in enumerate(frames, 1):
+        content = encode(frame)
+        for byte in content[:-1]:
+            came += len(made.feed(bytes([byte]), 0.0))
+        assert came >= number - 1
+        came += len(made.feed(content[-1:], 0.0))
+        assert came == number or (content[-1] in LENT and came == number - 1)
+
+
+@pytest.mark.parametrize("word", [-6, -5, -4])
+def test_in_free_fall_only_a_look_alike_of_a_header_is_lost(word: int) -> None:
+    """Not even a fifth of gravity, and -6 where the accelerometer's words are: a shifted frame."""
+    made, fall = FrameDecoder(), ImuFrame((word, 3, 900), (1, 2, 3))
+    found = made.feed(REST * 2 + encode(fall) + REST * 4, 0.0) + made.flush(1.0)
+    assert found.count(fall) == (word != -6)
+    assert len(found) - found.count(fall) == 6
+
+
+ADVERSARIES = {
+    "FF": b"\xff",
+    "FF FA": b"\xff\xfa",
+    "FF FB": b"\xff\xfb",
+    "FF FC": b"\xff\xfc",
+    "all headers": b"\xff\xfa\xff\xfb\xff\xfc",
+    "P": b"P",
+    "text begun": b"Paused: ",
+    "text begun with a number": b"Paused: 25",
+    "text too large": b"Paused: 256 \n",
+    "zeros": b"\x00",
+    "one frame and a byte": REST + b"\x00",
+    "two frames and a byte": REST * 2 + b"\x00",
+    "two frames and FF": REST * 2 + b"\xff",
+    "headers without gravity": b"\xff\xfa" + bytes(12),
+    "FF FB and a frame": b"\xff\xfb" + REST,
+    "a text within a frame": REST[:7] + b"Paused: 3 \n" + REST[7:],
+}
+
+
+def work(
+    monkeypatch: pytest.MonkeyPatch, stream: bytes, chunk_length: int, pause_s: float = 0.0
+) -> tuple[int, int]:
+    """Looks at a byte, edges and gaps of the lattice; and the most bytes held between calls."""
+    done, measure, forward = 0, decoder.measure, trellis._Search._forward
+
+    def measuring(data: bytes | bytearray, at: int) -> int:
+        nonlocal done
+        done += 1
+        return measure(data, at)
+
+    def searching(search: trellis._Search, *of: Any) -> None:
+        nonlocal done
+        forward(search, *of)
+        done += len(search._data) + len(search._edges) * (1 + len(search._pauses.gaps))
+
+    most = 0
+    with monkeypatch.context() as patch:
+        patch.setattr(decoder, "measure", measuring)
+        patch.setattr(trellis._Search, "_forward", searching)
+        made = FrameDecoder()
+        for number, at in enumerate(range(0, len(stream), chunk_length)):
+            made.feed(stream[at : at + chunk_length], number * pause_s)
+            most = max(most, len(made._held))
+    return done, most
+
+
+@pytest.mark.parametrize("pattern", ADVERSARIES.values(), ids=ADVERSARIES.keys())
+@pytest.mark.parametrize(("chunk_length", "pause_s"), [(1, 0), (1, 0.005), (13, 0), (1_000_000, 0)])
+def test_work_is_linear_and_memory_bounded(
+    monkeypatch: pytest.MonkeyPatch, pattern: bytes, chunk_length: int, pause_s: float
+) -> None:
+    """Twice the bytes are twice the work."""
+    stream = pattern * (2000 // len(pattern))
+    once, most = work(monkeypatch, stream, chunk_length, pause_s)
+    twice, _ = work(monkeypatch, stream * 2, chunk_length, pause_s)
+    assert most < DOUBT_BYTES
+    assert twice <= 2.1 * once + 5000
+
+
+@given(st.binary(min_size=1, max_size=40), st.sampled_from([1, 5, 13, 62, 4096]))
+@settings(max_examples=40)
+@example(b"\xff\xfb\xff\xfa", 1)
+def test_no_repeated_pattern_costs_much_more_than_another(
+    pattern: bytes, chunk_length: int
+) -> None:
+    """A bounded number of edges for each byte."""
+    stream = pattern * (1000 // len(pattern))
+    with pytest.MonkeyPatch.context() as patch:
+        done, _ = work(patch, stream, chunk_length)
+    assert done <= 1000 * len(stream)

@@ -1,0 +1,76 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Bytes that made no frame, and the frames that they were."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.core.omnibot.frame_schedule import Rhythm
+from omnibot_driver.core.omnibot.frames import DeltaFrame, ImuFrame, PoseFrame
+
+kinds = st.sampled_from([ImuFrame, DeltaFrame, PoseFrame])
+
+
+def nominal(imus: int) -> Rhythm:
+    """A second under way; so many IMU frames came after a pose."""
+    rhythm = Rhythm()
+    for _ in range(5):
+        for _ in range(5):
+            for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
+                assert rhythm.hear(kind, 0) == 0
+        assert rhythm.hear(PoseFrame, 0) == 0
+    for _ in range(imus):
+        assert rhythm.hear(ImuFrame, 0) == 0
+    return rhythm
+
+
+@pytest.mark.parametrize(
+    ("imus", "skipped", "lost"),
+    [(1, 13, 1), (1, 12, 1), (1, 27, 2), (4, 8, 0), (4, 9 + 13, 1), (3, 13 + 8, 1), (1, 3, 0)],
+)
+def test_damaged_bytes_tell_how_many_imu_frames_they_were(
+    imus: int, skipped: int, lost: int
+) -> None:
+    """A delta among them is none."""
+    assert nominal(imus).hear(ImuFrame, skipped) == lost
+
+
+def test_a_damaged_pose_is_no_imu_frame() -> None:
+    """Though it is as long as one."""
+    rhythm = nominal(0)
+    for _ in range(5):
+        for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
+            rhythm.hear(kind, 0)
+    assert rhythm.hear(ImuFrame, 14) == 0
+
+
+def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
+    """With the delta in between it is gone, whose SEQ counts what is before it."""
+    rhythm = nominal(0)
+    for _ in range(4):
+        for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
+            rhythm.hear(kind, 0)
+    for _ in range(3):
+        rhythm.hear(ImuFrame, 0)
+    assert rhythm.hear(PoseFrame, 14 + 9) == 0
+    assert rhythm.hear(ImuFrame, 0) == 1
+
+
+def test_imu_frames_alone_are_all_that_was_lost() -> None:
+    """Also where a delta stood before."""
+    rhythm = nominal(0)
+    for _ in range(30):
+        rhythm.hear(ImuFrame, 0)
+    assert [rhythm.hear(ImuFrame, 14 * n - 1) for n in range(1, 9)] == list(range(1, 9))
+
+
+@given(st.lists(st.tuples(kinds, st.integers(0, 500))))
+def test_any_order_of_frames_is_borne(heard: list[tuple[type, int]]) -> None:
+    """And never are there more IMU frames lost than there were bytes for."""
+    rhythm = Rhythm()
+    skipped = lost = 0
+    for kind, count in heard:
+        skipped += count
+        lost += rhythm.hear(kind, count)
+        assert 0 <= lost * 7 <= skipped

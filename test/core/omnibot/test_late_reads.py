@@ -1,0 +1,169 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A read is not an arrival: a reader that is late loses nothing of a good line."""
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from strategies import triples
+from streams import BYTE_S, LEAD_IN, REST, RUNNING_STREAMS, TICK_S, frames_of, ticks_of
+
+from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, PausedFrame, encode
+from omnibot_driver.core.omnibot.frames import Frame
+
+Reads = Iterator[tuple[bytes, float]]
+
+STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 12e-3, 20e-3, 30e-3, 0.1, 0.3)
+"""8.8 ms and whole ticks are how long a line is idle, or seems to be where frames are lost."""
+
+
+def arrivals(ticks: Sequence[bytes]) -> tuple[bytes, list[float]]:
+    """All bytes, and when each has come."""
+    times = [
+        number * TICK_S + (place + 1) * BYTE_S
+        for number, tick in enumerate(ticks)
+        for place in range(len(tick))
+    ]
+    return b"".join(ticks), times
+
+
+def stopped(
+    ticks: Sequence[bytes], place: int, stop_s: float, *, most: int = 4096, piece: int = 1
+) -> Reads:
+    """Read as pieces come; once, after ``place`` bytes, nothing is read for so long. Then all that
+    is there, but no more than ``most`` bytes at once, each read 20 µs after the one before."""
+    data, times = arrivals(ticks)
+    at, now = 0, 0.0
+    while at < len(data):
+        there = bisect_right(times, now)
+        if there <= at:
+            now = times[min(at + piece, len(data)) - 1]
+            there = bisect_right(times, now)
+        if at < place <= there:
+            yield data[at:place], now
+            at, now = place, now + stop_s
+            continue
+        end = min(there, at + most)
+        yield data[at:end], now
+        at, now = end, now + 20e-6
+
+
+def heard(reads: Reads) -> list[Frame]:
+    made, found, last_s = FrameDecoder(), [], 0.0
+    for data, now in reads:
+        assert now >= last_s
+        last_s = now
+        found += made.feed(data, now)
+    return found + made.flush(last_s)
+
+
+@pytest.mark.parametrize("stop_s", STOPS_S)
+@pytest.mark.parametrize("name", RUNNING_STREAMS)
+def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: float) -> None:
+    """Between any two bytes of five frames, after half a second in which it was prompt."""
+    ticks = ticks_of(name)[:100]
+    sent = [frame for _, frame in frames_of(b"".join(ticks))]
+    begin = len(b"".join(ticks[:50]))
+    for place in range(begin, begin + 5 * 14, 1 if stop_s == 5e-3 else 5):
+        assert heard(stopped(ticks, place, stop_s)) == sent, f"stopped after {place} bytes"
+
+
+@pytest.mark.parametrize("most", [1, 8, 32])
+@pytest.mark.parametrize("piece", [1, 4])
+def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: int) -> None:
+    """What it has not read yet is not lost."""
+    ticks = ticks_of("driving")[:100]
+    sent = [frame for _, frame in frames_of(b"".join(ticks))]
+    begin = len(b"".join(ticks[:50]))
+    for stop_s in STOPS_S:
+        for place in range(begin, begin + 4 * 14, 3):
+            found = heard(stopped(ticks, place, stop_s, most=most, piece=piece))
+            assert found == sent, f"stopped after {place} bytes for {stop_s} s"
+
+
+@given(
+    st.lists(st.tuples(triples, triples, st.booleans()), min_size=4, max_size=12),
+    st.lists(st.floats(0.0, 0.03), min_size=1, max_size=12),
+)
+@settings(max_examples=300)
+def test_any_content_comes_through_a_reader_that_is_always_late(
+    content: list[tuple[tuple[int, int, int], tuple[int, int, int], bool]], late_s: list[float]
+) -> None:
+    """A true shock and a late read together are no damage."""
+    sent: list[Frame] = [REST] * 24
+    ticks = [encode(REST)] * 24
+    for seq, (accel, gyro, delta) in enumerate(content):
+        frames: list[Frame] = [ImuFrame((accel[0], accel[1], -16384), gyro)]
+        frames += [DeltaFrame(1, 2, 3, seq)] * delta
+        sent += frames
+        ticks.append(b"".join(map(encode, frames)))
+    sent += [REST] * 4
+    ticks += [encode(REST)] * 4
+    data, times = arrivals(ticks)
+
+    def reads() -> Reads:
+        at, number = 0, 0
+        while at < len(data):
+            late = at >= 24 * 14
+            now = times[at] + (late_s[number % len(late_s)] if late else 0.0)
+            number += late
+            end = bisect_right(times, now)
+            yield data[at:end], now
+            at = end
+
+    assert heard(reads()) == sent
+
+
+@pytest.mark.parametrize("place", range(1, 11))
+def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
+    """And so does the last frame before it: of a board that is paused nothing is due."""
+    ticks = [encode(REST)] * 40
+    text = b"Paused: 0 \n"
+    made = FrameDecoder()
+    found = []
+    for number, tick in enumerate(ticks[:-1]):
+        found += made.feed(tick, number * TICK_S)
+    found += made.feed(ticks[-1][:place], 0.39)
+    found += made.feed(ticks[-1][place:], 0.41)
+    found += made.feed(text[:place], 0.9)
+    found += made.feed(text[place:], 1.2)
+    assert found == [REST] * 40 + [PausedFrame(0)]
+
+
+def test_pieces_that_straddle_a_silence_are_read() -> None:
+    """An adapter that fills its piece keeps the end of one text until the next one begins."""
+    made, found = FrameDecoder(), []
+    texts = b"".join(b"Paused: %d \n" % n for n in range(5))
+    for number in range(0, len(texts), 8):
+        found += made.feed(texts[number : number + 8], number * 0.1)
+    assert found == [PausedFrame(n) for n in range(5)]
+
+
+def test_where_the_line_was_cut_a_pause_still_tells() -> None:
+    """The front of one frame and the back of a later one are no frame: at rest only time says so,
+    and it was read by a prompt reader."""
+    ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
+    for cut in range(3, 12):
+        hurt = [*ticks[:50], ticks[50][:cut], b"", ticks[52][cut:], *ticks[53:]]
+        made, found = FrameDecoder(), []
+        for number, tick in enumerate(hurt):
+            shift = cut if number == 52 else 0
+            for place in range(len(tick)):
+                now = number * TICK_S + (shift + place + 1) * BYTE_S
+                found += made.feed(tick[place : place + 1], now)
+        found += made.flush(1.0)
+        whole = [frame for tick in ticks for _, frame in frames_of(tick)]
+        assert found == whole[:50] + whole[53:], f"cut after {cut} bytes"
+
+
+def test_a_line_that_was_out_for_long_is_read_anew() -> None:
+    """What comes then does not finish what had begun."""
+    made = FrameDecoder()
+    found = made.feed(LEAD_IN + encode(REST)[:5], 0.0)
+    other = ImuFrame((100, -70, -16300), (2, 3, 4))
+    for number in range(3):
+        found += made.feed(encode(other), 0.5 + number * TICK_S)
+    assert found == [REST, REST, other, other, other]

@@ -1,0 +1,288 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Odometry over lost frames and false poses, against the simulated board."""
+
+import math
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lossy_drives import (
+    PERIOD_S,
+    ROUNDING_M,
+    attached,
+    line,
+    lose,
+    settled,
+    steps,
+)
+from lossy_odometry import DELTA, POSE, loses_nothing
+
+from omnibot_driver.core.board import DisplacementReading, PoseReading
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+
+# Gaps
+
+
+@pytest.mark.parametrize("lost", [1, 2, 3, 5, 10, 25, 60, 100, 250, 300, 600])
+@pytest.mark.parametrize("frame", ["earth", "body"])
+def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
+    """Through curves, over the wrap of SEQ too, seen from where the driver attached."""
+    for seed in range(5):
+        on = line(seed, frame=frame)
+        lose(on, lost * PERIOD_S)
+        on.run(1.0)
+        assert settled(on), on.error
+
+
+def test_a_short_gap_is_bridged_at_once() -> None:
+    """By the motion on both sides of it: a tenth of a second lost is right to a millimetre."""
+    for seed in range(5):
+        on = line(seed)
+        lose(on, 0.12)
+        on.run(PERIOD_S)
+        assert on.error.way_m < 0.002
+        assert abs(on.error.yaw_rad) < 0.002
+
+
+def test_lost_poses_alone_cost_nothing_but_rounding() -> None:
+    """Ten seconds without one."""
+    on = line(1)
+    lose(on, 10.0, POSE)
+    assert on.error.way_m < 0.005
+    on.run(0.4)
+    assert settled(on)
+
+
+@pytest.mark.parametrize("rate", [0.01, 0.1, 0.3])
+def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float) -> None:
+    """Half a minute of losses, then a second without."""
+    for seed in range(3):
+        random, on = Random(seed), line(seed)
+        on.loses = lambda _data, _now, random=random: random.random() < rate
+        for _ in range(150):
+            on.run(0.2)
+            assert on.error.way_m < 0.1
+        on.loses = loses_nothing
+        on.run(1.0)
+        assert settled(on)
+
+
+@pytest.mark.parametrize("lost", [1, 5, 10, 20, 25, 26, 40, 100, 250])
+@pytest.mark.parametrize("frame", ["earth", "body"])
+def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
+    """At 2 m/s and 8 rad/s in the time of that step; only the first one has the gap's time."""
+    for seed in range(5):
+        on = line(seed, frame=frame)
+        before = on.estimates[-1]
+        lose(on, lost * PERIOD_S)
+        after = steps([before, *on.run(1.0)])
+        assert after[0][0] > lost * PERIOD_S
+        for seconds, step in after:
+            assert step.way_m <= 2.0 * seconds + 1e-6
+            assert abs(step.yaw_rad) <= 8.0 * seconds + 1e-6
+
+
+def test_a_bridge_that_was_far_wrong_is_put_right_at_the_fastest_speed_and_no_faster() -> None:
+    """The robot turned round unheard, at twice the speed: half a metre at 2 m/s."""
+    odometry, x, stamp_s = attached(), 0.0, 0.0
+    estimates: list[OdometryEstimate] = []
+
+    def drive(step: float, lost: int, told: bool) -> None:
+        nonlocal x, stamp_s
+        x, stamp_s = x + step, stamp_s + (lost + 1) * PERIOD_S
+        reading = DisplacementReading(step, 0.0, 0.0, "earth", PERIOD_S, lost)
+        estimates.extend(odometry.displace(reading, stamp_s))
+        if told:
+            odometry.settle(PoseReading(x, 0.0, 0.0))
+
+    for number in range(10):
+        drive(0.01, 0, number % 5 == 4)
+    x -= 0.5
+    drive(-0.01, 25, True)
+    for number in range(25):
+        drive(-0.01, 0, number % 5 == 4)
+    moves = steps(estimates)
+    assert max(step.way_m / seconds for seconds, step in moves) == pytest.approx(2.0)
+    assert estimates[-1].pose.x_m == pytest.approx(x, abs=1e-9)
+
+
+@pytest.mark.parametrize("lost", [26, 50, 100, 250])
+def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
+    """Displacements wait a fifth of a second at the most for the board's pose; no guess is seen."""
+    for seed in range(5):
+        on = line(seed)
+        lose(on, lost * PERIOD_S)
+        attached, known = on.attached, {}
+        found: list[OdometryEstimate] = []
+        while not found:
+            found = on.run(0.01)
+            known[on.now] = on.told
+        assert on.now - found[0].stamp_s < 0.21
+        for estimate in found:
+            off = attached.way_to(known[min(known, key=lambda at: abs(at - estimate.stamp_s))])
+            assert off.way_to(estimate.pose).way_m < ROUNDING_M
+
+
+def test_after_a_long_gap_nothing_waits_for_a_pose_that_does_not_come() -> None:
+    """It is lost as well: a quarter of a second, then the bridge is all there is."""
+    on = line(1)
+    lose(on, 2.0)
+    on.loses = lambda data, _now: data[:2] == POSE
+    assert on.run(0.2) == []
+    assert len(on.run(0.08)) >= 6
+    on.loses = loses_nothing
+    on.run(1.0)
+    assert settled(on)
+
+
+def test_the_twist_is_that_of_the_last_displacement_whatever_is_put_right() -> None:
+    """A correction is no motion."""
+    on = line(3)
+    lose(on, 1.0)
+    twists = [estimate.twist for estimate in on.run(1.0)]
+    assert all(twist is not None for twist in twists)
+    assert max(math.hypot(twist.vx_mps, twist.vy_mps) for twist in twists if twist) < 0.7
+
+
+@pytest.mark.parametrize("lost", [2, 5, 10])
+def test_the_covariance_jumps_with_a_gap_and_shrinks_when_it_is_settled(lost: int) -> None:
+    """By the gap's term and no more: drift stays."""
+    whole, torn = line(2), line(2)
+    whole.run(lost * PERIOD_S)
+    lose(torn, lost * PERIOD_S)
+    (first,) = torn.run(PERIOD_S)
+    (same,) = whole.run(PERIOD_S)
+    assert first.covariance.xx > same.covariance.xx * 1.001
+    assert first.covariance.yaw_yaw > same.covariance.yaw_yaw * 1.001
+    last_torn, last_whole = torn.run(1.0)[-1].covariance, whole.run(1.0)[-1].covariance
+    assert last_torn.xx == pytest.approx(last_whole.xx, rel=0.05)
+    assert last_torn.yaw_yaw == pytest.approx(last_whole.yaw_yaw, rel=0.05)
+
+
+def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
+    """And a pose moves nothing."""
+    on = line(1, OdometrySettings(use_board_pose=False))
+    lose(on, 0.4)
+    (first,) = on.run(PERIOD_S)
+    off = on.error
+    assert off.way_m < 0.02
+    last = on.run(1.0)[-1]
+    assert on.error.way_m == pytest.approx(off.way_m, abs=0.005)
+    assert last.covariance.xx > first.covariance.xx
+
+
+@pytest.mark.parametrize("use_board_pose", [True, False])
+@pytest.mark.parametrize("phase", range(5))
+def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose: bool) -> None:
+    """The pose tells of it before the next displacement does, and it is not counted twice."""
+    on = line(0, OdometrySettings(use_board_pose=use_board_pose))
+    on.run(phase * PERIOD_S)
+    lose(on, 2 * PERIOD_S, DELTA)
+    for _ in range(10):
+        on.run(PERIOD_S)
+        assert on.error.way_m < 0.005, on.error
+
+
+def test_a_board_that_sends_no_pose_is_bridged() -> None:
+    """At an even pace in an even curve the bridge is the way itself."""
+    odometry = Odometry(OdometrySettings())
+    for number in range(60):
+        if number < 30 or number >= 40:
+            odometry.displace(moved(lost=10 if number == 40 else 0), number * PERIOD_S)
+    (estimate,) = odometry.displace(moved(), 0.0)
+    whole = Odometry(OdometrySettings())
+    for number in range(61):
+        found = whole.displace(moved(), number * PERIOD_S)
+    assert estimate.pose.way_to(found[-1].pose).way_m < 1e-9
+
+
+def moved(lost: int = 0) -> DisplacementReading:
+    return DisplacementReading(0.02, 0.01, 0.03, "body", PERIOD_S, lost)
+
+
+# Poses that are not to be believed
+
+
+@pytest.mark.parametrize(
+    "bad", [(math.nan, 0.0, 0.0), (1e9, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.0, 1.0)]
+)
+def test_one_damaged_pose_moves_nothing(bad: tuple[float, float, float]) -> None:
+    """Not finite, out of reach, or a surprise that the next does not confirm."""
+    odometry = attached()
+    still = DisplacementReading(0.0, 0.0, 0.0, "earth", PERIOD_S, 0)
+    for pose in (bad, (0.0, 0.0, 0.0), bad, (0.0, 0.0, 0.0)):
+        for _ in range(5):
+            (estimate,) = odometry.displace(still, 0.0)
+            assert estimate.pose == Pose()
+        odometry.settle(PoseReading(*pose))
+
+
+def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
+    """A displacement that was damaged on the line, say: spread over five steps."""
+    odometry = attached()
+    still = DisplacementReading(0.0, 0.0, 0.0, "earth", PERIOD_S, 0)
+    odometry.displace(DisplacementReading(0.05, 0.0, 0.0, "earth", PERIOD_S, 0), 0.0)
+    odometry.settle(PoseReading(0.0, 0.0, 0.0))
+    assert odometry.displace(still, 0.0)[-1].pose.x_m == pytest.approx(0.05)
+    odometry.settle(PoseReading(0.0, 0.0, 0.0))
+    ways = [odometry.displace(still, 0.0)[-1].pose.x_m for _ in range(5)]
+    assert ways == pytest.approx([0.04, 0.03, 0.02, 0.01, 0.0], abs=1e-9)
+
+
+# Whatever is lost
+
+
+losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
+"""How many frames come, then how many are lost, deltas and poses alike."""
+
+
+@given(losses, st.integers(0, 3), st.sampled_from(["earth", "body"]))
+@settings(max_examples=40)
+def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
+    pattern: list[tuple[int, int]], seed: int, frame: str
+) -> None:
+    """And no step on the way was larger than the robot could have moved."""
+    on = line(seed, frame=frame)
+    fate = iter([lost for come, gone in pattern for lost in [False] * come + [True] * gone])
+    on.loses = lambda _data, _now: next(fate, False)
+    estimates = on.run(sum(come + gone for come, gone in pattern) / 30 + 1.1)
+    assert settled(on), on.error
+    for seconds, step in steps(estimates):
+        assert step.way_m <= 2.0 * seconds + 1e-6
+
+
+@given(
+    st.lists(
+        st.one_of(
+            st.builds(PoseReading, *[st.floats(allow_nan=True, width=32)] * 3, st.integers(0, 300)),
+            st.builds(
+                DisplacementReading,
+                *[st.floats(-3.3, 3.3)] * 3,
+                st.sampled_from(["earth", "body"]),
+                st.sampled_from([None, PERIOD_S]),
+                st.integers(0, 300),
+                st.booleans(),
+            ),
+        ),
+        max_size=40,
+    ),
+    st.booleans(),
+)
+def test_any_readings_give_finite_estimates_and_never_a_certain_one(
+    readings: list[DisplacementReading | PoseReading], use_board_pose: bool
+) -> None:
+    """Nothing is raised; x, y and yaw keep a variance."""
+    odometry = Odometry(OdometrySettings(use_board_pose=use_board_pose))
+    for number, reading in enumerate(readings):
+        if isinstance(reading, PoseReading):
+            estimates = odometry.settle(reading)
+        else:
+            estimates = odometry.displace(reading, number * PERIOD_S)
+        for estimate in estimates:
+            assert estimate.pose.finite
+            c = estimate.covariance
+            assert min(c.xx, c.yy, c.yaw_yaw) >= 1e-6
+            assert math.isfinite(c.xx + c.yy + c.yaw_yaw)

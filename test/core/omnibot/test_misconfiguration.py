@@ -1,0 +1,140 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Settings that the wire contradicts: told in one sentence, and only when they are wrong."""
+
+import math
+
+import pytest
+from session_bench import Bench
+from synthetic_board import earth
+
+from omnibot_driver.core.board import PoseReading
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings, PoseFrame
+from omnibot_driver.core.omnibot.misconfiguration import MOST_DELTAS, Suspicion
+from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S
+from omnibot_driver.simulator import (
+    BoardPose,
+    BoardSettings,
+    FaultyLine,
+    LineFaults,
+    SimulatedBoard,
+)
+
+DRIVE = bytes.fromhex("FF FE 01 00 15 00 0E 00 C8")
+"""0.3 m/s ahead, 0.2 m/s to the left, 0.4 rad/s."""
+
+
+def advice(board: BoardSettings, settings: OmniBotSettings, seconds: float = 6.0) -> str | None:
+    """After a drive on this board, read with these settings."""
+    sender, driver = SimulatedBoard(board), OmniBot(settings)
+    sender.receive(DRIVE)
+    for tick in range(round(seconds * 100)):
+        driver.receive(sender.step(), tick / 100)
+    return driver.advice
+
+
+@pytest.mark.parametrize(("sent", "read"), [("big", "little"), ("little", "big")])
+def test_a_wrong_byte_order_of_poses_is_noticed(sent: str, read: str) -> None:
+    """After two seconds of poses that make sense only the other way round."""
+    board = BoardSettings(running=True, pose_byte_order=sent)
+    told = advice(board, OmniBotSettings(pose_byte_order=read))
+    assert told is not None
+    assert f"`pose_byte_order` to {sent}" in told
+
+
+@pytest.mark.parametrize(("sent", "read"), [("earth", "body"), ("body", "earth")])
+def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str) -> None:
+    """As soon as the robot has turned and drives."""
+    board = BoardSettings(running=True, frame=sent, initial_pose=BoardPose(0.0, 0.0, 1500.0))
+    told = advice(board, OmniBotSettings(delta_frame=read))
+    assert told is not None
+    assert f"`delta_frame` to {sent}" in told
+
+
+@pytest.mark.parametrize("sent_s", DELTA_PERIODS_S)
+@pytest.mark.parametrize("read_s", DELTA_PERIODS_S)
+def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> None:
+    """Within three seconds, and the right one is named; of the right one nothing is said."""
+    board = BoardSettings(running=True, delta_period_s=sent_s)
+    told = advice(board, OmniBotSettings(delta_period_s=read_s), 3.0)
+    if sent_s == read_s:
+        assert told is None
+    else:
+        assert told is not None
+        assert f"a delta every {sent_s:g} s, not every {read_s:g} s" in told
+        assert told.endswith(f"set the parameter `delta_period` to {sent_s:g}")
+
+
+@pytest.mark.parametrize("period_s", [0.04, 0.1])
+@pytest.mark.parametrize("lose", [0.001, 0.01, 0.05])
+def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float) -> None:
+    """However many IMU frames are missing: the arrival of the deltas says otherwise."""
+    sender = SimulatedBoard(BoardSettings(running=True, delta_period_s=period_s))
+    driver = OmniBot(OmniBotSettings(delta_period_s=period_s))
+    line = FaultyLine(LineFaults(lose=lose), 5)
+    for tick in range(6000):
+        driver.receive(line.carry(sender.step()), tick / 100)
+    assert driver.advice is None
+
+
+@pytest.mark.parametrize("lose", [0.001, 0.005])
+def test_a_wrong_period_is_noticed_on_a_bad_line_too(lose: float) -> None:
+    """A delta is a witness also where an IMU frame before it is missing."""
+    sender = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
+    driver = OmniBot(OmniBotSettings())
+    line = FaultyLine(LineFaults(lose=lose), 5)
+    for tick in range(6000):
+        driver.receive(line.carry(sender.step()), tick / 100)
+    assert driver.advice is not None
+    assert "`delta_period` to 0.1" in driver.advice
+
+
+@pytest.mark.parametrize("reads_s", [0.016, 0.1, 0.5, 1.0])
+def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: float) -> None:
+    """A busy computer, and an adapter that collects."""
+    sender, driver = SimulatedBoard(BoardSettings(running=True)), OmniBot(OmniBotSettings())
+    held, read_at = b"", 0.0
+    for tick in range(3000):
+        held += sender.step()
+        if tick / 100 >= read_at:
+            driver.receive(held, tick / 100)
+            held, read_at = b"", tick / 100 + reads_s
+    assert driver.advice is None
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
+@pytest.mark.parametrize("order", ["big", "little"])
+@pytest.mark.parametrize("start", [BoardPose(), BoardPose(1e5, -3.0, 2e4), BoardPose(1e-12, 500.0)])
+def test_nobody_is_told_anything_of_right_settings(
+    frame: str, order: str, start: BoardPose
+) -> None:
+    """Far away, at zero, and where one coordinate is nothing but the rounding of the board."""
+    board = BoardSettings(running=True, frame=frame, pose_byte_order=order, initial_pose=start)
+    assert advice(board, OmniBotSettings(delta_frame=frame, pose_byte_order=order), 30.0) is None
+
+
+def test_the_user_is_told_once_and_odom_goes_on_by_deltas() -> None:
+    """No absurd pose moves it."""
+    start = BoardPose(3000.0, -2000.0, 0.0)
+    bench = Bench(BoardSettings(running=True, pose_byte_order="little", initial_pose=start))
+    bench.open()
+    bench.run(2.0)
+    for _ in range(20):
+        bench.drive(0.3, 0.0, 0.2)
+        bench.run(0.2)
+    (told,) = [text for text in bench.notices if "pose_byte_order" in text]
+    assert told.endswith("set the parameter `pose_byte_order` to little")
+    pose, true = bench.odometry[-1].pose, bench.board.truth
+    assert math.hypot(pose.x_m - true.x_m, pose.y_m - true.y_m) < 0.03
+
+
+def test_poses_that_never_make_sense_leave_nothing_behind() -> None:
+    """A robot that drove off from zero, read in the wrong byte order: deltas come for days."""
+    suspicion = Suspicion()
+    zero, absurd = PoseFrame(0.0, 0.0, 0.0, 1), PoseFrame(1e-30, 1e-30, 1e-30, 1)
+    suspicion.posed(zero, PoseReading(0.0, 0.0, 0.0), "big")
+    for _ in range(1000):
+        for _ in range(5):
+            suspicion.displaced(earth(0.01, 0.0))
+        suspicion.posed(absurd, PoseReading(0.0, 0.0, 0.0), "big")
+    assert len(suspicion._moved) <= MOST_DELTAS

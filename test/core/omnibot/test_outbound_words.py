@@ -1,0 +1,95 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What stands on the line to the board besides the manual's frames, and the words it avoids."""
+
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from session_bench import bare
+from strategies import words
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.omnibot.outbound import harmless
+
+COUNTS = st.floats(-32767.0, 32767.0)
+LETTERS = b"SPR"
+
+
+def payload(a: int, b: int, c: int) -> bytes:
+    return b"".join((word & 0xFFFF).to_bytes(2, "big") for word in (a, b, c))
+
+
+@given(st.tuples(COUNTS, COUNTS, COUNTS))
+def test_no_payload_holds_a_letter_or_a_header(counts: tuple[float, float, float]) -> None:
+    """A parser that lost the frame's own header finds nothing to act on."""
+    assert not re.search(rb"[SPR]|\xff\xfe", payload(*harmless(counts)))
+
+
+@given(st.tuples(words, words, words).filter(lambda w: min(w) > -32768))
+def test_harmless_words_stay_as_they_are(counts: tuple[int, int, int]) -> None:
+    """Only what could act is moved."""
+    if not re.search(rb"[SPR]|\xff\xfe", payload(*counts)):
+        assert harmless(counts) == counts
+
+
+@given(st.tuples(*[st.floats(-20479.0, 20479.0)] * 3))
+def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
+    counts: tuple[float, float, float],
+) -> None:
+    """Beyond 20,479 a high byte may be a letter; the nearest value without it is further."""
+    for word, count in zip(harmless(counts), counts, strict=True):
+        assert abs(word - count) <= 1.5
+
+
+@pytest.mark.parametrize(
+    ("counts", "typed"),
+    [
+        ((80.0, 0.0, 0.0), "00 4F 00 00 00 00"),  # P
+        ((80.4, 0.0, 0.0), "00 51 00 00 00 00"),
+        ((82.0, 83.0, -176.0), "00 51 00 54 FF 51"),  # R, S, FF 50 -> FF 51
+        ((-2.0, 0.0, 0.0), "FF FF 00 00 00 00"),  # FF FE -> FF FF
+        ((-2.4, 0.0, 0.0), "FF FD 00 00 00 00"),
+        ((255.0, -300.0, 0.0), "00 FE FE D4 00 00"),  # 00 FF | FE D4
+        ((0.0, -1.0, -257.0), "00 00 00 00 FE FF"),  # FF FF | FE FF
+        ((0x5080, 0.0, 0.0), "51 00 00 00 00 00"),  # a high byte
+    ],
+)
+def test_words_that_would_act_take_the_nearest_value_that_does_not(
+    counts: tuple[float, float, float], typed: str
+) -> None:
+    """Typed by hand."""
+    assert payload(*harmless(counts)) == bytes.fromhex(typed)
+
+
+def test_everything_goes_out_behind_zeros() -> None:
+    """They complete whatever was begun, and wake a board that has booted."""
+    board = OmniBot(OmniBotSettings())
+    zeros = "00 00 00 00 00 00 00 00 "
+    stop = zeros + "ff fe 02 00 00 00 00 00 00"
+    assert board.stop().hex(" ") == stop
+    assert board.emergency_stop().hex(" ") == zeros + "ff fe 10 00 00 00 00 00 00"
+    assert board.start().hex(" ") == zeros + "53"
+    assert board.force_pause().hex(" ") == f"{stop} {zeros}53 {zeros}50"
+    assert board.reset().hex(" ") == f"{stop} {zeros}52"
+    command = board.velocity(BodyTwist(0.2, -0.1, 0.5))
+    assert command.hex(" ") == zeros[:12] + "ff fe 01 00 0e ff f9 00 fa"
+
+
+@pytest.mark.parametrize("x_mm", [0x5000, 0x5210, 0x53FF])
+def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
+    """Another place half a metre away is no goal that anybody asked for."""
+    board = OmniBot(OmniBotSettings())
+    with pytest.raises(CommandRefused, match=r"start, pause or reset the board"):
+        board.drive_to(Pose(x_mm / 1000, 0.0, 0.0))
+    assert bare(board.drive_to(Pose(0x4F00 / 1000, 0.0, 0.0)))[3:5] == bytes.fromhex("4F 00")
+
+
+def test_a_goal_whose_low_byte_is_a_letter_is_moved_by_a_millimetre() -> None:
+    """0.083 m is 53 hex."""
+    board = OmniBot(OmniBotSettings())
+    assert bare(board.drive_to(Pose(0.083, 0.0, 0.0)))[3:5] == bytes.fromhex("00 54")

@@ -1,0 +1,192 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The examples in docs/protocol.md against the codec: a document that is wrong must not pass.
+
+An example is a line of a code block: bytes, ``->``, a word and its numbers, perhaps a remark.
+"""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import pytest
+
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.omnibot import (
+    CommandFrame,
+    DeltaFrame,
+    FrameDecoder,
+    ImuFrame,
+    OmniBot,
+    OmniBotSettings,
+    PausedFrame,
+    PoseFrame,
+    decode,
+    encode,
+)
+from omnibot_driver.parameters import BY_NAME
+
+DOCUMENT = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text(encoding="utf-8")
+
+EXAMPLE = re.compile(r"((?:[0-9A-F]{2} )+) *-> (\S+)((?: -?[\d.]+)*)\s*(?:# (.*))?")
+BOARD = OmniBot(OmniBotSettings())
+
+APPENDIX = {
+    "Stop": "FF FE 02 00 00 00 00 00 00",
+    "E-stop": "FF FE 10 00 00 00 00 00 00",
+    "Rotate all": "FF FE 02 00 20 00 20 00 20",
+    "Rotate all reversed": "FF FE 02 FF E0 FF E0 FF E0",
+    "Rotate A": "FF FE 02 00 20 00 00 00 00",
+    "Rotate B": "FF FE 02 00 00 00 20 00 00",
+    "Rotate C": "FF FE 02 00 00 00 00 00 20",
+    "Vx = 32": "FF FE 01 00 20 00 00 00 00",
+    "Vy = 32": "FF FE 01 00 00 00 20 00 00",
+    "Omega = 8": "FF FE 01 00 00 00 00 00 08",
+}
+
+DECISIONS = {
+    "linear_scale",
+    "angular_scale",
+    "position_scale",
+    "heading_scale",
+    "wheel_radius",
+    "base_radius",
+    "counts_per_revolution",
+    "axis_signs",
+    "delta_frame",
+    "delta_period",
+    "pose_byte_order",
+    "accel_range",
+    "gyro_range",
+}
+
+Number = int | float
+AnyFrame = ImuFrame | DeltaFrame | PoseFrame | PausedFrame | CommandFrame
+
+
+def command(mode: int) -> Callable[..., CommandFrame]:
+    """How the three words of a control frame with this mode are read."""
+    return lambda a, b, c: CommandFrame(mode, (a, b, c))
+
+
+FRAMES: dict[str, Callable[..., AnyFrame]] = {
+    "imu": lambda *words: ImuFrame(words[:3], words[3:]),
+    "delta": DeltaFrame,
+    "pose": PoseFrame,
+    "pose-little": PoseFrame,
+    "paused": PausedFrame,
+    "velocity": command(0x01),
+    "wheels": command(0x02),
+    "estop": command(0x10),
+}
+SENT_AS_IT_IS = {
+    "S": b"\x53",
+    "P": b"\x50",
+    "R": b"\x52",
+    "opening": BOARD.wake() + BOARD.start(),
+}
+
+
+class Example(NamedTuple):
+    """One line of the document."""
+
+    data: bytes
+    word: str
+    numbers: tuple[Number, ...]
+    remark: str
+
+
+def code_lines(text: str) -> list[str]:
+    """The lines inside fenced code blocks."""
+    return [line for block in text.split("```")[1::2] for line in block.splitlines()[1:]]
+
+
+def examples(text: str) -> list[Example]:
+    """Every example in a text, in its order."""
+    found = filter(None, map(EXAMPLE.fullmatch, code_lines(text)))
+    return [
+        Example(
+            bytes.fromhex(data),
+            word,
+            tuple(map(json.loads, numbers.split())),
+            remark or "",
+        )
+        for data, word, numbers, remark in (match.groups() for match in found)
+    ]
+
+
+def section(title: str) -> str:
+    """The document's text under one heading of the second level."""
+    return next(part for part in DOCUMENT.split("\n## ") if title in part.partition("\n")[0])
+
+
+EXAMPLES = examples(DOCUMENT)
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda e: f"{e.word} {e.data.hex()}")
+def test_each_example_means_what_the_document_says(example: Example) -> None:
+    """Bytes decode to the stated numbers, and the stated numbers encode to the bytes."""
+    if example.word in SENT_AS_IT_IS:
+        assert example.data == SENT_AS_IT_IS[example.word]
+    else:
+        frame = FRAMES[example.word](*example.numbers)
+        order: Literal["big", "little"] = "little" if example.word == "pose-little" else "big"
+        assert decode(example.data, order) == frame
+        assert encode(frame, order) == example.data
+
+
+def test_no_line_of_bytes_escapes_the_check() -> None:
+    """Whatever begins like bytes or has an arrow after it in a code block is an example."""
+    suspects = re.compile(r"\s*[0-9A-Fa-f]{2}( [0-9A-Fa-f]{2})*(\s|$)|.*\s->\s")
+    lines = [line for line in code_lines(DOCUMENT) if suspects.match(line)]
+    assert [line for line in lines if not EXAMPLE.fullmatch(line)] == []
+    assert len(lines) == len(EXAMPLES)
+
+
+def test_every_kind_of_frame_and_letter_has_an_example() -> None:
+    """A document that loses its examples fails here."""
+    assert {example.word for example in EXAMPLES} == FRAMES.keys() | SENT_AS_IT_IS.keys()
+
+
+def test_the_ten_commands_of_the_appendix_are_shown_under_their_names() -> None:
+    """Their bytes are those printed in the manual."""
+    shown = {example.remark: example.data.hex(" ").upper() for example in EXAMPLES}
+    assert {name: shown.get(name) for name in APPENDIX} == APPENDIX
+
+
+def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None:
+    """The remark gives the wish, the bytes are the driver's."""
+    wishes = [
+        (example, [float(part.split()[0]) for part in example.remark.split(",")])
+        for example in EXAMPLES
+        if example.remark.endswith("rad/s")
+    ]
+    assert {example.word for example, _ in wishes} == {"velocity", "wheels"}
+    for example, (a, b, c) in wishes:
+        wheels = example.word == "wheels"
+        sent = BOARD.wheels((a, b, c)) if wheels else BOARD.velocity(BodyTwist(a, b, c))
+        assert bytes(4) + example.data == sent
+
+
+def test_the_false_frames_lie_at_their_offsets_and_do_not_deceive_the_decoder() -> None:
+    """The framing example is real: the line of two true frames holds the false ones."""
+    in_section = examples(section("Why framing is hard"))
+    false = [example for example in in_section if example.remark.startswith("false")]
+    true = [example for example in in_section if example not in false]
+    line = b"".join(example.data for example in true)
+    assert {example.word for example in false} == {"imu", "delta"}
+    for example in false:
+        offset = int(example.remark.rsplit(maxsplit=1)[1])
+        assert line[offset : offset + len(example.data)] == example.data
+    assert FrameDecoder().feed(line, 0.0) == [decode(example.data) for example in true]
+
+
+def test_the_parameters_that_carry_a_decision_exist_with_the_stated_defaults() -> None:
+    """The table of decisions that are parameters agrees with the driver's own."""
+    rows = re.findall(r"^\| `([a-z]\w+)` \| ([^|]+?) \|", DOCUMENT, re.MULTILINE)
+    assert {name for name, _ in rows} == DECISIONS
+    for name, value in rows:
+        default = BY_NAME[name].default
+        assert value == default if isinstance(default, str) else json.loads(value) == default

@@ -1,0 +1,157 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A session and a simulated board on one workbench, wired to each other in simulated time."""
+
+from dataclasses import replace
+from typing import Any, Literal
+
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.shaping import ControlMethod
+from omnibot_driver.core.commands.stream import CommandSettings
+from omnibot_driver.core.events import Event, Notice
+from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.mode_manager import Request, RequestDone
+from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.session import Session, SessionSettings
+from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+
+TICK_S = 0.01
+ZEROS = bytes(8)
+STOP = ZEROS + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
+EMERGENCY_STOP = ZEROS + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+START, PAUSE, RESET = ZEROS + b"S", ZEROS + b"P", ZEROS + b"R"
+OPENING = STOP
+
+
+def bare(data: bytes) -> bytes:
+    """A transmission without the zeros before it."""
+    return data.lstrip(b"\0")
+
+
+class Bench:
+    """``hears`` and ``speaks`` cut the line in one direction: to the board, and from it."""
+
+    def __init__(
+        self,
+        board: BoardSettings | None = None,
+        *,
+        run: bool = True,
+        axis_signs: tuple[int, int, int] = (1, 1, 1),
+        limits: SpeedLimits | None = None,
+        use_board_pose: bool = True,
+        control: ControlMethod | None = None,
+    ) -> None:
+        self.board = SimulatedBoard(board or BoardSettings())
+        frame, period_s = self.board.settings.frame, self.board.settings.delta_period_s
+        self._settings = SessionSettings(
+            limits=limits or SpeedLimits(),
+            commands=CommandSettings(),
+            odometry=OdometrySettings(use_board_pose=use_board_pose),
+        )
+        self.session = Session(
+            OmniBot(OmniBotSettings(delta_frame=frame, delta_period_s=period_s)),
+            self._settings,
+            run=run,
+            axis_signs=axis_signs,
+            control=control or self.board.settings.control,
+        )
+        self.now = 1000.0
+        self.hears = self.speaks = True
+        self.events: list[Event] = []
+        self.written: list[tuple[float, bytes]] = []
+
+    def open(self) -> None:
+        self.session.opened(self.now)
+        self.settle()
+
+    def close(self) -> None:
+        self.session.closed(self.now)
+        self.settle()
+
+    def settle(self) -> None:
+        """What the shell does after every input."""
+        data = self.session.take_output(self.now)
+        if data:
+            self.written.append((self.now, data))
+            if self.hears:
+                self.board.receive(data)
+        self.events += self.session.take_events()
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / TICK_S)):
+            self.now += TICK_S
+            data = self.board.step()
+            if data and self.speaks:
+                self.session.receive(data, self.now)
+            if self.now >= self.session.wake_at:
+                self.session.tick(self.now)
+            self.settle()
+
+    def run_until_state(self, state: str, limit_s: float = 12.0) -> None:
+        end = self.now + limit_s
+        while self.session.state != state:
+            assert self.now < end, f"still {self.session.state}, not {state}"
+            self.run(TICK_S)
+
+    def drive(
+        self, vx: float = 0.0, vy: float = 0.0, yaw_rate: float = 0.0, *, age_s: float = 0.0
+    ) -> None:
+        self.session.command_twist(BodyTwist(vx, vy, yaw_rate), self.now, age_s=age_s)
+        self.settle()
+
+    def turn_wheels(self, a: float, b: float, c: float) -> None:
+        self.session.command_wheels((a, b, c), self.now)
+        self.settle()
+
+    def ask(self, request: Request, limit_s: float) -> RequestDone:
+        """Make a request and wait for its answer."""
+        token = object()
+        self.session.request(request, token, self.now)
+        self.settle()
+        end = self.now + limit_s
+        while True:
+            for event in self.events:
+                if isinstance(event, RequestDone) and event.token is token:
+                    return event
+            assert self.now < end, f"no answer to {request.value} within {limit_s} s"
+            self.run(TICK_S)
+
+    def configure(self, **changed: Any) -> None:
+        """Fields of SessionSettings; the others are as at first."""
+        self.session.configure(replace(self._settings, **changed), self.now)
+        self.settle()
+
+    def configure_board(self, **changed: Any) -> None:
+        """Fields of OmniBotSettings; the others are the defaults."""
+        board = self.board.settings
+        settings = OmniBotSettings(
+            delta_frame=board.frame, delta_period_s=board.delta_period_s, **changed
+        )
+        self.session.configure(self._settings, self.now, board=settings)
+        self.settle()
+
+    def read_deltas_as(self, frame: Literal["earth", "body"]) -> None:
+        """Whatever frame the board sends them in."""
+        self.session.configure(self._settings, self.now, board=OmniBotSettings(delta_frame=frame))
+
+    def written_since(self, mark: int) -> bytes:
+        """What was written after the first ``mark`` writes."""
+        return b"".join(data for _, data in self.written[mark:])
+
+    def still(self) -> bool:
+        truth = self.board.truth
+        return max(abs(truth.vx_mps), abs(truth.vy_mps), abs(truth.yaw_rate)) < 0.01
+
+    def go_to(self, x_m: float, y_m: float, yaw_rad: float) -> None:
+        self.session.command_pose(Pose(x_m, y_m, yaw_rad), self.now)
+        self.settle()
+
+    @property
+    def notices(self) -> list[str]:
+        return [event.text for event in self.events if isinstance(event, Notice)]
+
+    @property
+    def odometry(self) -> list[OdometryEstimate]:
+        return [event for event in self.events if isinstance(event, OdometryEstimate)]

@@ -1,0 +1,89 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A board made up for the odometry: it turns body twists into what the manual's firmware sends.
+
+Written with rotation matrices and independent of the code under test.
+"""
+
+import math
+
+import pytest
+
+from omnibot_driver.core.board import DisplacementReading, PoseReading
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+
+PERIOD_S = 0.04
+SETTINGS = OdometrySettings()
+Triple = tuple[float, float, float]
+
+
+def xyyaw(pose: Pose) -> Triple:
+    return pose.x_m, pose.y_m, pose.yaw_rad
+
+
+def close(values: Triple, tolerance: float = 1e-9) -> object:
+    return pytest.approx(values, abs=tolerance, rel=1e-9)
+
+
+def arc(vx: float, vy: float, turn: float) -> tuple[float, float]:
+    """Where a constant twist leads, by the textbook's integral of the rotation matrix."""
+    if abs(turn) < 1e-6:
+        return vx - vy * turn / 2, vy + vx * turn / 2
+    a, b = math.sin(turn) / turn, (1 - math.cos(turn)) / turn
+    return a * vx - b * vy, b * vx + a * vy
+
+
+class Trip:
+    """A board that has the given pose already, sends earth deltas, and whose axes have signs."""
+
+    def __init__(self, heading: float = 0.0, signs: tuple[int, int, int] = (1, 1, 1)) -> None:
+        self.board = (12.0, -34.0, heading)
+        self.truth = (0.0, 0.0, 0.0)
+        self._signs = signs
+
+    def move(self, dx: float, dy: float, turn: float, frame: str = "earth") -> DisplacementReading:
+        """One period of constant twist in the true body's axes; what the board makes of it."""
+        self.truth = self._moved(self.truth, dx, dy, turn)
+        x, y, yaw = self._signs
+        before = self.board
+        self.board = self._moved(before, x * dx, y * dy, yaw * turn)
+        if frame == "body":
+            return DisplacementReading(x * dx, y * dy, yaw * turn, "body", PERIOD_S, 0)
+        return DisplacementReading(
+            self.board[0] - before[0], self.board[1] - before[1], yaw * turn, "earth", PERIOD_S, 0
+        )
+
+    @property
+    def pose(self) -> PoseReading:
+        """The board's own."""
+        return PoseReading(*self.board)
+
+    @staticmethod
+    def _moved(pose: Triple, dx: float, dy: float, turn: float) -> Triple:
+        x, y, yaw = pose
+        ahead, left = arc(dx, dy, turn)
+        c, s = math.cos(yaw), math.sin(yaw)
+        return x + c * ahead - s * left, y + s * ahead + c * left, yaw + turn
+
+
+def earth(dx: float, dy: float, turn: float = 0.0) -> DisplacementReading:
+    return DisplacementReading(dx, dy, turn, "earth", PERIOD_S, 0)
+
+
+def body(dx: float, dy: float, turn: float = 0.0) -> DisplacementReading:
+    return DisplacementReading(dx, dy, turn, "body", PERIOD_S, 0)
+
+
+def heading(yaw: float) -> PoseReading:
+    return PoseReading(1.0, 2.0, yaw)
+
+
+def attach(odometry: Odometry, pose: PoseReading) -> list[OdometryEstimate]:
+    """The board says twice where it is."""
+    assert odometry.settle(pose) == []
+    return odometry.settle(pose)
+
+
+def last(estimates: list[OdometryEstimate]) -> Triple:
+    return xyyaw(estimates[-1].pose)

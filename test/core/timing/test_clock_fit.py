@@ -1,0 +1,75 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The line over the ticks, between made-up bounds in s."""
+
+from collections.abc import Callable
+
+import pytest
+
+from omnibot_driver.core.timing.clock_fit import TickLine
+
+PERIOD_S = 0.01
+NEVER_BELOW = -1.0
+
+
+def followed(
+    skew: float, above: Callable[[int], float], below: Callable[[int], float], *, ticks: int = 2000
+) -> tuple[TickLine, float]:
+    """A line that saw bounds so far above and below the truth; how late it is at the end."""
+    period_s = PERIOD_S * (1.0 + skew)
+    line = TickLine(PERIOD_S, (0, 1.0))
+    for tick in range(ticks):
+        true_s = tick * period_s
+        line.see((tick, true_s + above(tick)), cut=False)
+        line.not_before((tick, true_s + below(tick)))
+    return line, line.at(ticks) - ticks * period_s
+
+
+@pytest.mark.parametrize("skew", [1e-4, 0.0, -1e-4])
+def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> None:
+    """And the slope found."""
+    line, late_s = followed(skew, lambda tick: tick % 7 * 1e-3, lambda _: NEVER_BELOW)
+    assert late_s == pytest.approx(0.0, abs=1e-6)
+    assert line.slope_s == pytest.approx(PERIOD_S * (1.0 + skew), rel=1e-6)
+
+
+def test_between_near_bounds_the_middle_is_taken() -> None:
+    """0.8 ms above and 0.1 ms below, where 0.1 ms is granted to late reads."""
+    _, late_s = followed(0.0, lambda _: 0.8e-3, lambda _: -0.1e-3)
+    assert late_s == pytest.approx(0.3e-3, abs=0.05e-3)
+
+
+def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() -> None:
+    """A timer's: for eight seconds they move past the truth by 0.1 ms a second."""
+    for skew in (1e-4, -1e-4):
+        drift = [-skew * PERIOD_S * tick for tick in range(800)]
+        start = 0.0 if drift[-1] > 0.0 else 0.87e-3
+        _, late_s = followed(
+            skew,
+            lambda tick, drift=drift, start=start: start + drift[tick],  # type: ignore[misc]
+            lambda tick, drift=drift, start=start: start + drift[tick] - 0.87e-3,  # type: ignore[misc]
+            ticks=800,
+        )
+        assert abs(late_s) < 0.5e-3
+
+
+def test_reads_that_were_late_do_not_lift_the_line() -> None:
+    """One in twenty, by little or by much: what they did not bring may have come long before."""
+    for read_late_s in (0.9e-3, 5e-3):
+        _, late_s = followed(
+            0.0,
+            lambda _: 1e-3,
+            lambda tick, late_s=read_late_s: late_s if tick % 20 == 0 else -0.1e-3,  # type: ignore[misc]
+        )
+        assert late_s == pytest.approx(0.4e-3, abs=0.05e-3)
+
+
+@pytest.mark.parametrize("late", [range(401), range(500, 901)])
+def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
+    """Reads that were all late for some seconds, by less than can be told at once."""
+    _, late_s = followed(
+        0.0,
+        lambda tick: 0.9e-3 if tick in late else 0.0,
+        lambda tick: 0.8e-3 if tick in late else -0.1e-3,
+    )
+    assert abs(late_s) < 0.2e-3

@@ -1,0 +1,33 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How late measurements come is told of measurements alone."""
+
+import pytest
+from session_bench import TICK_S, Bench
+
+from omnibot_driver.core.mode_manager import Request
+
+
+def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
+    """A notice has no sampling time; before the first measurement there is none at all."""
+    bench = Bench()
+    bench.open()
+    bench.run_until_state("paused")
+    bench.run_until_state("nominal")
+    bench.run(5.0)
+    tally = bench.session.figures(bench.now).tally
+    assert 0.0 <= tally.delay_s < tally.reads * TICK_S
+    assert 0.0 <= tally.squared_delay_s2 < tally.reads * TICK_S**2
+
+
+def test_a_pause_is_no_delay() -> None:
+    """However long it was since the last measurement."""
+    bench = Bench()
+    bench.open()
+    bench.run_until_state("nominal")
+    bench.run(2.0)
+    before = bench.session.figures(bench.now).tally
+    assert bench.ask(Request.PAUSE, 5.0).success
+    bench.run(20.0)
+    after = bench.session.figures(bench.now).tally
+    assert after.delay_s - before.delay_s == pytest.approx(0.0, abs=0.1)

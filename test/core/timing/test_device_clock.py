@@ -1,0 +1,299 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Sampling times against the truth of a generated line, in simulated time."""
+
+import math
+import random
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from itertools import pairwise
+from statistics import fmean
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from serial_line import Board, Chunker, Read, blocks, bursts, crumbs, ftdi, late, singles
+
+from omnibot_driver.core.board import DisplacementReading, Edge, ImuReading
+from omnibot_driver.core.imu.scale import STANDARD_GRAVITY
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.timing.device_clock import DeviceClock
+
+SEEDS = range(3)
+SKEWS = [1e-4, -1e-4]
+JITTER_S = 60e-6
+SETTLED_S = 2.0
+SAMPLE = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+COUNTS = 16384 / STANDARD_GRAVITY
+
+
+@dataclass(slots=True)
+class Stamped:
+    """What a clock said of one stream: (tick, stamp, arrival), of samples and of displacements."""
+
+    board: Board
+    samples: list[tuple[int, float, float]] = field(default_factory=list)
+    displacements: list[tuple[int, float, float]] = field(default_factory=list)
+
+    def errors(self, since_s: float = SETTLED_S) -> list[float]:
+        """Stamp less true sampling time, from so long after the board began."""
+        return [
+            stamp_s - self.board.sampled_at(tick)
+            for tick, stamp_s, _ in self.samples
+            if self.board.sampled_at(tick) >= self.board.begins_at + since_s
+        ]
+
+    def unevenness(self, since_s: float = SETTLED_S) -> float:
+        """Standard deviation, from 10 ms, of the differences between successive samples' stamps."""
+        return math.sqrt(
+            fmean(
+                (after[1] - before[1] - 0.01) ** 2
+                for before, after in pairwise(self.samples)
+                if before[1] >= self.board.begins_at + since_s and after[0] == before[0] + 1
+            )
+        )
+
+
+def spread(errors: list[float], part: float = 0.99) -> float:
+    """Half the width of the narrowest interval that holds this part: error up to one constant."""
+    ordered = sorted(errors)
+    count = math.ceil(part * len(ordered))
+    ends = zip(ordered, ordered[count - 1 :], strict=False)
+    return min(high - low for low, high in ends) / 2
+
+
+def stamp(clock: DeviceClock, board: Board, reads: Iterable[Read]) -> Stamped:
+    """Decode and stamp; on the way, what is true of every stamp is asserted."""
+    stamped = Stamped(board)
+    omnibot = OmniBot(OmniBotSettings())
+    last_s = -math.inf
+    for now, data in reads:
+        readings = omnibot.receive(data, now)
+        stamps_s = clock.stamps(readings, now, omnibot.edge)
+        for reading, stamp_s in zip(readings, stamps_s, strict=True):
+            if isinstance(reading, ImuReading):
+                assert last_s < stamp_s <= now
+                last_s = stamp_s
+                low, high = (round(value * COUNTS) for value in reading.specific_force[:2])
+                stamped.samples.append((low + 8192 * high, stamp_s, now))
+            elif isinstance(reading, DisplacementReading):
+                stamped.displacements.append((4 * round(reading.dx_m * 1e4), stamp_s, now))
+    return stamped
+
+
+def run(
+    board: Board,
+    chunker: Chunker,
+    seed: int,
+    *,
+    stalls: list[tuple[float, float]] | None = None,
+    clock: DeviceClock | None = None,
+) -> Stamped:
+    rng = random.Random(seed)
+    chunks = chunker(board.stream(rng), rng)
+    reads = late(chunks, rng, jitter_s=JITTER_S, stalls=stalls)
+    return stamp(clock or DeviceClock(0.01), board, reads)
+
+
+@pytest.mark.parametrize("imu_only", [False, True])
+@pytest.mark.parametrize("skew", SKEWS)
+@pytest.mark.parametrize(
+    "chunker",
+    [ftdi(restarted_by_data=True), ftdi(latency_s=0.001), bursts, singles, crumbs],
+    ids=["adapter 16 ms", "adapter 1 ms", "bursts", "bytes", "crumbs"],
+)
+def test_stamps_are_even_and_true_to_a_constant(
+    chunker: Chunker, skew: float, imu_only: bool
+) -> None:
+    """Within 0.2 ms (standard deviation) of 10 ms; 99 % within 0.5 ms; from 2 s on."""
+    for seed in SEEDS:
+        stamped = run(Board(seconds=20, skew=skew, imu_only=imu_only), chunker, seed)
+        assert stamped.unevenness() < 0.2e-3
+        assert spread(stamped.errors()) < 0.5e-3
+
+
+@pytest.mark.parametrize("imu_only", [False, True])
+@pytest.mark.parametrize("skew", SKEWS)
+def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
+    skew: float, imu_only: bool
+) -> None:
+    """A free timer of 16 ms: for seconds nothing on the line tells 0.8 ms of delay from none."""
+    stamped = run(Board(seconds=120, skew=skew, imu_only=imu_only), ftdi(), 0)
+    assert stamped.unevenness() < 0.2e-3
+    assert spread(stamped.errors()) < 0.5e-3
+
+
+@pytest.mark.parametrize("chunker", [bursts, singles], ids=["bursts", "bytes"])
+def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Chunker) -> None:
+    """Neither in their error nor in their evenness."""
+    for seed in SEEDS:
+        stamped = run(Board(seconds=20, skew=1e-4), chunker, seed)
+        arrivals = Stamped(stamped.board, [(tick, at, at) for tick, _, at in stamped.samples])
+        assert spread(stamped.errors()) <= spread(arrivals.errors())
+        assert stamped.unevenness() <= arrivals.unevenness()
+
+
+def test_blocks_as_large_as_the_hosts_buffer_are_spread_over_their_ticks() -> None:
+    """240 ticks at once; the line is known after some of them."""
+    for seed in SEEDS:
+        stamped = run(Board(seconds=120, skew=1e-4, imu_only=True), blocks, seed)
+        assert stamped.unevenness(since_s=20.0) < 0.2e-3
+        assert spread(stamped.errors(since_s=20.0)) < 0.5e-3
+
+
+@pytest.mark.parametrize("chunker", [ftdi(restarted_by_data=True), bursts, crumbs])
+def test_a_host_that_stalls_does_not_move_the_stamps(chunker: Chunker) -> None:
+    """Ten stalls of 5 to 200 ms: what came meanwhile is stamped as if there had been none."""
+    for seed in SEEDS:
+        rng = random.Random(seed)
+        stalls = [(1003 + 1.5 * k, 1003 + 1.5 * k + rng.uniform(0.005, 0.2)) for k in range(10)]
+        stamped = run(Board(seconds=20, skew=-1e-4), chunker, seed, stalls=stalls)
+        assert max(now - at for _, at, now in stamped.samples) > 0.05
+        assert stamped.unevenness() < 0.2e-3
+        assert spread(stamped.errors()) < 0.5e-3
+
+
+@pytest.mark.parametrize("imu_only", [False, True])
+def test_a_driver_that_finds_a_backlog_does_not_take_it_for_now(imu_only: bool) -> None:
+    """Three seconds of frames in the first read, cut anywhere, get their own times."""
+    for seed in SEEDS:
+        board = Board(seconds=10, skew=1e-4, imu_only=imu_only, first_tick=seed * 1234 + 3)
+        rng = random.Random(seed)
+        line = board.stream(rng)[rng.randrange(40) :]
+        reads = late(bursts(line, rng), rng, jitter_s=JITTER_S, stalls=[(0.0, 1003.004)])
+        stamped = stamp(DeviceClock(0.01), board, reads)
+        assert spread(stamped.errors(since_s=5.0)) < 0.5e-3
+        assert max(map(abs, stamped.errors(since_s=0.1))) < 0.02
+
+
+@pytest.mark.parametrize("chunker", [ftdi(restarted_by_data=True), bursts, singles])
+def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
+    """One frame in a hundred is lost; the displacements' counter says how many were."""
+    for seed in SEEDS:
+        stamped = run(Board(seconds=40, skew=1e-4, loss=0.01), chunker, seed)
+        errors = stamped.errors()
+        usual_s = sorted(errors)[len(errors) // 2]
+        assert sum(abs(error - usual_s) < 0.5e-3 for error in errors) > 0.98 * len(errors)
+
+
+def test_without_displacements_lost_samples_are_counted_by_their_arrival() -> None:
+    """On a line that delivers at once, a tick of silence is a tick."""
+    for seed in SEEDS:
+        stamped = run(Board(seconds=40, skew=1e-4, loss=0.01, imu_only=True), bursts, seed)
+        assert spread(stamped.errors()) < 0.5e-3
+
+
+def test_a_stall_that_ends_with_one_sample_at_a_time_loses_none() -> None:
+    """A network hands over what it held packet by packet: the first of ten was no tenth."""
+    for seed in SEEDS:
+        board = Board(seconds=10, skew=1e-4)
+        rng = random.Random(seed)
+        reads = [
+            (1005.0 + (at - 1004.9) * 1e-3 if 1004.9 < at < 1005.0 else at, data)
+            for at, data in bursts(board.stream(rng), rng)
+        ]
+        stamped = stamp(DeviceClock(0.01), board, reads)
+        errors = stamped.errors()
+        assert max(errors) - min(errors) < 1e-3
+
+
+@pytest.mark.parametrize("skew", [*SKEWS, 0.0])
+def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
+    """Positive where it is faster than ours, so that its ticks are shorter."""
+    clock = DeviceClock(0.01)
+    for tick in range(1000):
+        clock.stamps([SAMPLE], tick * 0.01 / (1.0 + skew))
+    assert clock.skew_ppm == pytest.approx(1e6 * skew, abs=1.0)
+
+
+@pytest.mark.parametrize("skew", SKEWS)
+def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
+    """Another phase and another SEQ; the stamps go on forward and to the same constant."""
+    clock = DeviceClock(0.01)
+    adapter = ftdi(restarted_by_data=True)
+    before = run(Board(seconds=10, skew=skew), adapter, 1, clock=clock)
+    clock.restart()
+    board = Board(seconds=10, skew=skew, begins_at=1012.3456)
+    after = run(board, adapter, 2, clock=clock)
+    assert after.samples[0][1] > before.samples[-1][1]
+    assert after.unevenness() < 0.2e-3
+    assert spread(before.errors() + after.errors()) < 0.5e-3
+
+
+def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
+    """Five seconds without a byte, and SEQ does not say so: the line is laid anew."""
+    clock = DeviceClock(0.01)
+    run(Board(seconds=10), bursts, 1, clock=clock)
+    after = run(Board(seconds=10, begins_at=1015.0055), bursts, 2, clock=clock)
+    assert spread(after.errors()) < 0.5e-3
+    assert after.unevenness() < 0.2e-3
+
+
+def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
+    """Also when the adapter cuts between the two frames."""
+    for chunker in (ftdi(restarted_by_data=True), bursts, singles):
+        stamped = run(Board(seconds=10), chunker, 0)
+        stamp_of = {tick: stamp_s for tick, stamp_s, _ in stamped.samples}
+        assert len(stamped.displacements) > 200
+        assert all(stamp_s == stamp_of[tick] for tick, stamp_s, _ in stamped.displacements)
+
+
+def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
+    """Framing made it up, two ticks after a true one and two before the next."""
+    clock = DeviceClock(0.01)
+    true = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
+    made_up = DisplacementReading(0.0, 0.0, 0.0, "earth", None, 0, restarted=True)
+    after = {tick: [true] for tick in range(0, 200, 4)} | {102: [made_up]}
+    stamps_s = [
+        clock.stamps([SAMPLE, *after.get(tick, [])], 1000.0 + 0.01 * tick)[0] for tick in range(200)
+    ]
+    differences = [after - before for before, after in pairwise(stamps_s)]
+    assert differences == pytest.approx([0.01] * 199, abs=1e-6)
+
+
+imu_readings = st.builds(
+    ImuReading, st.just((0.0, 0.0, 0.0)), st.just((0.0, 0.0, 0.0)), st.integers(0, 40)
+)
+displacements = st.builds(
+    DisplacementReading,
+    *[st.just(0.0)] * 3,
+    st.just("earth"),
+    st.sampled_from([None, 0.04]),
+    st.integers(0, 255),
+)
+edges = st.none() | st.builds(
+    Edge, st.integers(0, 1), st.floats(0.0, 0.0013), st.floats(0.0, 0.0012), st.booleans()
+)
+reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, max_size=30), edges)
+
+
+@given(st.lists(reads, max_size=60))
+def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
+    reads: list[tuple[float, list[ImuReading | DisplacementReading], Edge | None]],
+) -> None:
+    """Whatever counters and framing say."""
+    clock = DeviceClock(0.01)
+    now, last_s = 1000.0, -math.inf
+    for passed_s, readings, edge in reads:
+        now += passed_s
+        for reading, stamp_s in zip(readings, clock.stamps(readings, now, edge), strict=True):
+            assert stamp_s <= now
+            assert last_s < stamp_s if isinstance(reading, ImuReading) else last_s <= stamp_s
+            last_s = stamp_s
+
+
+def test_displacements_alone_are_stamped_forwards() -> None:
+    """Should every sample be lost, or a board have none."""
+    clock = DeviceClock(0.01)
+    reading = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
+    stamps_s = [clock.stamps([reading], 1000.0 + 0.04 * k)[0] for k in range(500)]
+    differences = [after - before for before, after in pairwise(stamps_s)]
+    assert differences == pytest.approx([0.04] * 499, abs=1e-6)
+
+
+def test_stamps_increase_even_where_arrival_times_do_not() -> None:
+    """By a microsecond each, when a clock as coarse as that hands all of them in at once."""
+    clock = DeviceClock(0.01)
+    stamps_s = [clock.stamps([SAMPLE], 5.0)[0] for _ in range(100)]
+    assert all(before < after for before, after in pairwise(stamps_s))
+    assert stamps_s[-1] == pytest.approx(5.0, abs=1e-3)

@@ -1,0 +1,58 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""An adapter that holds everything back for seconds, loses what it cannot hold, and then works."""
+
+import math
+from itertools import pairwise
+
+from hypothesis import example, given
+from hypothesis import strategies as st
+from session_bench import TICK_S, Bench
+
+from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
+from omnibot_driver.simulator import BoardSettings
+
+HELD = 4095
+"""Bytes, 2.4 s of them; later ones are lost."""
+
+
+def through_a_stall(ticks: int, frame: str, vx: float, yaw_rate: float) -> Bench:
+    """The robot drives on meanwhile, for it hears nobody either."""
+    bench = Bench(BoardSettings(frame=frame))
+    bench.open()
+    bench.run_until_state("nominal")
+    for _ in range(10):
+        bench.drive(vx, 0.1, yaw_rate)
+        bench.run(10 * TICK_S)
+    held, bench.hears = b"", False
+    for _ in range(ticks):
+        bench.now += TICK_S
+        held += bench.board.step()
+        if bench.now >= bench.session.wake_at:
+            bench.session.tick(bench.now)
+        bench.settle()
+    bench.hears = True
+    bench.session.receive(held[:HELD], bench.now)
+    bench.settle()
+    bench.run(2.0)
+    return bench
+
+
+def step(before: OdometryEstimate, after: OdometryEstimate) -> float:
+    return math.hypot(after.pose.x_m - before.pose.x_m, after.pose.y_m - before.pose.y_m)
+
+
+@given(st.integers(20, 700), st.sampled_from(["earth", "body"]), st.floats(-0.4, 0.4))
+@example(ticks=400, frame="earth", vx=0.4)
+@example(ticks=592, frame="earth", vx=0.0)
+@example(ticks=291, frame="body", vx=0.4)
+def test_no_step_is_larger_than_its_stamps_allow(ticks: int, frame: str, vx: float) -> None:
+    """However much was lost, and however little the stamps know of it; soon nothing is missing."""
+    bench = through_a_stall(ticks, frame, vx, 0.5)
+    fastest_mps = OdometrySettings().fastest_mps
+    for before, after in pairwise(bench.odometry):
+        seconds = max(after.stamp_s - before.stamp_s, 0.04)
+        assert step(before, after) <= fastest_mps * seconds + 0.005
+    last, told = bench.odometry[-1].pose, bench.board.odometry
+    assert math.hypot(last.x_m - told.x_mm / 1000, last.y_m - told.y_mm / 1000) < 0.002
+    assert abs(math.remainder(last.yaw_rad - told.theta_mrad / 1000, math.tau)) < 0.002
