@@ -27,7 +27,7 @@ from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
 from omnibot_driver.kernel_counts import waited_s
 from omnibot_driver.outbox import Delivery, Outbox
 from omnibot_driver.port import Port
-from omnibot_driver.stall_detector import Standstill, boot_time_s
+from omnibot_driver.stall_detector import StallDetector, boot_time_s
 
 JOIN_TIMEOUT_S: Final = 3.0
 """Longer than a guard takes to repeat Stop."""
@@ -95,7 +95,7 @@ class Link:
         self._write_error: LinkError | None = None
         self._keeper: Keeper | None = None
         self._unguarded_told = False
-        self._standstill = Standstill()
+        self._standstill = StallDetector()
         self._pacing_until = self._beat_at = -math.inf
         self._threads = [
             threading.Thread(target=self._guard, args=(work,), name=f"omnibot-{name}", daemon=True)
@@ -185,7 +185,7 @@ class Link:
                 self._leaving = True
                 self._on_exit = on_exit
                 self._stop_for_good()
-                self._write(self._session.farewell(on_exit))
+                self._write(self._session.shutdown_sequence(on_exit))
                 if self._port is not None:
                     told = self._write_error is None
                     self._stands = told and self._session.stands
@@ -305,7 +305,7 @@ class Link:
                 self._received += len(data)
                 self._count(port, now)
                 stopped = self._heed_standstill(boot_time_s())
-                if self._session.heed(now) or stopped:
+                if self._session.process(now) or stopped:
                     self._settle()
             self._outbox.deliver()
 
@@ -322,7 +322,7 @@ class Link:
         """Whatever ended the reading, the robot is not left with a command to carry out."""
         with self._changed:
             if self._write_error is None:
-                self._write(self._session.farewell(self._on_exit))
+                self._write(self._session.shutdown_sequence(self._on_exit))
             else:  # Stop, right behind whatever is out of the kernel's reach
                 port.write_if_room(self._session.broken_off())
             stopped = self._stands if self._closing.is_set() else comes_back

@@ -30,7 +30,7 @@ def boot_time_ns() -> int:
     return time.clock_gettime_ns(time.CLOCK_BOOTTIME)
 
 
-class Standstill:
+class StallDetector:
     """``passed`` by the watchdog's thread, ``begun`` by every thread before it does something.
 
     ``outlived_by`` is never true of what ``begun`` would tell.

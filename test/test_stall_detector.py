@@ -6,7 +6,7 @@ import pytest
 
 from omnibot_driver.guard import LIMIT_S
 from omnibot_driver.keeper import BEAT_S
-from omnibot_driver.stall_detector import SETTLE_S, STANDSTILL_S, Standstill
+from omnibot_driver.stall_detector import SETTLE_S, STANDSTILL_S, StallDetector
 
 DAY_NS = 1_700_000_000_000_000_000
 """The time of day when the steady clock shows 0."""
@@ -16,9 +16,9 @@ def wall_ns(now: float) -> int:
     return DAY_NS + round(now * 1e9)
 
 
-def resumed(length_s: float) -> Standstill:
+def resumed(length_s: float) -> StallDetector:
     """Ran until 100, and again from ``length_s`` later on."""
-    standstill = Standstill()
+    standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     standstill.begun(100.0 + length_s)
     standstill.passed(100.0 + length_s, wall_ns(100.0 + length_s))
@@ -27,7 +27,7 @@ def resumed(length_s: float) -> Standstill:
 
 def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
     """A busy machine may keep it waiting a little."""
-    standstill = Standstill()
+    standstill = StallDetector()
     assert standstill.begun(5.0) == 0.0  # not even before it ever ran
     for now in (10.0, 10.1, 10.45):
         assert standstill.begun(now) == 0.0
@@ -37,7 +37,7 @@ def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
 
 def test_a_standstill_is_told_once_with_its_length() -> None:
     """Whichever thread runs first afterwards; the next standstill is told again."""
-    standstill = Standstill()
+    standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     assert standstill.begun(103.0) == pytest.approx(3.0)
     assert standstill.begun(103.1) == 0.0
@@ -48,7 +48,7 @@ def test_a_standstill_is_told_once_with_its_length() -> None:
 
 def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
     """Another thread may run first, or alone."""
-    standstill = Standstill()
+    standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     assert not standstill.outlived_by(wall_ns(100.0 + STANDSTILL_S), 100.0 + STANDSTILL_S)
     standstill.begun(103.0)

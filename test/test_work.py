@@ -108,7 +108,7 @@ def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound
         assert session.hear(data, now) or now < SETTLED * TICK_S
 
     def rest(now: float) -> None:
-        session.heed(now)
+        session.process(now)
         session.take_events()
 
     assert most_calls(work, rest)[kind] <= bound

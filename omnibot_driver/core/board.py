@@ -106,7 +106,7 @@ class BoardFigures:
 
 
 @value(frozen=True, slots=True)
-class Edge:
+class SampleBoundary:
     """Where a read ended among the samples.
 
     The beginning of one tells when it was taken better than an end that is delivered late, and what
@@ -136,7 +136,7 @@ class Board(Protocol):
         """The nominal time from one ImuReading to the next."""
 
     @property
-    def edge(self) -> Edge | None:
+    def edge(self) -> SampleBoundary | None:
         """Where the last read ended. None while the framing is in doubt, or it told nothing new."""
 
     @property

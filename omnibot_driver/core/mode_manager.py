@@ -74,7 +74,7 @@ class RequestDone:
     message: str
 
 
-class Supervisor:
+class ModeManager:
     """``run``: whether the board is to run whenever it is there; otherwise it stays as it is."""
 
     def __init__(self, board: Board, *, run: bool) -> None:
@@ -202,7 +202,7 @@ class Supervisor:
         elif self.phase is Phase.STARTING and now - self._said_at >= START_RETRY_S:
             self._say(self._board.start(), now)
 
-    def farewell(self, on_exit: OnExit, *, proved: bool) -> bytes:
+    def shutdown_sequence(self, on_exit: OnExit, *, proved: bool) -> bytes:
         """The last bytes to the board, which stops it unless it is ``proved`` to stand."""
         stops = 0 if proved else LAST_STOPS
         return stops * self._board.stop() + self._last_request(on_exit)

@@ -23,7 +23,7 @@ from omnibot_driver.core.board import (
 )
 from omnibot_driver.core.commands.interlocks import why_not_calibrate, why_not_drive
 from omnibot_driver.core.commands.limits import SpeedLimits
-from omnibot_driver.core.commands.pipeline import Driving, Wish
+from omnibot_driver.core.commands.pipeline import Command, CommandPipeline
 from omnibot_driver.core.commands.shaping import ControlMethod
 from omnibot_driver.core.commands.stream import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
@@ -32,11 +32,11 @@ from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose, Signs
 from omnibot_driver.core.imu.bias_correction import ImuCorrection, ImuEstimate
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits, Refused
-from omnibot_driver.core.measurement.pipeline import Measured, Measuring
-from omnibot_driver.core.mode_manager import CLOSED, OnExit, Phase, Request, Supervisor
+from omnibot_driver.core.measurement.pipeline import Measured, MeasurementPipeline
+from omnibot_driver.core.mode_manager import CLOSED, ModeManager, OnExit, Phase, Request
 from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.reporting.figures import SessionFigures
-from omnibot_driver.core.reporting.notices import HEADING_ASSUMED, Bulletin, why_silent
+from omnibot_driver.core.reporting.notices import HEADING_ASSUMED, Notices, why_silent
 
 SILENCE_S: Final = 1.5
 """The board says something at least once a second; after this it is not known to be there."""
@@ -78,12 +78,12 @@ class Session:
         obeys: bool = True,
     ) -> None:
         self._board = board
-        self._supervisor = Supervisor(board, run=run)
-        self._measuring = Measuring(
+        self._mode_manager = ModeManager(board, run=run)
+        self._measurement = MeasurementPipeline(
             board, settings.odometry, settings.motion, settings.imu, axis_signs
         )
-        self._odometry, self._inertial = self._measuring.odometry, self._measuring.inertial
-        self._driving = Driving(
+        self._odometry, self._imu = self._measurement.odometry, self._measurement.inertial
+        self._commanding = CommandPipeline(
             board,
             self._odometry,
             settings.limits,
@@ -93,12 +93,12 @@ class Session:
             obeys=obeys,
             monitored=settings.motion_monitor,
         )
-        self._commands = self._driving.stream
+        self._commands = self._commanding.stream
         self._heard_at = self._came_at = -math.inf
         self._silent = self._leaving = False
         self._last: Reading | None = None
         self._tell_at = -math.inf
-        self._bulletin = Bulletin()
+        self._notices_due = Notices()
         self._overruns = 0
         self._events: list[Event] = []
         self.shown = (self.state, self.estop_active)
@@ -113,7 +113,7 @@ class Session:
         """The public name of the link's and the board's state."""
         if self._closed:
             return DISCONNECTED
-        resetting = self._supervisor.phase is Phase.RESETTING
+        resetting = self._mode_manager.phase is Phase.RESETTING
         return str((Mode.UNKNOWN if resetting else self._board.mode).value)
 
     @property
@@ -124,38 +124,38 @@ class Session:
     @property
     def refused(self) -> Refused:
         """What the wire said and nobody was told."""
-        return self._measuring.refused
+        return self._measurement.refused
 
     def figures(self, now: float) -> SessionFigures:
         """All that is counted and measured."""
         return SessionFigures(
             state=self.state,
-            tally=replace(self._measuring.tally),
+            tally=replace(self._measurement.tally),
             board=self._board.figures,
             refused=self.refused,
-            skew_ppm=self._measuring.skew_ppm,
-            commands=self._driving.figures(now),
-            imu=self._inertial.figures,
+            skew_ppm=self._measurement.skew_ppm,
+            commands=self._commanding.figures(now),
+            imu=self._imu.figures,
         )
 
     @property
     def gyro_bias(self) -> Vector3:
         """What is taken off the gyro's readings, in rad/s."""
-        return self._inertial.calibration.bias
+        return self._imu.calibration.bias
 
     @property
     def wake_at(self) -> float:
         """When ``tick`` must be called at the latest; infinity when nothing is due."""
-        if self._supervisor.phase is CLOSED:
+        if self._mode_manager.phase is CLOSED:
             return math.inf
         silent_at = math.inf if self._silent else self._heard_at + SILENCE_S
         unheard_at = self._heard_at + UNHEARD_S if self._commands.current else math.inf
         return min(
             silent_at,
             unheard_at,
-            self._supervisor.wake_at,
+            self._mode_manager.wake_at,
             self._commands.wake_at,
-            self._inertial.calibration.wake_at,
+            self._imu.calibration.wake_at,
         )
 
     # What happens
@@ -165,40 +165,38 @@ class Session:
 
         ``board``: new settings of the board's own, in which the present command is said as well.
         """
-        self._notify(self._driving.configure(settings.limits, settings.commands, now))
-        self._driving.monitor(settings.motion_monitor)
+        self._notify(self._commanding.configure(settings.limits, settings.commands, now))
+        self._commanding.monitor(settings.motion_monitor)
         if board is not None:
             self._board.settings = board
-            self._notify(self._driving.encode_anew(now))
-        self._measuring.configure(settings.odometry, settings.motion, settings.imu)
+            self._notify(self._commanding.encode_anew(now))
+        self._measurement.configure(settings.odometry, settings.motion, settings.imu)
 
     def opened(self, now: float) -> None:
         """The port is open."""
         self._board.connect()
-        self._driving.begin()
+        self._commanding.begin()
         self._commands.connect()
-        self._measuring.restart()
+        self._measurement.restart()
         self._silent, self._heard_at, self._came_at = False, now, -math.inf
-        self._supervisor.opened(now)
+        self._mode_manager.opened(now)
 
     def closed(self, now: float) -> None:
         """The port is gone."""
         self._events += self._take_in(self._board.flush(now), now)
-        self.heed(now)
-        self._react(self._measuring.release(), now)
-        self._supervisor.closed()
-        self._inertial.calibration.give_up(
-            "the port was lost meanwhile; call again once it is back"
-        )
+        self.process(now)
+        self._react(self._measurement.release(), now)
+        self._mode_manager.closed()
+        self._imu.calibration.give_up("the port was lost meanwhile; call again once it is back")
         self._commands.discard()
 
     def receive(self, data: bytes, now: float) -> None:
         """Bytes came in at ``now``."""
         self._events += self.hear(data, now)
-        self.heed(now)
+        self.process(now)
 
     def hear(self, data: bytes, now: float) -> list[ImuEstimate]:
-        """``receive``, but for what can wait until these are told: ``heed`` is to follow.
+        """``receive``, but for what can wait until these are told: ``process`` is to follow.
 
         Whoever commands in between is as one who came before the bytes. That must not be where they
         change the mode, so there nothing waits; nor does it where anything else is asked for.
@@ -211,7 +209,7 @@ class Session:
             return estimates
         self._events += estimates
         self._tell_at = now
-        self.heed(now)
+        self.process(now)
         if after.running and not before.running:
             self._commands.proof.begin()
             self._commands.halt(now)
@@ -221,26 +219,28 @@ class Session:
         """So often the port has lost bytes since it was opened: they never came to us."""
         self._overruns = count
 
-    def heed(self, now: float) -> bool:
+    def process(self, now: float) -> bool:
         """What comes of the bytes that were heard last. False: nothing to write or to tell."""
         last, self._last = self._last, None
         if last is None:
             return True
         if (
             now < self._tell_at
-            and not self._measuring.undigested
+            and not self._measurement.undigested
             and not self._events
-            and self._supervisor.at_rest
+            and self._mode_manager.at_rest
         ):
             return False
-        if self._measuring.undigested:
-            measured = self._measuring.digest()
-            self._notify(self._driving.count_refused(self._measuring.refused_displacements, now))
+        if self._measurement.undigested:
+            measured = self._measurement.flush()
+            self._notify(
+                self._commanding.count_refused(self._measurement.refused_displacements, now)
+            )
             self._react(measured, now)
         if now >= self._tell_at:
             self._tell(now)
         if self._board.mode.running and not isinstance(last, PausedReading):
-            self._supervisor.heard_data(now)
+            self._mode_manager.heard_data(now)
         return True
 
     def tick(self, now: float) -> None:
@@ -249,16 +249,16 @@ class Session:
             self._commands.halt(now)
         if not self._silent and now - self._heard_at >= SILENCE_S:
             self._silent = True
-            self._react(self._measuring.release(), now)
+            self._react(self._measurement.release(), now)
             self._notify([why_silent(SILENCE_S, bytes_came=self._came_at > self._heard_at)])
             if self._board.mode is not Mode.UNKNOWN:
                 self._board.silence()
-                self._measuring.restart()
+                self._measurement.restart()
                 self._commands.proof.begin()
                 self._commands.halt(now)
-                self._supervisor.heard_nothing(now)
-        self._supervisor.tick(now)
-        self._inertial.calibration.tick(now)
+                self._mode_manager.heard_nothing(now)
+        self._mode_manager.tick(now)
+        self._imu.calibration.tick(now)
 
     def stood_still(self, seconds: float, now: float) -> None:
         """This process, or its watchdog, did not run for so long: no command is current."""
@@ -279,30 +279,30 @@ class Session:
 
         ``age_s``: how long ago it was sent, by the sender's stamp.
         """
-        self._command(self._driving.twist(twist, now, age_s=age_s), now)
+        self._command(self._commanding.twist(twist, now, age_s=age_s), now)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
         """Turn wheels A, B, C. Raises CommandRefused, and then nothing changes."""
-        self._command(self._driving.wheels(rates_radps, now), now)
+        self._command(self._commanding.wheels(rates_radps, now), now)
 
     def command_pose(self, goal: Pose, now: float) -> None:
         """Drive to a pose in the odometry frame. Raises CommandRefused; then nothing changes."""
-        self._command(self._driving.pose(goal), now)
+        self._command(self._commanding.pose(goal), now)
 
     def request(self, request: Request, token: object, now: float) -> None:
         """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""
         if self._leaving:
             raise RequestRefused("the driver is shutting down")
-        self.heed(now)  # what came before is no answer
-        self._supervisor.request(request, token, now)
+        self.process(now)  # what came before is no answer
+        self._mode_manager.request(request, token, now)
         if request is Request.START:
-            self._driving.interlock.start()
+            self._commanding.interlock.start()
         else:
             self._commands.halt(now)
 
     def calibrate_gyro(self, token: object, now: float) -> None:
         """Find the gyro's bias; answered by a RequestDone. Raises RequestRefused at once."""
-        calibration, phase = self._inertial.calibration, self._supervisor.phase
+        calibration, phase = self._imu.calibration, self._mode_manager.phase
         if reason := why_not_calibrate(
             phase, self._board.mode, self._commands.current, measuring=calibration.measuring
         ):
@@ -322,15 +322,15 @@ class Session:
             return "e-stop latched"
         if not self.estop_active:
             return "the e-stop was not latched"
-        self._driving.release(now)
+        self._commanding.release(now)
         self._notify([f"e-stop released by {by}"])
         return "e-stop released; the robot stands still until a new command comes"
 
     def reset_odometry(self, now: float) -> None:
         """The odometry frame begins where the robot stands; a goal in the old one is dropped."""
-        self.heed(now)
+        self.process(now)
         self._events += self._odometry.reset()
-        self._notify(self._driving.check_goal([], now))
+        self._notify(self._commanding.check_goal([], now))
 
     def leave(self, now: float) -> None:
         """The driver ends: nothing is obeyed any more, and Stop is repeated."""
@@ -352,10 +352,10 @@ class Session:
         """The board has shown that the robot stands, and no motion was commanded since."""
         return self._commands.proof.proved
 
-    def farewell(self, on_exit: OnExit) -> bytes:
+    def shutdown_sequence(self, on_exit: OnExit) -> bytes:
         """The last bytes to write before the port is closed."""
         proved = self._commands.quiet and self.stands
-        data = self._supervisor.farewell(on_exit, proved=proved)
+        data = self._mode_manager.shutdown_sequence(on_exit, proved=proved)
         self._commands.discard()
         return data + (self._board.emergency_stop() if self.estop_active else b"")
 
@@ -367,26 +367,26 @@ class Session:
 
     def take_output(self, now: float) -> bytes:
         """The bytes to write now; they count as written."""
-        if self._supervisor.phase is CLOSED:
+        if self._mode_manager.phase is CLOSED:
             return b""
-        if data := self._supervisor.take_output():
+        if data := self._mode_manager.take_output():
             self._commands.wrote(data, now)
         if due := self._commands.due(now):
-            self._driving.wrote(due, now)
+            self._commanding.wrote(due, now)
             data += due
         if self._commands.unconfirmed:
             self._commands.unconfirmed = False
             measured = self._commands.proof.measured
-            self._notify(self._bulletin.unconfirmed(self._board.mode, measured=measured))
+            self._notify(self._notices_due.unconfirmed(self._board.mode, measured=measured))
         return data
 
     def take_events(self) -> list[Event]:
         """What happened since the last call, in order."""
-        for answers in (self._supervisor.answers, self._inertial.calibration.answers):
+        for answers in (self._mode_manager.answers, self._imu.calibration.answers):
             if answers:
                 self._events += answers
                 answers.clear()
-        beneath = (self._supervisor.phase, self._board.mode, self._commands.latched)
+        beneath = (self._mode_manager.phase, self._board.mode, self._commands.latched)
         if beneath != self._beneath:
             self._beneath = beneath
             shown = (self.state, self.estop_active)
@@ -398,39 +398,39 @@ class Session:
 
     @property
     def _closed(self) -> bool:
-        return self._supervisor.phase is CLOSED
+        return self._mode_manager.phase is CLOSED
 
     def _take_in(self, readings: list[Reading], now: float) -> list[ImuEstimate]:
         if readings:
             self._heard_at, self._silent, self._last = now, False, readings[-1]
-        return self._measuring.hear(readings, now)
+        return self._measurement.hear(readings, now)
 
     def _react(self, measured: list[Measured], now: float) -> None:
         for reading, estimates in measured:
             self._events += estimates
             if isinstance(reading, DisplacementReading):
-                self._notify(self._driving.look(reading, estimates, now))
+                self._notify(self._commanding.look(reading, estimates, now))
                 if reading.restarted:
                     self._commands.halt(now)
             elif isinstance(reading, PoseReading):
                 if reading.restarted:
                     self._commands.halt(now)
             elif isinstance(reading, PausedReading):
-                self._driving.begin()
+                self._commanding.begin()
                 self._commands.proof.paused()
                 if self._board.mode.running:  # again, within one read
                     self._commands.halt(now)
-                self._supervisor.heard_paused(now, continues=reading.continues)
+                self._mode_manager.heard_paused(now, continues=reading.continues)
         if self._commands.current is not None:
-            self._notify(self._driving.check_goal([], now))
+            self._notify(self._commanding.check_goal([], now))
 
     def _tell(self, now: float) -> None:
         self._tell_at = now + TELL_EVERY_S
-        bulletin, measuring, advice = self._bulletin, self._measuring, self._board.advice
+        bulletin, measuring, advice = self._notices_due, self._measurement, self._board.advice
         news = bulletin.counted(
             measuring.tally.lost_displacements, self._overruns, measuring.refused, now
         )
-        news += bulletin.standing(self._inertial.advice)
+        news += bulletin.standing(self._imu.advice)
         if advice is not None:
             news += bulletin.once(advice)
         if self._odometry.heading_assumed:
@@ -441,23 +441,23 @@ class Session:
         if sentences:
             self._events += map(Notice, sentences)
 
-    def _command(self, wish: Wish, now: float) -> None:
+    def _command(self, wish: Command, now: float) -> None:
         if self._leaving:
             raise CommandRefused("motion command refused: the driver is shutting down")
         motion, expires_at = wish
         unheard = now - self._heard_at >= UNHEARD_S and not motion.stands
         if reason := why_not_drive(
-            self._supervisor.phase,
+            self._mode_manager.phase,
             self._board.mode,
             latched=self._commands.latched,
             unheard_s=UNHEARD_S if unheard else 0.0,
-            interlock=self._driving.interlock.arrive(
+            interlock=self._commanding.interlock.arrive(
                 now, self._commands.settings.timeout_s, stands=motion.stands
             ),
         ):
             raise CommandRefused(f"motion command refused: {reason}")
         self._commands.command(motion, now, expires_at=expires_at)
         if not motion.stands:
-            self._inertial.calibration.give_up(
+            self._imu.calibration.give_up(
                 "a motion command came in; stop the sender, then call again"
             )

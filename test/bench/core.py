@@ -124,7 +124,7 @@ def cold(ticks: int) -> str:
         begun = time.perf_counter()
         session.hear(data, now)
         passed = time.perf_counter() - begun
-        session.heed(now)
+        session.process(now)
         session.take_output(now)
         session.take_events()
         if tick >= SETTLED and len(data) == 14:

@@ -95,7 +95,7 @@ class Relay:
         """... stamped, checked and integrated; and the session is told the rest."""
         now = time.monotonic()
         self.publish(list(self._session.hear(data, now)))
-        self._session.heed(now)
+        self._session.process(now)
         self._session.take_output(now)
         told = self._session.take_events()
         self.publish([each for each in told if isinstance(each, OdometryEstimate)])

@@ -85,13 +85,13 @@ class Line:
         """Smooth curves at up to 0.45 m/s along each axis and 0.45 rad/s, or Stop."""
         sizes = (30, 30, 225)
         words = [
-            round(self._driving * size * math.sin(self.now * speed + phase)) & 0xFFFF
+            round(self._commanding * size * math.sin(self.now * speed + phase)) & 0xFFFF
             for size, speed, phase in zip(sizes, self._speeds, self._phases, strict=True)
         ]
         self.board.receive(b"\xff\xfe\x01" + b"".join(word.to_bytes(2, "big") for word in words))
 
     @property
-    def _driving(self) -> bool:
+    def _commanding(self) -> bool:
         """A paused board could take a letter in a command for a request."""
         return self.drives and self.board.mode is BoardMode.NOMINAL
 

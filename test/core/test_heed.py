@@ -43,7 +43,7 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(drives: bool
         told += len(session.take_events())
         if data:
             session.hear(data, now)
-            if not session.heed(now):
+            if not session.process(now):
                 nothing_left += 1
                 assert session.take_output(now) == b""
                 assert session.take_events() == []
@@ -61,7 +61,7 @@ def test_data_from_before_a_request_do_not_answer_it() -> None:
     session.take_events()
     session.hear(board.step(), 2.0)
     session.request(Request.START, "asked", 2.0)
-    session.heed(2.0)
+    session.process(2.0)
     assert not any(isinstance(event, RequestDone) for event in session.take_events())
     session.receive(board.step(), 2.01)
     assert RequestDone("asked", True, "running (nominal)") in session.take_events()

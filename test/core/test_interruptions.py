@@ -21,7 +21,7 @@ from omnibot_driver.core.odometry.estimator import Odometry, OdometrySettings
 from omnibot_driver.core.omnibot import DeltaFrame, ImuFrame, OmniBot, OmniBotSettings, encode
 from omnibot_driver.core.omnibot.translation import Translation
 
-# Pauses and restarts
+# InterFrameGaps and restarts
 
 
 @pytest.mark.parametrize("hidden", [False, True])

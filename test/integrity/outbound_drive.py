@@ -46,7 +46,7 @@ class Write:
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class Command:
     """What is wanted of the session at a time; a refusal is an answer like any other."""
 
     at_s: float
@@ -66,7 +66,7 @@ class Scene:
     """
 
     kind: str
-    wishes: tuple[Wish, ...]
+    wishes: tuple[Command, ...]
     ends_s: float
     faults_from_s: float
     still_by_s: float
@@ -165,7 +165,7 @@ class _Rehearsal:
             if not (session.stands and session.fall_silent(now)):
                 break
         stands = session.stands
-        self._writes.append(Write(now, session.farewell(self._scene.on_exit)))
+        self._writes.append(Write(now, session.shutdown_sequence(self._scene.on_exit)))
         if not stands:
             self._writes += self._guards_words(now)
 

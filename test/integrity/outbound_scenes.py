@@ -12,7 +12,7 @@ from functools import partial
 from random import Random
 from typing import Final
 
-from outbound_drive import Scene, Wish
+from outbound_drive import Command, Scene
 from outbound_teller import ANGULAR_SCALE, Shown
 
 from omnibot_driver.core.commands.limits import SpeedLimits
@@ -50,7 +50,7 @@ def _rates(random: Random) -> tuple[float, float, float]:
 
 def driving(
     random: Random, begin_s: float, end_s: float, *, by_wheels: bool = False, rate_hz: float = 0.0
-) -> list[Wish]:
+) -> list[Command]:
     """Somebody commands at a rate of his own, the same thing or another now and then."""
     rate_hz, changes = rate_hz or random.choice(RATES_HZ), random.choice((0.0, 0.1, 0.1, 1.0))
     wishes = []
@@ -60,9 +60,9 @@ def driving(
         if random.random() < changes:
             twist, rates = _twist(random), _rates(random)
         if by_wheels:
-            wishes.append(Wish(now, partial(_turn, rates)))
+            wishes.append(Command(now, partial(_turn, rates)))
         else:
-            wishes.append(Wish(now, partial(_drive, twist)))
+            wishes.append(Command(now, partial(_drive, twist)))
         now += random.uniform(0.8, 1.2) / rate_hz
     return wishes
 
@@ -102,7 +102,7 @@ def _common(random: Random) -> dict[str, object]:
     }
 
 
-def _leg(random: Random) -> tuple[list[Wish], float]:
+def _leg(random: Random) -> tuple[list[Command], float]:
     """A drive, and the time of its last command."""
     wishes = driving(random, FROM_S, FROM_S + random.uniform(0.1, 0.35), by_wheels=_wheels(random))
     return wishes, wishes[-1].at_s
@@ -142,7 +142,7 @@ def zero(random: Random) -> Scene:
     gap_s = 1.0 / random.choice(RATES_HZ)
     until_s, now = last_s + random.uniform(0.0, 0.7), last_s + gap_s
     while now <= until_s + gap_s:
-        wishes.append(Wish(now, _stand))
+        wishes.append(Command(now, _stand))
         now += gap_s
     return Scene(
         kind="zero",
@@ -155,7 +155,7 @@ def zero(random: Random) -> Scene:
 
 def switch(random: Random) -> Scene:
     """cmd_vel and wheel_cmd take turns, with pauses and without."""
-    wishes: list[Wish] = []
+    wishes: list[Command] = []
     now = FROM_S
     for number in range(4):
         end_s = now + random.uniform(0.05, 0.3)
@@ -175,7 +175,7 @@ def pause(random: Random) -> Scene:
     """``~/pause``, while it drives or stands."""
     wishes, last_s = _leg(random) if random.random() < 0.7 else ([], FROM_S)
     asked_s = last_s + random.choice((0.005, 0.03, 0.3))
-    wishes.append(Wish(asked_s, _request(Request.PAUSE)))
+    wishes.append(Command(asked_s, _request(Request.PAUSE)))
     return Scene(
         kind="pause",
         wishes=tuple(wishes),
@@ -187,7 +187,7 @@ def pause(random: Random) -> Scene:
 
 def start(random: Random) -> Scene:
     """``~/start`` of a paused board, a drive, and its end."""
-    wishes = [Wish(FROM_S, _request(Request.START))]
+    wishes = [Command(FROM_S, _request(Request.START))]
     wishes += driving(random, FROM_S + 0.05, FROM_S + random.uniform(0.3, 1.0))
     last_s = wishes[-1].at_s
     return Scene(
@@ -205,7 +205,7 @@ def reset(random: Random) -> Scene:
     """``~/reset`` while it drives; the board comes back and is started."""
     wishes, last_s = _leg(random) if random.random() < 0.8 else ([], FROM_S)
     asked_s = last_s + random.choice((0.005, 0.03, 0.3))
-    wishes.append(Wish(asked_s, _request(Request.RESET)))
+    wishes.append(Command(asked_s, _request(Request.RESET)))
     return Scene(
         kind="reset",
         wishes=tuple(wishes),
@@ -220,7 +220,7 @@ def estop(random: Random) -> Scene:
     begin_s = FROM_S + random.uniform(0.1, 0.3)
     released_s = begin_s + random.uniform(0.35, 0.6)
     wishes = driving(random, FROM_S, released_s - 0.05, by_wheels=_wheels(random))
-    wishes += [Wish(begin_s, _estop(True)), Wish(released_s, _estop(False))]
+    wishes += [Command(begin_s, _estop(True)), Command(released_s, _estop(False))]
     return Scene(
         kind="e-stop",
         wishes=tuple(wishes),
@@ -233,11 +233,11 @@ def estop(random: Random) -> Scene:
 def goal(random: Random) -> Scene:
     """A pose to drive to and another one; neither expires, so the e-stop ends it."""
     wishes = [
-        Wish(at_s, partial(_go, Pose(*(random.uniform(-9, 9) for _ in range(3)))))
+        Command(at_s, partial(_go, Pose(*(random.uniform(-9, 9) for _ in range(3)))))
         for at_s in (FROM_S, FROM_S + random.uniform(0.05, 0.4), FROM_S + 0.4)
     ]
     begin_s = FROM_S + random.uniform(0.5, 0.7)
-    wishes.append(Wish(begin_s, _estop(True)))
+    wishes.append(Command(begin_s, _estop(True)))
     return Scene(
         kind="goal",
         wishes=tuple(wishes),
@@ -253,7 +253,7 @@ def leave(random: Random) -> Scene:
     exits_s = FROM_S + random.uniform(0.1, 0.3)
     wishes = driving(random, FROM_S, exits_s, by_wheels=_wheels(random))
     if random.random() < 0.2:
-        wishes.append(Wish(exits_s - 0.02, _estop(True)))
+        wishes.append(Command(exits_s - 0.02, _estop(True)))
     return Scene(
         kind="exit",
         wishes=tuple(wishes),
@@ -270,7 +270,7 @@ def kill(random: Random) -> Scene:
     wishes, last_s = _leg(random)
     killed_s = last_s + random.choice((0.0002, 0.0007, 0.0012, 0.002, 0.02))
     if random.random() < 0.2:
-        wishes.append(Wish(killed_s - 0.02, _estop(True)))
+        wishes.append(Command(killed_s - 0.02, _estop(True)))
     return Scene(
         kind="kill",
         wishes=tuple(wishes),

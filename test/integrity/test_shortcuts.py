@@ -28,7 +28,7 @@ from omnibot_driver.core.omnibot import (
 )
 from omnibot_driver.core.omnibot.cost_model import NOTHING_KNOWN, Expectation
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics
-from omnibot_driver.core.omnibot.fast_path import Walk, take_calm
+from omnibot_driver.core.omnibot.fast_path import Walk, take_run
 from omnibot_driver.core.omnibot.frames import Frame, decode_measured, measure
 from omnibot_driver.core.omnibot.lower_bound import least_costs
 
@@ -43,13 +43,13 @@ def outcome(chunks: Chunks, *, quick: bool) -> Outcome:
     """What comes out of each call, what is counted, and what has begun."""
     with pytest.MonkeyPatch.context() as patch:
         if not quick:
-            patch.setattr(decoder, "take_calm", lambda _held, at, context, *_: (at, context))
+            patch.setattr(decoder, "take_run", lambda _held, at, context, *_: (at, context))
             patch.setattr(trellis, "least_costs", lambda data: [0.0] * (2 * len(data) + 3))
             patch.setattr(trellis, "STEP", inf)
         tested = FrameDecoder()
         found: Outcome = []
         for data, now in chunks:
-            if quick and (lone := tested.take_lone(data, now)) is not None:
+            if quick and (lone := tested.take_single(data, now)) is not None:
                 frames, skipped = [lone], [0]
             else:
                 frames, skipped = tested.feed(data, now), tested.skipped
@@ -117,7 +117,7 @@ def test_readings_come_out_alike(
         return found
 
     quick = told()
-    monkeypatch.setattr(FrameDecoder, "take_lone", lambda *_: None)
+    monkeypatch.setattr(FrameDecoder, "take_single", lambda *_: None)
     assert quick == told()
 
 
@@ -176,7 +176,7 @@ def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
     expected = [context]
     while at < len(data):
-        at, context = take_calm(data, at, context, expectation, "big", walk)
+        at, context = take_run(data, at, context, expectation, "big", walk)
         if at < len(data):
             end = at + measure(data, at)
             frame = decode_measured(data[at:end])

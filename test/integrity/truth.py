@@ -29,7 +29,7 @@ class Truth:
 
 
 @dataclass(slots=True)
-class Motion:
+class Setpoint:
     """Velocities that chase random targets, as a drive does; all zero for a robot at rest."""
 
     random: Random
@@ -85,7 +85,7 @@ def generate(scenario: Scenario, seed: int, seconds: float) -> Truth:
     random = Random(f"{scenario} {seed}")
     gauss = random.gauss
     bias = [random.uniform(-6, 6) for _ in range(3)]
-    motion = Motion(random, scenario.driving)
+    motion = Setpoint(random, scenario.driving)
     sent = [0, 0, 0]
     delta_seq, pose_seq = random.randrange(256), random.randrange(256)
     truth = Truth()

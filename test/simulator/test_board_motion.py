@@ -99,7 +99,7 @@ def test_an_emergency_stop_that_does_not_latch_ends_with_the_next_motion() -> No
 
 
 def test_a_latching_emergency_stop_ends_with_a_reset_alone() -> None:
-    """Motion, pause and start do not release it, a reset does; refused motion is not logged."""
+    """Setpoint, pause and start do not release it, a reset does; refused motion is not logged."""
     board = SimulatedBoard(BoardSettings(running=True, estop_latches=True))
     board.receive(ESTOP + velocity(35, 0, 0) + b"PS" + velocity(35, 0, 0))
     run(board, 2.0)

@@ -170,7 +170,7 @@ def test_earth_frame_deltas_add_up_to_the_pose() -> None:
 def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
     frame: str, expected: tuple[int, int, int]
 ) -> None:
-    """Driving forward at 0.5 m/s, headed along the earth's y: 20 mm, along y or along x."""
+    """CommandPipeline forward at 0.5 m/s, headed along the earth's y: 20 mm, along y or along x."""
     board = SimulatedBoard(
         BoardSettings(
             running=True,

@@ -27,7 +27,7 @@ def test_the_odometry_matrix_inverts_the_velocity_equations(
 
 
 def test_the_velocity_equations_are_those_of_the_manual() -> None:
-    """Driving along x, along y and turning, each wheel by the manual's signs."""
+    """CommandPipeline along x, along y and turning, each wheel by the manual's signs."""
     c30 = cos(pi / 6)
     assert rims_from_body(1, 0, 0, L) == pytest.approx((-c30, c30, 0))
     assert rims_from_body(0, 1, 0, L) == pytest.approx((-0.5, -0.5, 1))

@@ -6,7 +6,7 @@ Each answer is a sentence, empty when nothing is in the way. Knows modes and pha
 """
 
 from omnibot_driver.core.board import Mode
-from omnibot_driver.core.commands.set_points import Motion
+from omnibot_driver.core.commands.set_points import Setpoint
 from omnibot_driver.core.mode_manager import Phase
 
 
@@ -29,7 +29,9 @@ def why_not_drive(
     return interlock
 
 
-def why_not_calibrate(phase: Phase, mode: Mode, current: Motion | None, *, measuring: bool) -> str:
+def why_not_calibrate(
+    phase: Phase, mode: Mode, current: Setpoint | None, *, measuring: bool
+) -> str:
     """``current``: what is commanded; ``measuring``: a calibration is under way."""
     if phase is Phase.CLOSED:
         return "the port is not open; connect the board, then call again"

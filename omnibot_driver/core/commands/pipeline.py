@@ -13,8 +13,8 @@ from typing import Final
 from omnibot_driver.core.board import Board, DisplacementReading
 from omnibot_driver.core.commands.limits import SpeedLimits, require_timely
 from omnibot_driver.core.commands.motion_interlock import MotionInterlock
-from omnibot_driver.core.commands.set_points import GoalMotion, Motion
-from omnibot_driver.core.commands.shaping import ControlMethod, Helm
+from omnibot_driver.core.commands.set_points import GoalSetpoint, Setpoint
+from omnibot_driver.core.commands.shaping import CommandShaper, ControlMethod
 from omnibot_driver.core.commands.stream import PACE_S, CommandSettings, CommandStream
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.kinematics import BodyTwist
@@ -25,12 +25,12 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
 from omnibot_driver.core.reporting.figures import CommandFigures
 
-Wish = tuple[Motion, float]
+Command = tuple[Setpoint, float]
 """A motion that may be commanded, and when it expires."""
 NEVER: Final = math.inf
 
 
-class Driving:
+class CommandPipeline:
     """``stream`` is what goes out; ``obeys``: whether the robot can be expected to do it;
     ``interlock`` refuses motion after it did not; ``monitored``: whether that is looked after.
     """
@@ -52,7 +52,7 @@ class Driving:
             commands, stop=self._stop, emergency_stop=board.emergency_stop()
         )
         self._odometry = odometry
-        self._helm = Helm(board, odometry, limits, axis_signs, control)
+        self._shaper = CommandShaper(board, odometry, limits, axis_signs, control)
         self.interlock = MotionInterlock()
         self._board, self._axis_signs = board, axis_signs
         self._monitor = MotionMonitor()
@@ -65,11 +65,11 @@ class Driving:
         What was commanded under looser ones ends.
         """
         stricter = commands.timeout_s < self.stream.settings.timeout_s or limits.stricter_than(
-            self._helm.limits
+            self._shaper.limits
         )
-        self._helm.limits, self.stream.settings = limits, commands
+        self._shaper.limits, self.stream.settings = limits, commands
         current = self.stream.current
-        if not stricter or current is None or current.stands or isinstance(current, GoalMotion):
+        if not stricter or current is None or current.stands or isinstance(current, GoalSetpoint):
             return []
         self.stream.halt(now)
         return ["the robot is stopped, as its limits are stricter now: command it anew"]
@@ -98,7 +98,7 @@ class Driving:
         return CommandFigures(
             source=current.authority.value if current else None,
             age_s=now - self.stream.commanded_at,
-            limited=self._helm.limited,
+            limited=self._shaper.limited,
             estop=self.stream.latched,
             monitored=self.monitored or not self._obeys,
             trips=self.interlock.trips,
@@ -115,27 +115,27 @@ class Driving:
         self.stream.release(now)
         self._monitor.release()
 
-    def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Wish:
+    def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
         """Drive the body. Raises CommandRefused, as all wishes do."""
         timeout_s = self.stream.settings.timeout_s
         expires_at = now + timeout_s
         if age_s:
             require_timely("cmd_vel", age_s, timeout_s)
             expires_at -= max(0.0, age_s)
-        motion = self._helm.base(twist, before=self.stream.current, since=now - PACE_S)
+        motion = self._shaper.base(twist, before=self.stream.current, since=now - PACE_S)
         return motion, expires_at
 
-    def wheels(self, rates_radps: Sequence[float], now: float) -> Wish:
+    def wheels(self, rates_radps: Sequence[float], now: float) -> Command:
         """Turn wheels A, B, C."""
-        return self._helm.wheels(rates_radps), now + self.stream.settings.timeout_s
+        return self._shaper.wheels(rates_radps), now + self.stream.settings.timeout_s
 
-    def pose(self, goal: Pose) -> Wish:
+    def pose(self, goal: Pose) -> Command:
         """Drive to a pose in the odometry frame."""
-        return self._helm.pose(goal), NEVER
+        return self._shaper.pose(goal), NEVER
 
     def wrote(self, data: bytes, now: float) -> None:
         """The stream said this."""
-        goal = isinstance(self.stream.current, GoalMotion)
+        goal = isinstance(self.stream.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._board.meaning(data), now)
 
     def look(
@@ -202,7 +202,7 @@ class Driving:
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
         """Drop a goal that is another place by now, or that the robot drives away from."""
         goal = self.stream.current
-        if not isinstance(goal, GoalMotion):
+        if not isinstance(goal, GoalSetpoint):
             return []
         if goal.alignment != self._odometry.alignments:
             why = "odom begins anew"

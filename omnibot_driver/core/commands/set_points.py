@@ -33,7 +33,7 @@ class Authority(Enum):
     POSE = "cmd_pose"
 
 
-class Motion(Protocol):
+class Setpoint(Protocol):
     """One command, current until it expires or another takes its place."""
 
     @property
@@ -58,7 +58,7 @@ class Motion(Protocol):
         """
 
 
-class BaseMotion:
+class BaseSetpoint:
     """A body velocity, approached by the acceleration limits from what was commanded before.
 
     ``encode`` makes a velocity a frame; what it makes ``stop`` of, stands.
@@ -73,7 +73,7 @@ class BaseMotion:
         encode: Callable[[BodyTwist], bytes],
         *,
         stop: bytes,
-        before: Motion | None,
+        before: Setpoint | None,
         since: float,
     ) -> None:
         self._wanted, self._limits, self._encode = wanted, limits, encode
@@ -84,7 +84,7 @@ class BaseMotion:
         """Whether the set-point has arrived."""
         if not self.settled:
             self._setpoint = AT_REST
-            if isinstance(before, BaseMotion):
+            if isinstance(before, BaseSetpoint):
                 self._setpoint = before._setpoint
                 self._reached_at = max(before._reached_at, since)
 
@@ -106,7 +106,7 @@ class BaseMotion:
         self._frame = self._encode(self._setpoint)
 
 
-class SteadyMotion:
+class SteadySetpoint:
     """A command whose frame does not change, unless ``encode`` makes another one of it."""
 
     settled: Final = True
@@ -133,7 +133,7 @@ class SteadyMotion:
             self.stands = self._frame == stop
 
 
-class GoalMotion:
+class GoalSetpoint:
     """A pose to drive to: ``place`` in the odometry frame, as that lay at this ``alignment``.
 
     ``encode`` makes its frame.

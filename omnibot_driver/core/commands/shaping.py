@@ -14,10 +14,10 @@ from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.commands.limits import SpeedLimits, require_finite
 from omnibot_driver.core.commands.set_points import (
     Authority,
-    BaseMotion,
-    GoalMotion,
-    Motion,
-    SteadyMotion,
+    BaseSetpoint,
+    GoalSetpoint,
+    Setpoint,
+    SteadySetpoint,
 )
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.kinematics import BodyTwist
@@ -27,7 +27,7 @@ from omnibot_driver.core.odometry.estimator import Odometry
 ControlMethod = Literal["velocity", "position"]
 
 
-class Helm:
+class CommandShaper:
     """``limits`` may be replaced at any time. Every method raises CommandRefused."""
 
     def __init__(
@@ -45,7 +45,7 @@ class Helm:
         self.limited = 0
         """Wishes that went beyond the limits."""
 
-    def base(self, twist: BodyTwist, *, before: Motion | None, since: float) -> Motion:
+    def base(self, twist: BodyTwist, *, before: Setpoint | None, since: float) -> Setpoint:
         """Drive the body, from what was commanded ``before``."""
         if self._control == "position":
             raise self._at_odds(Authority.BASE)
@@ -55,7 +55,7 @@ class Helm:
             limited = self.limits.twist(twist)
             self.limited += limited != twist
         x, y, yaw = self._axis_signs
-        return BaseMotion(
+        return BaseSetpoint(
             BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps),
             self.limits,
             self._board.velocity,
@@ -64,7 +64,7 @@ class Helm:
             since=since,
         )
 
-    def wheels(self, rates_radps: Sequence[float]) -> Motion:
+    def wheels(self, rates_radps: Sequence[float]) -> Setpoint:
         """Turn the wheels A, B, C."""
         if self._control == "position":
             raise self._at_odds(Authority.WHEELS)
@@ -77,14 +77,14 @@ class Helm:
         limited = self.limits.wheels(rates_radps)
         self.limited += limited != tuple(rates_radps)
         frame = self._board.wheels(limited)
-        return SteadyMotion(
+        return SteadySetpoint(
             Authority.WHEELS,
             frame,
             stands=frame == self._stop,
             encode=partial(self._board.wheels, limited),
         )
 
-    def pose(self, goal: Pose) -> Motion:
+    def pose(self, goal: Pose) -> Setpoint:
         """Drive to a pose in the odometry frame and stay there."""
         if self._control != "position":
             raise self._at_odds(Authority.POSE)
@@ -96,7 +96,7 @@ class Helm:
                 " poses (nominal mode) and `use_board_pose`. After a restart, wait a second"
             )
         encode = partial(self._board.drive_to, place)
-        return GoalMotion(goal, encode, self._odometry.alignments)
+        return GoalSetpoint(goal, encode, self._odometry.alignments)
 
     def _at_odds(self, authority: Authority) -> CommandRefused:
         return CommandRefused(

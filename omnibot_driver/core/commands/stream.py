@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from omnibot_driver.core.commands.set_points import Motion
+from omnibot_driver.core.commands.set_points import Setpoint
 from omnibot_driver.core.commands.stop_proof import StopProof
 
 PACE_S: Final = 0.01
@@ -42,7 +42,7 @@ class CommandStream:
         self.settings = settings
         self.latched = False
         self.proof = StopProof()
-        self.current: Motion | None = None
+        self.current: Setpoint | None = None
         """The command that is being carried out."""
         self.commanded_at = -math.inf
         self.quiet = False
@@ -55,7 +55,7 @@ class CommandStream:
         self._urgent = self._fresh = self._switching = False
         self._said_at = self._fresh_at = self._moved_at = self._stop_at = -math.inf
 
-    def command(self, motion: Motion, now: float, *, expires_at: float) -> None:
+    def command(self, motion: Setpoint, now: float, *, expires_at: float) -> None:
         """The newest command replaces the current one; another authority's is stopped first."""
         before, self.current = self.current, motion
         self.commanded_at, self._expires_at = now, expires_at

@@ -70,7 +70,7 @@ class Pose:
         return BodyTwist(self.x_m / duration_s, self.y_m / duration_s, self.yaw_rad / duration_s)
 
 
-def unroll(chord: Pose) -> Pose:
+def log_of(chord: Pose) -> Pose:
     """The constant twist times duration (the SE(2) logarithm) whose result is this displacement."""
     half = chord.yaw_rad / 2
     if not half:

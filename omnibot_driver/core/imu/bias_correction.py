@@ -28,7 +28,7 @@ class ImuEstimate:
     angular_velocity: Vector3
 
 
-class Inertial:
+class BiasCorrector:
     """``calibration`` is for whoever asks for one."""
 
     def __init__(self, board: Board, correction: ImuCorrection) -> None:

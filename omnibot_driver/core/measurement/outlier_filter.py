@@ -70,15 +70,15 @@ class Refused:
     poses: int
 
 
-class Plausibility:
+class OutlierFilter:
     """``limits`` may be replaced at any time; ``tick_s`` is the time between two ImuReadings."""
 
     def __init__(self, limits: MotionLimits, tick_s: float) -> None:
         self.limits = limits
         self.refused_imu = self.refused_displacements = 0
         self._tick_s = tick_s
-        self._imu_leaps = _Leaps(STILL, knocked=3)
-        self._motion_leaps = _Leaps(BACK, knocked=0)
+        self._imu_leaps = _Spikes(STILL, knocked=3)
+        self._motion_leaps = _Spikes(BACK, knocked=0)
         self._held_imu: list[tuple[ImuReading, float]] = []
         self._held_motion: list[Stamped] = []
         """A displacement that leaps, and the poses after it."""
@@ -188,7 +188,7 @@ class Plausibility:
         return made_good
 
 
-class _Leaps:
+class _Spikes:
     """Finds single leaps in a row of values, each in units of what it may change by at once.
 
     ``left``: what may be left of a leap that is over, as a part of it; ``knocked``: so many of the

@@ -4,7 +4,7 @@
 
 Composes the board's clock, plausibility, odometry and the IMU. Knows no commands and no modes.
 Readings of the IMU are measured with the read that brings them (``hear``), so that nobody waits for
-what else is made of it (``digest``).
+what else is made of it (``flush``).
 """
 
 from collections.abc import Sequence
@@ -17,14 +17,14 @@ from omnibot_driver.core.board import (
     Reading,
 )
 from omnibot_driver.core.geometry.se2 import Signs
-from omnibot_driver.core.imu.bias_correction import ImuCorrection, ImuEstimate, Inertial
+from omnibot_driver.core.imu.bias_correction import BiasCorrector, ImuCorrection, ImuEstimate
 from omnibot_driver.core.measurement.outlier_filter import (
     MotionLimits,
-    Plausibility,
+    OutlierFilter,
     Refused,
     Stamped,
 )
-from omnibot_driver.core.measurement.statistics import Tally
+from omnibot_driver.core.measurement.statistics import StreamStatistics
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
 from omnibot_driver.core.timing.device_clock import DeviceClock
 
@@ -33,7 +33,7 @@ Measured = tuple[Reading, Sequence[Estimate]]
 """A reading that is sure, and what came of it."""
 
 
-class Measuring:
+class MeasurementPipeline:
     """Everything between what a board says and what is told of it."""
 
     def __init__(
@@ -45,28 +45,28 @@ class Measuring:
         axis_signs: Signs,
     ) -> None:
         self.odometry = Odometry(odometry, axis_signs)
-        self.inertial = Inertial(board, imu)
-        self._tally = Tally()
+        self.inertial = BiasCorrector(board, imu)
+        self._tally = StreamStatistics()
         self._board = board
         self._clock = DeviceClock(board.tick_s)
-        self._plausibility = Plausibility(motion, board.tick_s)
+        self._outliers = OutlierFilter(motion, board.tick_s)
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
         """Of each read the readings, and how old the newest was."""
         self.undigested: list[Stamped] = []
-        """What is heard, but for ``digest``."""
+        """What is heard, but for ``flush``."""
 
     def configure(
         self, odometry: OdometrySettings, motion: MotionLimits, imu: ImuCorrection
     ) -> None:
         """New settings, from the next reading on."""
         self.odometry.configure(odometry)
-        self._plausibility.limits = motion
+        self._outliers.limits = motion
         self.inertial.configure(imu)
 
     @property
     def refused(self) -> Refused:
         """What the wire said and nobody was told."""
-        checked = self._plausibility
+        checked = self._outliers
         return Refused(
             checked.refused_imu, checked.refused_displacements, self.odometry.refused_poses
         )
@@ -74,7 +74,7 @@ class Measuring:
     @property
     def refused_displacements(self) -> int:
         """Of these, those that no robot can have made."""
-        return self._plausibility.refused_displacements
+        return self._outliers.refused_displacements
 
     @property
     def skew_ppm(self) -> float:
@@ -86,7 +86,7 @@ class Measuring:
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
-        """What is sure of the IMU by these, which came in at ``now``; the rest is for ``digest``.
+        """What is sure of the IMU by these, which came in at ``now``; the rest is for ``flush``.
 
         A reading does not overtake one of another kind.
         """
@@ -96,7 +96,7 @@ class Measuring:
             stamp_s = None if self.undigested else self._clock.stamp(alone, now, edge)
             if stamp_s is not None:
                 self._uncounted.append((readings, now - stamp_s))
-                for sure, at_s in self._plausibility.admit_imu(alone, stamp_s):
+                for sure, at_s in self._outliers.admit_imu(alone, stamp_s):
                     estimates.append(self.inertial.estimate(sure, at_s))
                 return estimates
         stamps_s = self._clock.stamps(readings, now, edge)
@@ -104,32 +104,32 @@ class Measuring:
             if self.undigested or not isinstance(reading, ImuReading):
                 self.undigested.append((reading, stamp_s))
                 continue
-            for sure, at_s in self._plausibility.admit_imu(reading, stamp_s):
+            for sure, at_s in self._outliers.admit_imu(reading, stamp_s):
                 estimates.append(self.inertial.estimate(sure, at_s))
         if readings:
             self._uncounted.append((readings, now - stamps_s[-1]))
         return estimates
 
     @property
-    def tally(self) -> Tally:
+    def tally(self) -> StreamStatistics:
         """Of all that was heard so far."""
         for readings, delay_s in self._uncounted:
             self._tally.read(readings, delay_s)
         self._uncounted.clear()
         return self._tally
 
-    def digest(self) -> list[Measured]:
+    def flush(self) -> list[Measured]:
         """What else is sure of all that was heard."""
         measured: list[Measured] = []
         for reading, stamp_s in self.undigested:
-            for sure, at_s in self._plausibility.admit(reading, stamp_s):
+            for sure, at_s in self._outliers.admit(reading, stamp_s):
                 measured.append((sure, self._estimates(sure, at_s)))
         self.undigested.clear()
         return measured
 
     def release(self) -> list[Measured]:
         """What waited for readings that will not come."""
-        measured, released = self.digest(), self._plausibility.release()
+        measured, released = self.flush(), self._outliers.release()
         return measured + [(sure, self._estimates(sure, at_s)) for sure, at_s in released]
 
     def _estimates(self, reading: Reading, stamp_s: float) -> Sequence[Estimate]:

@@ -17,7 +17,7 @@ from omnibot_driver.core.board import (
 
 
 @dataclass(slots=True)
-class Tally:
+class StreamStatistics:
     """Since the driver began; nothing but ``last_gap`` and the two of the sensor ever shrinks."""
 
     imu: int = 0

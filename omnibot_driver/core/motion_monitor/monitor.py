@@ -15,7 +15,7 @@ from omnibot_driver.core.motion_monitor.envelope import dot, speed_of
 from omnibot_driver.core.motion_monitor.following_error import FollowingError
 from omnibot_driver.core.motion_monitor.set_point_history import (
     AT_REST,
-    Setpoint,
+    CommandedTwist,
     SetpointHistory,
     Velocity,
 )
@@ -97,7 +97,7 @@ class MotionMonitor:
         self._has_stood = False
         self._stood_s = self._moved_s = self._blocked_s = self._stop_again_s = 0.0
 
-    def set_point(self, setpoint: Setpoint, now: float) -> None:
+    def set_point(self, setpoint: CommandedTwist, now: float) -> None:
         """This is commanded from now on; None: a goal, the way to which is the board's own."""
         if setpoint is self._history.current:
             return

@@ -13,7 +13,7 @@ from typing import Final
 
 from omnibot_driver.core.geometry.kinematics import BodyTwist
 
-Setpoint = BodyTwist | None
+CommandedTwist = BodyTwist | None
 """A body velocity that was commanded; None: any motion is possible."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
@@ -40,11 +40,11 @@ class SetpointHistory:
 
     def clear(self) -> None:
         """Nothing is known of what was commanded before."""
-        self.current: Setpoint = None
+        self.current: CommandedTwist = None
         self._entries: deque[tuple[float, BodyTwist]] = deque()
         self._known_from_s = math.inf
 
-    def add(self, setpoint: Setpoint, at_s: float) -> None:
+    def add(self, setpoint: CommandedTwist, at_s: float) -> None:
         """``setpoint`` holds from this time on; at rest it is ``AT_REST`` itself."""
         before, self.current = self.current, setpoint
         if setpoint is None:

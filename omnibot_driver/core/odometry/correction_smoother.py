@@ -13,7 +13,7 @@ SPREAD_S: Final = 0.2
 """Time over which a correction is spread: that from one pose of the board to the next."""
 
 
-class Follower:
+class CorrectionSmoother:
     """``pose`` follows ``target``. What the robot could have moved and did not is room for it."""
 
     def __init__(self) -> None:

@@ -14,12 +14,12 @@ from typing import Final
 
 from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.geometry.kinematics import BodyTwist
-from omnibot_driver.core.geometry.se2 import Pose, Signs, roll, unroll
+from omnibot_driver.core.geometry.se2 import Pose, Signs, log_of, roll
 from omnibot_driver.core.odometry.covariance import NOTHING, Covariance, OdometryNoise
-from omnibot_driver.core.odometry.gap_interpolation import Bridge
-from omnibot_driver.core.odometry.pending_displacements import Backlog, advanced
-from omnibot_driver.core.odometry.pose_gate import Belief, expected
-from omnibot_driver.core.odometry.pose_tracker import Track
+from omnibot_driver.core.odometry.gap_interpolation import GapInterpolation
+from omnibot_driver.core.odometry.pending_displacements import PendingDisplacements, advanced
+from omnibot_driver.core.odometry.pose_gate import PoseGate, expected
+from omnibot_driver.core.odometry.pose_tracker import PoseTracker
 from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0
@@ -78,13 +78,13 @@ class Odometry:
         """True once a board sent no pose and its heading had to be taken for 0."""
         self.alignments = 0
         """How often the odometry frame has come to lie otherwise in the board's."""
-        self._track = Track(axis_signs)
+        self._track = PoseTracker(axis_signs)
         self.configure(settings)
         self._board: Pose | None = None
-        self._belief = Belief()
+        self._belief = PoseGate()
         self._restarted: Pose | None = None
-        self._backlog = Backlog()
-        self._bridge = Bridge()
+        self._backlog = PendingDisplacements()
+        self._bridge = GapInterpolation()
         self._last_stamp_s: float | None = None
         self.reset()
 
@@ -110,7 +110,7 @@ class Odometry:
             due = self._release()
             if self._track.uncertainty.gap != NOTHING:
                 self._belief.proved = None  # what the next pose corrects was before the reset
-        self._backlog = Backlog()
+        self._backlog = PendingDisplacements()
         self._track.begin()
         return due
 
@@ -119,7 +119,7 @@ class Odometry:
         estimates = []
         if reading.restarted:
             estimates = self._release() if self._board is not None else []
-            self._backlog = Backlog()
+            self._backlog = PendingDisplacements()
             self._restarted, self._belief.doubted = Pose(), None
         if self._restarted is not None:
             self._restarted = advanced(self._restarted, reading)
@@ -212,7 +212,7 @@ class Odometry:
         """The pose tells what was lost before the displacements that wait."""
         assert self._board is not None
         seconds = self._backlog.unstamped_s(self._last_stamp_s)
-        way = unroll(self._board.way_to(self._backlog.before(told)))
+        way = log_of(self._board.way_to(self._backlog.before(told)))
         self._board = self._board.moved(roll(way))
         self._track.resume(way)
         self._move(Pose(), seconds, seconds)
@@ -244,7 +244,7 @@ class Odometry:
             self._belief.doubted = told
             return
         if reachable:
-            self._track.correct(unroll(way))
+            self._track.correct(log_of(way))
         else:
             self.alignments += 1
             self._track.uncertainty.give_up()
@@ -256,7 +256,7 @@ class Odometry:
         settings = self._settings
         return self._belief.reachable(told, waited_s, settings.fastest_mps, settings.fastest_radps)
 
-    # Motion
+    # Setpoint
 
     def _release(self) -> list[OdometryEstimate]:
         return [self._integrate(reading, stamp_s) for reading, stamp_s in self._backlog.take()]

@@ -9,7 +9,7 @@ import math
 from typing import Final
 
 from omnibot_driver.core.board import DisplacementReading
-from omnibot_driver.core.geometry.se2 import Pose, unroll
+from omnibot_driver.core.geometry.se2 import Pose, log_of
 from omnibot_driver.core.odometry.pending_displacements import chord
 
 LONGEST_BRIDGE_S: Final = 2.0
@@ -17,7 +17,7 @@ LONGEST_BRIDGE_S: Final = 2.0
 NO_WAY: Final = Pose()
 
 
-class Bridge:
+class GapInterpolation:
     """``last``: the newest tangent in the board's body axes, and the time that it took in s; None
     where that is not known.
     """
@@ -53,4 +53,4 @@ def _tangent(reading: DisplacementReading, heading_rad: float | None) -> Pose:
         return chord(reading)
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
     dx_m, dy_m = reading.dx_m, reading.dy_m
-    return unroll(Pose(cos * dx_m + sin * dy_m, cos * dy_m - sin * dx_m, reading.dyaw_rad))
+    return log_of(Pose(cos * dx_m + sin * dy_m, cos * dy_m - sin * dx_m, reading.dyaw_rad))

@@ -11,7 +11,7 @@ from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.geometry.se2 import Pose, roll
 
 
-class Backlog:
+class PendingDisplacements:
     """In the order in which they came, each with its stamp."""
 
     def __init__(self) -> None:

@@ -23,7 +23,7 @@ FARTHEST_RAD: Final = 1e5
 """Beyond 100 km or 16,000 turns a pose is other bytes misread."""
 
 
-class Belief:
+class PoseGate:
     """``doubted`` is the last surprise, moved on with the robot since."""
 
     def __init__(self) -> None:

@@ -10,8 +10,8 @@ which of the board's words to believe.
 from typing import Final
 
 from omnibot_driver.core.geometry.kinematics import BodyTwist
-from omnibot_driver.core.geometry.se2 import Pose, Signs, roll, unroll
-from omnibot_driver.core.odometry.correction_smoother import Follower
+from omnibot_driver.core.geometry.se2 import Pose, Signs, log_of, roll
+from omnibot_driver.core.odometry.correction_smoother import CorrectionSmoother
 from omnibot_driver.core.odometry.covariance import NOTHING, OdometryNoise, Uncertainty
 
 Factors = tuple[float, float, float]
@@ -19,14 +19,14 @@ Factors = tuple[float, float, float]
 AS_TOLD: Final[Factors] = (1.0, 1.0, 1.0)
 
 
-class Track:
+class PoseTracker:
     """``axis_signs`` turn x, y and yaw of the board's body axes into REP-103's."""
 
     def __init__(self, axis_signs: Signs) -> None:
         self.rolled = Pose()
         """All motion since the driver began, as one tangent in the board's axes, of true size."""
         self._axis_signs = axis_signs
-        self.follower, self.uncertainty = Follower(), Uncertainty(OdometryNoise())
+        self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(OdometryNoise())
 
     def configure(
         self, noise: OdometryNoise, *, scale: tuple[float, float], fastest: tuple[float, float]
@@ -41,7 +41,7 @@ class Track:
 
     def begin(self) -> None:
         """The odometry frame begins where the robot stands."""
-        self.follower, self.uncertainty = Follower(), Uncertainty(self.uncertainty.noise)
+        self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(self.uncertainty.noise)
 
     def rates(self, tangent: Pose, seconds: float) -> tuple[BodyTwist, BodyTwist]:
         """Of this motion in this time: in REP-103's axes, and in the board's."""
@@ -53,7 +53,7 @@ class Track:
     def way_to(self, place: Pose) -> Pose:
         """The tangent that leads there from where the robot is, by the shorter turn."""
         x, y, yaw = self._signed_size
-        return unroll(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
+        return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
 
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Along a tangent, and no further than by the stamps it can be."""

@@ -10,7 +10,7 @@ it. What the board says is told in ``translation``.
 
 from typing import Final
 
-from omnibot_driver.core.board import BoardFigures, Edge, Mode, Reading, Vector3
+from omnibot_driver.core.board import BoardFigures, Mode, Reading, SampleBoundary, Vector3
 from omnibot_driver.core.commands.limits import MAX_WORD, slow, to_nearest
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
@@ -54,7 +54,7 @@ class OmniBot:
     def settings(self, settings: OmniBotSettings) -> None:
         self._settings = self._translation.settings = settings
         byte_s = 10 / settings.baudrate
-        self._nothing_begun = Edge(0, 0.0, (frames.IMU_LENGTH - 1) * byte_s)
+        self._nothing_begun = SampleBoundary(0, 0.0, (frames.IMU_LENGTH - 1) * byte_s)
 
     def connect(self) -> None:
         """A new line: a new decoder, and no belief but in the board's counters."""
@@ -79,7 +79,7 @@ class OmniBot:
         return TICK_S
 
     @property
-    def edge(self) -> Edge | None:
+    def edge(self) -> SampleBoundary | None:
         """By the IMU frame in hand, whole or begun, and the bytes after it."""
         if self._decoder.at_rest:
             return self._nothing_begun
@@ -91,10 +91,10 @@ class OmniBot:
         if begun[:2] == frames.IMU_HEADER:
             ahead, after = 1, len(begun) - frames.IMU_LENGTH
             if after < 0:
-                return Edge(1, -after * byte_s, (-after - 1) * byte_s, cut=True)
+                return SampleBoundary(1, -after * byte_s, (-after - 1) * byte_s, cut=True)
         elif not self._decoder.fresh:
             return None
-        return Edge(ahead, 0.0, (frames.IMU_LENGTH - 1 - after) * byte_s)
+        return SampleBoundary(ahead, 0.0, (frames.IMU_LENGTH - 1 - after) * byte_s)
 
     @property
     def figures(self) -> BoardFigures:
@@ -117,7 +117,7 @@ class OmniBot:
 
     def receive(self, data: bytes, now: float) -> list[Reading]:
         """The readings that these bytes complete, in the order of the line."""
-        if self._translation.lone_to_come and (frame := self._decoder.take_lone(data, now)):
+        if self._translation.lone_to_come and (frame := self._decoder.take_single(data, now)):
             return [self._translation.lone(frame, now)]
         found = self._decoder.feed(data, now)
         return self._translation.readings(found, self._decoder.skipped, now)

@@ -23,7 +23,7 @@ from typing import Final
 
 from omnibot_driver.core.omnibot import cost_model
 from omnibot_driver.core.omnibot.cost_model import NOTHING_KNOWN, Context, Expectation
-from omnibot_driver.core.omnibot.fast_path import Walk, goes_on, take_calm, take_lone
+from omnibot_driver.core.omnibot.fast_path import Walk, goes_on, take_run, take_single
 from omnibot_driver.core.omnibot.frames import (
     IMU_LENGTH,
     INCOMPLETE,
@@ -35,10 +35,10 @@ from omnibot_driver.core.omnibot.frames import (
     decode_measured,
     measure,
 )
-from omnibot_driver.core.omnibot.gaps import BYTE_S, LATE_S, TICK_BYTES, Pauses
+from omnibot_driver.core.omnibot.gaps import BYTE_S, LATE_S, TICK_BYTES, InterFrameGaps
 from omnibot_driver.core.omnibot.late_reads import IDLE_S
 from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
-from omnibot_driver.core.omnibot.trellis import Piece, read
+from omnibot_driver.core.omnibot.trellis import Segment, read
 
 SPOKEN_AGAINST: Final = 3.0
 """A content of this cost waits for what follows."""
@@ -79,7 +79,7 @@ class FrameDecoder:
         self._context = NOTHING_KNOWN
         self._held = bytearray()
         self._in_step = False
-        self._pauses = Pauses(byte_s)
+        self._pauses = InterFrameGaps(byte_s)
         self._last_arrival_s = -math.inf
 
     def feed(self, data: bytes, now: float) -> list[Frame]:
@@ -104,7 +104,7 @@ class FrameDecoder:
         self.at_rest = pauses.sharp and pauses.between and self._in_step and not self._held
         return found
 
-    def take_lone(self, data: bytes, now: float) -> ImuFrame | None:
+    def take_single(self, data: bytes, now: float) -> ImuFrame | None:
         """``feed`` for what comes most often: one IMU frame by itself, when a frame is due.
 
         None, and nothing is changed, where anything at all is to be considered.
@@ -112,7 +112,7 @@ class FrameDecoder:
         pause_s = now - self._last_arrival_s
         if not self.at_rest or len(data) != IMU_LENGTH or pause_s > LATE_S:
             return None
-        taken = take_lone(data, self._context, self._expectation)
+        taken = take_single(data, self._context, self._expectation)
         if taken is None:
             return None
         self._last_arrival_s = now
@@ -158,7 +158,7 @@ class FrameDecoder:
         if pause_s > LATE_S or len(data) > TICK_BYTES:
             return False
         walk, order = Walk(self._context), self._pose_byte_order
-        end, context = take_calm(data, 0, self._context, self._expectation, order, walk)
+        end, context = take_run(data, 0, self._context, self._expectation, order, walk)
         if end < len(data):
             return False
         self._take(walk, len(walk.frames), context, found)
@@ -187,7 +187,7 @@ class FrameDecoder:
         while at < size:
             paused = gaps and gaps[-1].first > at  # within what follows
             if not paused:
-                at, context = take_calm(held, at, context, expectation, order, walk)
+                at, context = take_run(held, at, context, expectation, order, walk)
                 if at == size:
                     break
             length = measure(held, at)
@@ -272,8 +272,8 @@ class FrameDecoder:
         return at > 0
 
     def _settled(
-        self, pieces: list[Piece], size: int, until: int, closed: bool
-    ) -> Iterator[tuple[Piece, bool]]:
+        self, pieces: list[Segment], size: int, until: int, closed: bool
+    ) -> Iterator[tuple[Segment, bool]]:
         """The first pieces, as far as no more will be learnt about them, and whether to take them.
 
         What ends before ``until`` has waited long enough.

@@ -90,10 +90,10 @@ class Walk:
         return context
 
 
-def take_lone(
+def take_single(
     data: bytes, context: Context, expectation: Expectation
 ) -> tuple[ImuFrame, Context] | None:
-    """``take_calm`` where one IMU frame is all there is: the frame, and what is known then.
+    """``take_run`` where one IMU frame is all there is: the frame, and what is known then.
 
     It came as a whole, so its last byte is its own.
     """
@@ -134,7 +134,7 @@ def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     return at == len(held) or measure(held, at) != NO_FRAME
 
 
-def take_calm(
+def take_run(
     held: bytes | bytearray,
     at: int,
     context: Context,

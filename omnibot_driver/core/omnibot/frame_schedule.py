@@ -43,7 +43,7 @@ def _nominal(imus_per_delta: int, deltas_per_pose: int) -> Cycle:
     return Cycle(*delta_period * deltas_per_pose, PoseFrame)
 
 
-class Rhythm:
+class FrameSchedule:
     """Where in its cycle a board is; one for each stretch in which it runs."""
 
     def __init__(self, schedule: Schedule = USUAL) -> None:

@@ -28,7 +28,7 @@ PAUSES_TO_TRUST: Final = 16
 """So many pauses that stood where they should, and they are taken for the line's own."""
 
 
-class Pauses:
+class InterFrameGaps:
     """``gaps``: those within the bytes held.
 
     ``sharp``: as a rule, the first byte that comes after a pause begins a frame; ``between``: as a

@@ -37,7 +37,7 @@ _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "b
 _OTHER_FRAME: Final[dict[str, Literal["earth", "body"]]] = {"earth": "body", "body": "earth"}
 
 
-class Suspicion:
+class MisconfigurationChecks:
     """``advice``: a sentence for the user, once there is reason for it."""
 
     def __init__(self, schedule: Schedule = USUAL) -> None:

@@ -18,7 +18,7 @@ from omnibot_driver.core.board import (
     Vector3,
 )
 from omnibot_driver.core.geometry.kinematics import OmniKinematics
-from omnibot_driver.core.omnibot.frame_schedule import LENGTH, Rhythm
+from omnibot_driver.core.omnibot.frame_schedule import LENGTH, FrameSchedule
 from omnibot_driver.core.omnibot.frames import (
     DeltaFrame,
     Frame,
@@ -27,7 +27,7 @@ from omnibot_driver.core.omnibot.frames import (
     PoseFrame,
     Words,
 )
-from omnibot_driver.core.omnibot.misconfiguration import Suspicion
+from omnibot_driver.core.omnibot.misconfiguration import MisconfigurationChecks
 from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
 from omnibot_driver.core.omnibot.schedule import Schedule
 from omnibot_driver.core.omnibot.sequence import Sequence
@@ -48,14 +48,14 @@ class Translation:
     def __init__(self, settings: OmniBotSettings) -> None:
         self.settings = settings
         self._schedule = Schedule(settings.delta_period_s)
-        self.suspicion = Suspicion(self._schedule)
+        self.suspicion = MisconfigurationChecks(self._schedule)
         self._sequence = Sequence(self._schedule)
         self.connect()
 
     def connect(self) -> None:
         """A new line: no belief but in the board's counters."""
         self.modes = ModeTracker(self._schedule)
-        self._rhythm = Rhythm(self._schedule)
+        self._rhythm = FrameSchedule(self._schedule)
         self._sequence.reconnect()
         self._paused_count: int | None = None
         self._imus = 0
@@ -132,7 +132,7 @@ class Translation:
             case PausedFrame(count):
                 self._paused_count = count
                 self._sequence.pause()
-                self._rhythm = Rhythm(self._schedule)
+                self._rhythm = FrameSchedule(self._schedule)
                 continues = paused_count is not None and count == (paused_count + 1) % 256
                 return PausedReading(continues)
 

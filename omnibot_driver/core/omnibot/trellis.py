@@ -28,7 +28,7 @@ from omnibot_driver.core.omnibot.frames import (
     decode_measured,
     measure,
 )
-from omnibot_driver.core.omnibot.gaps import Pauses
+from omnibot_driver.core.omnibot.gaps import InterFrameGaps
 from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
@@ -70,7 +70,7 @@ _BEGINNINGS: Final = (_HEADER, _TEXT)
 
 
 @value(frozen=True, slots=True)
-class Piece:
+class Segment:
     """A whole frame of the best reading; ``sure``: any other reading of it is clearly dearer."""
 
     start: int
@@ -89,12 +89,12 @@ def read(
     data: bytes,
     context: Context,
     expectation: Expectation,
-    pauses: Pauses,
+    pauses: InterFrameGaps,
     pose_byte_order: ByteOrder,
     *,
     in_step: bool,
     closed: bool,
-) -> list[Piece]:
+) -> list[Segment]:
     """The whole frames of the best reading of ``data``.
 
     ``in_step``: a frame ended right before; ``closed``: nothing follows, ever.
@@ -110,7 +110,7 @@ class _Search:
         data: bytes,
         context: Context,
         expectation: Expectation,
-        pauses: Pauses,
+        pauses: InterFrameGaps,
         pose_byte_order: ByteOrder,
     ) -> None:
         self._data = data
@@ -260,7 +260,7 @@ class _Search:
         self._contexts[node] = found = found.damaged() if damaged else found
         return found
 
-    def pieces(self) -> list[Piece]:
+    def pieces(self) -> list[Segment]:
         """Walk the best path back, then ask every edge what the best path through it costs."""
         cost = self._cost
         path: list[_Edge] = []
@@ -286,7 +286,7 @@ class _Search:
                 for number in range(bisect_left(starts, start >> 1), bisect_left(starts, end >> 1)):
                     sure[number] = sure[number] and path[number] is edge
         return [
-            Piece(start >> 1, end >> 1, frame, self._context(start), after, is_sure)
+            Segment(start >> 1, end >> 1, frame, self._context(start), after, is_sure)
             for (start, end, _, frame, after), is_sure in zip(path, sure, strict=True)
             if frame is not None and after is not None
         ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from omnibot_driver.core.board import BoardFigures, Vector3
 from omnibot_driver.core.measurement.outlier_filter import Refused
-from omnibot_driver.core.measurement.statistics import Tally
+from omnibot_driver.core.measurement.statistics import StreamStatistics
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +62,7 @@ class SessionFigures:
     """``skew_ppm``: how much faster the board's clock runs than ours."""
 
     state: str
-    tally: Tally
+    tally: StreamStatistics
     board: BoardFigures
     refused: Refused
     skew_ppm: float

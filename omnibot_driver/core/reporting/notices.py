@@ -32,7 +32,7 @@ STOP_UNHEEDED: Final = (
 )
 
 
-class News:
+class ThrottledNotice:
     """What a count has grown by since that was last told."""
 
     def __init__(self) -> None:
@@ -47,11 +47,11 @@ class News:
         return new
 
 
-class Bulletin:
+class Notices:
     """The sentences that are due."""
 
     def __init__(self) -> None:
-        self._lost, self._refused = News(), News()
+        self._lost, self._refused = ThrottledNotice(), ThrottledNotice()
         self._overruns = 0
         self._told: set[str] = set()
         self._standing = ""

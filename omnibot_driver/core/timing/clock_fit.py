@@ -47,7 +47,7 @@ Point = tuple[int, float]
 """A tick, and a time that bounds it."""
 
 
-class TickLine:
+class ClockFit:
     """The line over the ticks from the first one seen on. ``period_s``: the nominal one."""
 
     def __init__(self, period_s: float, first: Point) -> None:

@@ -10,7 +10,7 @@ told of is told exactly by the counter that displacements carry; until the next 
 any, by arrival: a read takes all that has come, so the newest tick in it is hardly older than one
 period, and never from the future.
 
-*When was it?* ``TickLine`` lays a line under the arrivals. What stays in the stamps is the least
+*When was it?* ``ClockFit`` lays a line under the arrivals. What stays in the stamps is the least
 delay that ever happens: one constant.
 
 This module knows readings and times. It reads no clock and knows no board's bytes.
@@ -21,8 +21,14 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
-from omnibot_driver.core.board import DisplacementReading, Edge, ImuReading, PoseReading, Reading
-from omnibot_driver.core.timing.clock_fit import Point, TickLine
+from omnibot_driver.core.board import (
+    DisplacementReading,
+    ImuReading,
+    PoseReading,
+    Reading,
+    SampleBoundary,
+)
+from omnibot_driver.core.timing.clock_fit import ClockFit, Point
 
 LARGEST_LOSS_TICKS: Final = 25
 """If more are missing that no counter has told, then nothing that was known holds any more."""
@@ -36,7 +42,7 @@ LARGEST_RISE: Final = 0.02
 SMALLEST_STEP_S: Final = 1e-6
 """Between two stamps for which even their arrivals leave no room."""
 
-WHOLE: Final = Edge(ahead=0, latest_s=0.0, earliest_s=0.0)
+WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
 """A read that ended with a whole sample."""
 
 
@@ -58,10 +64,10 @@ class DeviceClock:
         self._stamped_tick: int | None = None
         self._displaced_tick: int | None = None
         self._displacement_ticks = 0
-        self._line: TickLine | None = None
+        self._line: ClockFit | None = None
         self._seen_tick: int | None = None
         self._settled = False
-        self._calm: TickLine | None = None
+        self._calm: ClockFit | None = None
         """The line, if the last read was near it and cut no sample."""
         self._single_reads = 0
         """The last so many brought one sample each, so none waited for another."""
@@ -80,7 +86,7 @@ class DeviceClock:
         return 0.0 if line is None else 1e6 * (self._period_s / line.slope_s - 1.0)
 
     def stamps(
-        self, readings: Sequence[Reading], now: float, edge: Edge | None = WHOLE
+        self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None = WHOLE
     ) -> list[float]:
         """When each of these readings, all that one read at ``now`` completed, was sampled.
 
@@ -92,7 +98,7 @@ class DeviceClock:
             stamp_s = self._due(ticks[0], now, edge, len(ticks))
             if stamp_s is not None:
                 return [stamp_s] * len(ticks)
-        line = self._line = self._line or TickLine(self._period_s, (self._tick, now))
+        line = self._line = self._line or ClockFit(self._period_s, (self._tick, now))
         if readings and self._cut_off:
             if isinstance(readings[0], ImuReading) and not readings[0].lost:
                 line.not_before(self._cut_off)
@@ -116,7 +122,7 @@ class DeviceClock:
             stamps.append(self._stamp_s)
         return stamps
 
-    def stamp(self, reading: ImuReading, now: float, edge: Edge | None) -> float | None:
+    def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
         """``stamps`` of one that came alone, when due; None, and nothing is changed, otherwise."""
         if reading.lost:
             return None
@@ -125,7 +131,9 @@ class DeviceClock:
             self._tick += 1
         return stamp_s
 
-    def _due(self, tick: int, now: float, edge: Edge | None, readings: int) -> float | None:
+    def _due(
+        self, tick: int, now: float, edge: SampleBoundary | None, readings: int
+    ) -> float | None:
         """The stamp of one new tick that came as a whole, when it was due; None if it did not."""
         line = self._calm
         if line is None or edge is None or edge.ahead or edge.cut or tick == self._seen_tick:
@@ -163,7 +171,7 @@ class DeviceClock:
         passed = self._displacement_ticks * (reading.lost + 1)
         return self._displaced_tick + passed - self._tick
 
-    def _compare(self, line: TickLine, edge: Edge, now: float, *, counted: bool) -> int:
+    def _compare(self, line: ClockFit, edge: SampleBoundary, now: float, *, counted: bool) -> int:
         """Hold the newest tick against its arrival; by how many the count was found to be short.
 
         ``counted``: a counter told this tick.
@@ -192,7 +200,7 @@ class DeviceClock:
                 lags_s.clear()
         if short > LARGEST_LOSS_TICKS:
             self.restart()
-            line = self._line = TickLine(period_s, (tick, arrival))
+            line = self._line = ClockFit(period_s, (tick, arrival))
             short, lag_s = 0, 0.0
         elif short:
             self._tick += short
@@ -210,7 +218,7 @@ class DeviceClock:
         self._calm = line if is_calm else None
         return short
 
-    def _see(self, line: TickLine, tick: int, lag_s: float, now: float) -> None:
+    def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """A new tick. One that comes right behind another had waited with it to be read."""
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Driving by the odometry, from one pose to the next. Pure."""
+"""CommandPipeline by the odometry, from one pose to the next. Pure."""
 
 import math
 from collections.abc import Sequence

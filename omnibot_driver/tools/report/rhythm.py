@@ -47,7 +47,7 @@ ODOMETRY: Final = Stream(
 
 
 @dataclass(frozen=True, slots=True)
-class Rhythm:
+class FrameSchedule:
     """``steps_s``: between successive stamps, from ``at_s`` on; ``period_s``: the usual one.
 
     Gaps: where they begin, how long they are, how many messages are missing, without those that
@@ -67,7 +67,7 @@ class Rhythm:
     late_s: Array
 
 
-def measure(log: Log, series: Series, stream: Stream) -> Rhythm:
+def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
     """By stamps; what has none is left out."""
     stamped = series.only(np.isfinite(series.stamp_s))
     at_s, steps_s = stamped.stamp_s[:-1], np.diff(stamped.stamp_s)
@@ -88,7 +88,7 @@ def measure(log: Log, series: Series, stream: Stream) -> Rhythm:
     if len(stamped) and (ended := _ended(log, stamped, stream)) is not None:
         gap_at_s, gap_s = np.append(gap_at_s, ended.begin_s), np.append(gap_s, ended.length_s)
         missing = np.append(missing, np.rint(ended.length_s / period_s))
-    return Rhythm(
+    return FrameSchedule(
         at_s=at_s,
         steps_s=steps_s,
         period_s=period_s,
@@ -141,7 +141,7 @@ def judge(log: Log, series: Series, stream: Stream) -> Iterator[Finding]:
     yield from _arrival(rhythm, stream)
 
 
-def _steps(rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
+def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     back = int((rhythm.steps_s <= 0.0).sum())
     if back:
         yield Finding(
@@ -183,7 +183,7 @@ def _steps(rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
     )
 
 
-def _gaps(log: Log, rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
+def _gaps(log: Log, rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     if not len(rhythm.gap_s):
         yield Finding(Level.GOOD, "Gaps", f"{stream.name} has no gap while it should come.")
         return
@@ -210,7 +210,7 @@ def _gaps(log: Log, rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
     )
 
 
-def _arrival(rhythm: Rhythm, stream: Stream) -> Iterator[Finding]:
+def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     least_s, middle_s, mean_s = (
         float(figure)
         for figure in (rhythm.late_s.min(), np.median(rhythm.late_s), rhythm.late_s.mean())

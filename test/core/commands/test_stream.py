@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.core.commands.set_points import Authority, SteadyMotion
+from omnibot_driver.core.commands.set_points import Authority, SteadySetpoint
 from omnibot_driver.core.commands.stream import (
     MOTION_PACE_S,
     PACE_S,
@@ -26,7 +26,7 @@ TIMEOUT_S = 0.5
 def order(
     stream: CommandStream, frame: bytes, now: float, authority: Authority = Authority.BASE
 ) -> None:
-    motion = SteadyMotion(authority, frame, stands=frame == STOP)
+    motion = SteadySetpoint(authority, frame, stands=frame == STOP)
     stream.command(motion, now, expires_at=now + TIMEOUT_S)
 
 

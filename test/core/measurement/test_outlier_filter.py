@@ -18,7 +18,7 @@ from omnibot_driver.core.board import (
     PoseReading,
     Reading,
 )
-from omnibot_driver.core.measurement.outlier_filter import MotionLimits, Plausibility
+from omnibot_driver.core.measurement.outlier_filter import MotionLimits, OutlierFilter
 
 PERIOD_S, TICK_S, G = 0.04, 0.01, 9.80665
 
@@ -32,11 +32,11 @@ def ahead(dx: float = 0.01, turn: float = 0.0, lost: int = 0) -> DisplacementRea
     return DisplacementReading(dx, 0.0, turn, "earth", PERIOD_S, lost)
 
 
-def gate() -> Plausibility:
-    return Plausibility(MotionLimits(), TICK_S)
+def gate() -> OutlierFilter:
+    return OutlierFilter(MotionLimits(), TICK_S)
 
 
-def admitted(readings: list[Reading], through: Plausibility) -> list[list[Reading]]:
+def admitted(readings: list[Reading], through: OutlierFilter) -> list[list[Reading]]:
     """What each of them brings out."""
     return [
         [found for found, _ in through.admit(reading, number * TICK_S)]
@@ -118,7 +118,7 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 @pytest.mark.parametrize(("scale_g", "leap"), [(4, 19.613), (16, 4.903), (16, 78.45)])
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
     """``full_scale_mps2`` says how much."""
-    through = Plausibility(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
+    through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
     assert came[50] == []
     assert through.refused_imu == 1

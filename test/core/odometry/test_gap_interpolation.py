@@ -7,7 +7,7 @@ from synthetic_board import PERIOD_S, Trip, body, xyyaw
 
 from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.odometry.gap_interpolation import Bridge
+from omnibot_driver.core.odometry.gap_interpolation import GapInterpolation
 
 
 def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> DisplacementReading:
@@ -17,7 +17,7 @@ def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> Displa
 
 def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing() -> None:
     """Four of them, from 0.5 to 1 m/s."""
-    bridge = Bridge()
+    bridge = GapInterpolation()
     assert bridge.tangents(body(0.02, 0.0), None) == (Pose(), Pose(0.02))
     lost, own = bridge.tangents(after(4, 0.04), None)
     assert xyyaw(lost) == pytest.approx((4 * 0.03, 0.0, 0.0))
@@ -26,7 +26,7 @@ def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing
 
 def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
     """A robot that is not heard for longer has been stopped."""
-    bridge = Bridge()
+    bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     lost, _ = bridge.tangents(after(250, 0.02), None)
     assert xyyaw(lost) == pytest.approx((50 * 0.02, 0.0, 0.0))
@@ -35,7 +35,7 @@ def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
 @pytest.mark.parametrize("missing", [0, 1, 7])
 def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
     """Earth displacements are turned by the heading that the robot has after the gap."""
-    bridge, trip = Bridge(), Trip(0.7)
+    bridge, trip = GapInterpolation(), Trip(0.7)
     bridge.tangents(trip.move(0.02, 0.01, 0.1), 0.7)
     before = trip.board
     for _ in range(missing):
@@ -51,7 +51,7 @@ def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
 
 def test_what_took_an_unknown_time_is_no_side_of_a_gap() -> None:
     """It may hold all motion of a pause; the gap after it is like what follows."""
-    bridge = Bridge()
+    bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     assert bridge.tangents(after(0, 0.5, None), None) == (Pose(), Pose(0.5))
     assert bridge.last is None

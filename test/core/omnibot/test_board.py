@@ -235,7 +235,7 @@ def test_reset_is_stop_and_r(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_after_silence_or_on_a_new_line_the_mode_is_unknown(mode: Mode) -> None:
-    """Belief rests on what is heard."""
+    """PoseGate rests on what is heard."""
     board = in_mode(mode)
     board.silence()
     assert board.mode is Mode.UNKNOWN

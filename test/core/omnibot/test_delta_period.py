@@ -15,7 +15,7 @@ from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.mode_manager import Request
 from omnibot_driver.core.omnibot import FrameDecoder
 from omnibot_driver.core.omnibot.cost_model import Context, Expectation
-from omnibot_driver.core.omnibot.frame_schedule import Rhythm
+from omnibot_driver.core.omnibot.frame_schedule import FrameSchedule
 from omnibot_driver.core.omnibot.frames import DeltaFrame, ImuFrame, PoseFrame
 from omnibot_driver.core.omnibot.modes import ModeTracker
 from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, Schedule
@@ -197,7 +197,7 @@ def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
 def test_bytes_that_made_no_frame_tell_how_many_imu_frames_they_were(period_s: float) -> None:
     """By the order in which this board sends: the last one before a delta, and the delta."""
     schedule = Schedule(period_s)
-    rhythm = Rhythm(schedule)
+    rhythm = FrameSchedule(schedule)
     for _ in range(3):
         for _ in range(schedule.deltas_per_pose):
             for kind in (*[ImuFrame] * schedule.imus_per_delta, DeltaFrame):

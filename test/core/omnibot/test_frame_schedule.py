@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.core.omnibot.frame_schedule import Rhythm
+from omnibot_driver.core.omnibot.frame_schedule import FrameSchedule
 from omnibot_driver.core.omnibot.frames import DeltaFrame, ImuFrame, PoseFrame
 
 kinds = st.sampled_from([ImuFrame, DeltaFrame, PoseFrame])
 
 
-def nominal(imus: int) -> Rhythm:
+def nominal(imus: int) -> FrameSchedule:
     """A second under way; so many IMU frames came after a pose."""
-    rhythm = Rhythm()
+    rhythm = FrameSchedule()
     for _ in range(5):
         for _ in range(5):
             for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
@@ -68,7 +68,7 @@ def test_imu_frames_alone_are_all_that_was_lost() -> None:
 @given(st.lists(st.tuples(kinds, st.integers(0, 500))))
 def test_any_order_of_frames_is_borne(heard: list[tuple[type, int]]) -> None:
     """And never are there more IMU frames lost than there were bytes for."""
-    rhythm = Rhythm()
+    rhythm = FrameSchedule()
     skipped = lost = 0
     for kind, count in heard:
         skipped += count

@@ -4,7 +4,7 @@
 
 import pytest
 
-from omnibot_driver.core.omnibot.gaps import Pauses
+from omnibot_driver.core.omnibot.gaps import InterFrameGaps
 
 
 @pytest.mark.parametrize(
@@ -19,6 +19,6 @@ from omnibot_driver.core.omnibot.gaps import Pauses
 )
 def test_bytes_of_a_slow_line_take_longer(baudrate: int, pause_s: float, idle: bool) -> None:
     """24 bytes of ten bits: 2.08 ms at 115200 baud, 6.25 ms at 38400; 4 ms more are a pause."""
-    pauses = Pauses(10 / baudrate)
+    pauses = InterFrameGaps(10 / baudrate)
     pauses.read(pause_s, 24, 5, now=1.0)
     assert bool(pauses.gaps) is idle

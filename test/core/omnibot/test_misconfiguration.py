@@ -10,7 +10,7 @@ from synthetic_board import earth
 
 from omnibot_driver.core.board import PoseReading
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings, PoseFrame
-from omnibot_driver.core.omnibot.misconfiguration import MOST_DELTAS, Suspicion
+from omnibot_driver.core.omnibot.misconfiguration import MOST_DELTAS, MisconfigurationChecks
 from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S
 from omnibot_driver.simulator import (
     BoardPose,
@@ -130,7 +130,7 @@ def test_the_user_is_told_once_and_odom_goes_on_by_deltas() -> None:
 
 def test_poses_that_never_make_sense_leave_nothing_behind() -> None:
     """A robot that drove off from zero, read in the wrong byte order: deltas come for days."""
-    suspicion = Suspicion()
+    suspicion = MisconfigurationChecks()
     zero, absurd = PoseFrame(0.0, 0.0, 0.0, 1), PoseFrame(1e-30, 1e-30, 1e-30, 1)
     suspicion.posed(zero, PoseReading(0.0, 0.0, 0.0), "big")
     for _ in range(1000):

@@ -9,7 +9,7 @@ import pytest
 
 from omnibot_driver.core.board import BoardFigures
 from omnibot_driver.core.measurement.outlier_filter import Refused
-from omnibot_driver.core.measurement.statistics import Tally
+from omnibot_driver.core.measurement.statistics import StreamStatistics
 from omnibot_driver.core.reporting.diagnosis import RECENT_S, Diagnosis, Level, Refusals, Status
 from omnibot_driver.core.reporting.figures import (
     CommandFigures,
@@ -34,7 +34,7 @@ class Robot:
         self.delay_s = 0.001
         self.figures = SessionFigures(
             state="nominal",
-            tally=Tally(),
+            tally=StreamStatistics(),
             board=BoardFigures(rates_hz=(100.0, 25.0, 5.0)),
             refused=Refused(0, 0, 0),
             skew_ppm=20.0,

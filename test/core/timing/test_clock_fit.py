@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from omnibot_driver.core.timing.clock_fit import TickLine
+from omnibot_driver.core.timing.clock_fit import ClockFit
 
 PERIOD_S = 0.01
 NEVER_BELOW = -1.0
@@ -14,10 +14,10 @@ NEVER_BELOW = -1.0
 
 def followed(
     skew: float, above: Callable[[int], float], below: Callable[[int], float], *, ticks: int = 2000
-) -> tuple[TickLine, float]:
+) -> tuple[ClockFit, float]:
     """A line that saw bounds so far above and below the truth; how late it is at the end."""
     period_s = PERIOD_S * (1.0 + skew)
-    line = TickLine(PERIOD_S, (0, 1.0))
+    line = ClockFit(PERIOD_S, (0, 1.0))
     for tick in range(ticks):
         true_s = tick * period_s
         line.see((tick, true_s + above(tick)), cut=False)

@@ -9,16 +9,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from serial_line import Board, Chunker, bursts, crumbs, ftdi, late, singles
 
-from omnibot_driver.core.board import DisplacementReading, Edge, ImuReading, PoseReading, Reading
+from omnibot_driver.core.board import (
+    DisplacementReading,
+    ImuReading,
+    PoseReading,
+    Reading,
+    SampleBoundary,
+)
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.timing import device_clock
 from omnibot_driver.core.timing.device_clock import DeviceClock
 
-WHOLE = Edge(0, 0.0, 13 * 10 / 115200)
+WHOLE = SampleBoundary(0, 0.0, 13 * 10 / 115200)
 SAMPLE = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 SETTLING = 40
 """Ticks after which a calm line is believed to be one."""
-Read = tuple[list[Reading], float, Edge | None]
+Read = tuple[list[Reading], float, SampleBoundary | None]
 
 
 def stamped(reads: list[Read], *, quick: bool) -> tuple[list[list[float]], str]:
@@ -57,7 +63,7 @@ imus = st.builds(
 others = st.builds(displaced, st.sampled_from([0, 0, 1, 5]), st.sampled_from([0.04, 0.04, None]))
 poses = st.builds(PoseReading, st.just(0.0), st.just(0.0), st.just(0.0), st.sampled_from([0, 1]))
 edges = st.sampled_from([WHOLE, WHOLE, WHOLE, None]) | st.builds(
-    Edge, st.integers(0, 1), st.floats(0.0, 1e-3), st.floats(0.0, 1e-3), st.booleans()
+    SampleBoundary, st.integers(0, 1), st.floats(0.0, 1e-3), st.floats(0.0, 1e-3), st.booleans()
 )
 surprises = st.tuples(
     st.lists(imus, max_size=2) | st.lists(imus | others | poses, max_size=4),
@@ -72,7 +78,7 @@ surprises = st.tuples(
 @settings(max_examples=200)
 @given(st.lists(surprises, max_size=30), st.floats(0.0, 0.004))
 def test_surprises_are_stamped_alike(
-    given: list[tuple[list[Reading], int, float, Edge | None, int]], later_s: float
+    given: list[tuple[list[Reading], int, float, SampleBoundary | None, int]], later_s: float
 ) -> None:
     """After a calm beginning, without which there is no short way; all arrive later afterwards."""
     tick, last_s = SETTLING, 0.0

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from serial_line import Board, Chunker, Read, blocks, bursts, crumbs, ftdi, late, singles
 
-from omnibot_driver.core.board import DisplacementReading, Edge, ImuReading
+from omnibot_driver.core.board import DisplacementReading, ImuReading, SampleBoundary
 from omnibot_driver.core.imu.scale import STANDARD_GRAVITY
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.timing.device_clock import DeviceClock
@@ -262,14 +262,14 @@ displacements = st.builds(
     st.integers(0, 255),
 )
 edges = st.none() | st.builds(
-    Edge, st.integers(0, 1), st.floats(0.0, 0.0013), st.floats(0.0, 0.0012), st.booleans()
+    SampleBoundary, st.integers(0, 1), st.floats(0.0, 0.0013), st.floats(0.0, 0.0012), st.booleans()
 )
 reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, max_size=30), edges)
 
 
 @given(st.lists(reads, max_size=60))
 def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
-    reads: list[tuple[float, list[ImuReading | DisplacementReading], Edge | None]],
+    reads: list[tuple[float, list[ImuReading | DisplacementReading], SampleBoundary | None]],
 ) -> None:
     """Whatever counters and framing say."""
     clock = DeviceClock(0.01)
