@@ -22,8 +22,8 @@ from sensor_msgs.msg import Imu, JointState
 
 from omnibot_driver import messages
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate

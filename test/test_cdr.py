@@ -15,8 +15,8 @@ from rosbags.typesys import Stores, get_typestore
 from omnibot_driver import cdr, parameters
 from omnibot_driver.cdr import Messages, Serializer, difference
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate

@@ -16,7 +16,7 @@ from listener import EMERGENCY_STOP, PATIENCE_S, STOP, Listener, kinds, link_to,
 from omnibot_driver import stall_detector
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Event, Notice
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.session import Session
 from omnibot_driver.keeper import BEAT_S, Keeper

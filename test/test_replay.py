@@ -14,7 +14,7 @@ from listener import Listener, link_to, session
 
 from omnibot_driver.core.errors import LinkError, RequestRefused
 from omnibot_driver.core.events import Event, Notice, StateChanged
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.mode_manager import Request
 from omnibot_driver.core.odometry.estimator import OdometryEstimate

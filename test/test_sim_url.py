@@ -10,7 +10,7 @@ from listener import PATIENCE_S, Listener, link_to, session
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.events import Notice
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.port import Port
 from omnibot_driver.simulator import SimulatedBoard

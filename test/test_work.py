@@ -16,8 +16,8 @@ import pytest
 
 from omnibot_driver import parameters
 from omnibot_driver.cdr import LITTLE_ENDIAN, Serializer, twist
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate

@@ -28,8 +28,8 @@ from omnibot_driver.core.commands.shaping import ControlMethod
 from omnibot_driver.core.commands.stream import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import Event, Notice, StateChanged
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose, Signs
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuCorrection, ImuEstimate
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits, Refused
 from omnibot_driver.core.measurement.pipeline import Measured, MeasurementPipeline

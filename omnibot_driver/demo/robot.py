@@ -15,8 +15,8 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, String
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.demo.display import status_row
 from omnibot_driver.demo.square import HALT, steer
 from omnibot_driver.tools.monitor.rates import Rate

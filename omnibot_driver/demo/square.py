@@ -6,8 +6,8 @@ import math
 from typing import Final
 
 from omnibot_driver.core.commands.limits import shorten
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 
 SIDE_M: Final = 1.0
 SPEED_MPS: Final = 0.3

@@ -8,7 +8,7 @@ import pytest
 
 from omnibot_driver import parameters
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.mode_manager import Request, RequestDone
 from omnibot_driver.core.omnibot import OmniBot
 from omnibot_driver.core.session import Session

@@ -16,8 +16,8 @@ from outbound_drive import Command, Scene
 from outbound_teller import ANGULAR_SCALE, Shown
 
 from omnibot_driver.core.commands.limits import SpeedLimits
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.mode_manager import Request
 from omnibot_driver.core.session import Session
 

@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from urdf_parser_py.urdf import URDF
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.core.geometry.omni import OmniKinematics
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.parameters import BY_NAME
 
 ROOT = Path(__file__).parents[2]

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.core.geometry.omni import OmniKinematics
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.parameters import BY_NAME
 
 ROOT = Path(__file__).parents[2]

@@ -20,8 +20,8 @@ from hypothesis import strategies as st
 from pseudo_terminal import PseudoTerminal
 
 import omnibot_driver
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.demo import display, square
 from omnibot_driver.demo.__main__ import main
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from monitor_view import FINE, view
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.reporting.diagnosis import Level
 from omnibot_driver.tools.monitor.model import LONGEST_PATH, Flow, Model, level
 from omnibot_driver.tools.monitor.rates import HISTORY_S, WINDOW_S, Rate

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from monitor_view import FINE, view
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.reporting.diagnosis import Level, Status
 from omnibot_driver.tools.monitor import text
 from omnibot_driver.tools.monitor.plot import draw_path, sparkline

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 
 MAX_WORD: Final = 32767
 

@@ -17,8 +17,8 @@ from omnibot_driver.core.commands.set_points import GoalSetpoint, Setpoint
 from omnibot_driver.core.commands.shaping import CommandShaper, ControlMethod
 from omnibot_driver.core.commands.stream import PACE_S, CommandSettings, CommandStream
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose, Signs
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.measurement.pipeline import Estimate
 from omnibot_driver.core.motion_monitor.monitor import ADVICE, Fault, MotionMonitor
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST

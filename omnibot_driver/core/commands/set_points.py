@@ -13,8 +13,8 @@ from enum import Enum
 from typing import Final, Protocol
 
 from omnibot_driver.core.commands.limits import SpeedLimits
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 
 LONGEST_STEP_S: Final = 0.05
 """A frame that goes out late does not make up for more time than this."""

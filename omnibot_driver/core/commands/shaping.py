@@ -20,8 +20,8 @@ from omnibot_driver.core.commands.set_points import (
     SteadySetpoint,
 )
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose, Signs
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.estimator import Odometry
 
 ControlMethod = Literal["velocity", "position"]

@@ -4,7 +4,7 @@
 
 import math
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.values import value
 
 Signs = tuple[int, int, int]

@@ -8,7 +8,7 @@ velocities in the board's own axes, and times; not what an error means.
 
 from typing import Final
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.motion_monitor.envelope import on_the_way, outside
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, SetpointHistory
 from omnibot_driver.core.motion_monitor.wind_up import WindUp

@@ -10,7 +10,7 @@ import math
 from enum import Enum
 from typing import Final
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.motion_monitor.envelope import dot, speed_of
 from omnibot_driver.core.motion_monitor.following_error import FollowingError
 from omnibot_driver.core.motion_monitor.set_point_history import (

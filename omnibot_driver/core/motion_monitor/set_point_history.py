@@ -11,7 +11,7 @@ import math
 from collections import deque
 from typing import Final
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 
 CommandedTwist = BodyTwist | None
 """A body velocity that was commanded; None: any motion is possible."""

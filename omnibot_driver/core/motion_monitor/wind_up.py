@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.motion_monitor.envelope import NOISE_MPS, NOISE_RADPS, dot, speed_of
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 

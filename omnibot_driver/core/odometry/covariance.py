@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
-from omnibot_driver.core.geometry.kinematics import OmniKinematics
+from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.values import value
 

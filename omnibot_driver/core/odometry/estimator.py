@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from omnibot_driver.core.board import DisplacementReading, PoseReading
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose, Signs, log_of, roll
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.covariance import NOTHING, Covariance, OdometryNoise
 from omnibot_driver.core.odometry.gap_interpolation import GapInterpolation
 from omnibot_driver.core.odometry.pending_displacements import PendingDisplacements, advanced

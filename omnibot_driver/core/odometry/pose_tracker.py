@@ -9,8 +9,8 @@ which of the board's words to believe.
 
 from typing import Final
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose, Signs, log_of, roll
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.correction_smoother import CorrectionSmoother
 from omnibot_driver.core.odometry.covariance import NOTHING, OdometryNoise, Uncertainty
 

@@ -13,8 +13,9 @@ from typing import Final
 from omnibot_driver.core.board import BoardFigures, Mode, Reading, SampleBoundary, Vector3
 from omnibot_driver.core.commands.limits import MAX_WORD, slow, to_nearest
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.scale import ACCEL_COUNTS_PER_G, gravity_advice
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder

@@ -17,7 +17,7 @@ from omnibot_driver.core.board import (
     Reading,
     Vector3,
 )
-from omnibot_driver.core.geometry.kinematics import OmniKinematics
+from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.omnibot.frame_schedule import LENGTH, FrameSchedule
 from omnibot_driver.core.omnibot.frames import (
     DeltaFrame,

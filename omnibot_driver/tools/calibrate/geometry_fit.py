@@ -16,7 +16,8 @@ from typing import Final
 import numpy as np
 from scipy.optimize import least_squares
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.core.geometry.omni import OmniKinematics
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.tools.calibrate.log import Column
 from omnibot_driver.tools.needs import ToolError
 

@@ -9,7 +9,8 @@ equations call positive), -1 clockwise, 0 still.
 from collections.abc import Sequence
 from typing import Final
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.core.geometry.omni import OmniKinematics
+from omnibot_driver.core.geometry.twist import BodyTwist
 
 Pattern = tuple[int, int, int]
 

@@ -9,7 +9,7 @@ So a key moves the robot for a short time only, and holding it renews that time.
 import math
 from typing import Final
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 
 FIRST_S: Final = 0.6
 """A key pressed anew moves the robot so long: most keyboards repeat after 0.25 s to 0.6 s."""

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any, Final
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.reporting.diagnosis import Level, Status
 from omnibot_driver.tools.monitor.model import IMU_TOPIC, ODOM_TOPIC, View
 from omnibot_driver.tools.monitor.plot import sparkline

@@ -12,7 +12,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.tools.monitor.teleop import HALT, DeadMan
 
 TOPIC: Final = "cmd_vel"

@@ -19,7 +19,7 @@ from omnibot_driver.core.commands.limits import (
     to_nearest,
 )
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 
 limits = st.one_of(st.just(0.0), st.floats(1e-3, 200.0))
 vectors = st.lists(finite, min_size=2, max_size=3)

@@ -9,7 +9,7 @@ from session_bench import Bench
 
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.events import Notice
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuCorrection, ImuEstimate
 from omnibot_driver.core.mode_manager import Request, RequestDone
 from omnibot_driver.simulator import BoardSettings

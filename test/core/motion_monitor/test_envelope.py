@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import twists
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.motion_monitor.envelope import NOISE_MPS, on_the_way, outside
 from omnibot_driver.core.motion_monitor.set_point_history import (
     AT_REST,

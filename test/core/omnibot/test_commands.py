@@ -13,8 +13,8 @@ from session_bench import bare
 from strategies import twists, words
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.geometry.kinematics import BodyTwist
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 
 STOP = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00")

@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 
 import pytest
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.omnibot import (
     CommandFrame,
     DeltaFrame,

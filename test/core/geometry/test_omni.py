@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import twists, wheel_rates
 
-from omnibot_driver.core.geometry.kinematics import BodyTwist, OmniKinematics
+from omnibot_driver.core.geometry.omni import OmniKinematics
+from omnibot_driver.core.geometry.twist import BodyTwist
 
 R, L = 0.029, 0.143
 MANUAL = OmniKinematics(wheel_radius_m=R, base_radius_m=L)

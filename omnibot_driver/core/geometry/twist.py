@@ -1,0 +1,23 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The velocity of a body in the plane. Knows no wheels."""
+
+import math
+
+from omnibot_driver.core.values import value
+
+
+@value(frozen=True, slots=True)
+class BodyTwist:
+    """Velocity of the body in its own frame: m/s forward, m/s to the left, rad/s to the left."""
+
+    vx_mps: float
+    vy_mps: float
+    yaw_rate_radps: float
+
+    def faster_than(self, linear_mps: float, angular_radps: float) -> bool:
+        """Whether it moves or turns faster than this."""
+        return (
+            math.hypot(self.vx_mps, self.vy_mps) > linear_mps
+            or abs(self.yaw_rate_radps) > angular_radps
+        )
