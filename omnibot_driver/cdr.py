@@ -54,12 +54,13 @@ class Serializer:
         linear, angular = settings.twist_linear_stddev**2, settings.twist_angular_stddev**2
         self._twist_noise = messages.planar(linear, 0.0, 0.0, linear, 0.0, angular)
 
-        names, name_values = zip(*map(_text, messages.WHEEL_JOINTS), strict=True)
+        names, name_values = zip(*map(_text, settings.wheels.joints), strict=True)
         no_frame, no_values = _text("")
-        joints = f"@{STAMP}{no_frame}I{''.join(names)}I3d"
-        self._joints = struct.Struct(f"{joints}I3dI")
+        count = len(names)
+        joints = f"@{STAMP}{no_frame}I{''.join(names)}I{count}d"
+        self._joints = struct.Struct(f"{joints}I{count}dI")
         self._joints_at_odds = struct.Struct(f"{joints}II")
-        self._joints_head = (*no_values, 3, *itertools.chain(*name_values), 3)
+        self._joints_head = (*no_values, count, *itertools.chain(*name_values), count)
 
     def imu(self, estimate: ImuEstimate, stamp_ns: int) -> bytes:
         """``messages.imu_message``."""
@@ -95,7 +96,7 @@ class Serializer:
         _, angles, rates = wheels
         head = (*divmod(stamp_ns, 10**9), *self._joints_head, *angles)
         if rates:
-            return LITTLE_ENDIAN + self._joints.pack(*head, 3, *rates, 0)
+            return LITTLE_ENDIAN + self._joints.pack(*head, len(rates), *rates, 0)
         return LITTLE_ENDIAN + self._joints_at_odds.pack(*head, 0, 0)
 
 
@@ -132,7 +133,7 @@ class Messages:
 
     def joint_state(self, wheels: Wheels, stamp_ns: int) -> JointState:
         """``joint_states``."""
-        return messages.joint_state_message(wheels, messages.time_message(stamp_ns))
+        return messages.joint_state_message(wheels, messages.time_message(stamp_ns), self._settings)
 
 
 def difference(settings: MessageSettings) -> str:

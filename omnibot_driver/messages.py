@@ -30,23 +30,22 @@ from std_msgs.msg import Header, UInt8MultiArray
 
 from omnibot_driver.core.commands.limits import require_finite
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.geometry.omni import OmniKinematics
+from omnibot_driver.core.geometry.kinematics import Kinematics
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.reporting.diagnosis import Status
+from omnibot_driver.parameters import kinematics
 
 UNMEASURED_VARIANCE: Final = 1e6
 """For z, roll and pitch, of which a planar odometry says nothing, and for a twist not known."""
 SHORTEST_QUATERNION: Final = 1e-3
 MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
-WHEEL_JOINTS: Final = ("wheel_a_joint", "wheel_b_joint", "wheel_c_joint")
 
 Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
 """What was rolled so far, the angles in rad, unwrapped, and the rates in rad/s, if known."""
-UNTURNED: Final[Wheels] = (Pose(), (0.0, 0.0, 0.0), ())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +61,7 @@ class MessageSettings:
     angular_velocity_stddev: float
     twist_linear_stddev: float
     twist_angular_stddev: float
-    wheels: OmniKinematics
+    wheels: Kinematics
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any]) -> "MessageSettings":
@@ -76,7 +75,7 @@ class MessageSettings:
             angular_velocity_stddev=values["angular_velocity_stddev"],
             twist_linear_stddev=values["twist_linear_stddev"],
             twist_angular_stddev=values["twist_angular_stddev"],
-            wheels=OmniKinematics(values["wheel_radius"], values["base_radius"]),
+            wheels=kinematics(values),
         )
 
 
@@ -137,7 +136,12 @@ def transform_message(
     )
 
 
-def turned(before: Wheels, estimate: OdometryEstimate, kinematics: OmniKinematics) -> Wheels:
+def unturned(kinematics: Kinematics) -> Wheels:
+    """The wheels before anything was rolled."""
+    return Pose(), (0.0,) * len(kinematics.joints), ()
+
+
+def turned(before: Wheels, estimate: OdometryEstimate, kinematics: Kinematics) -> Wheels:
     """The wheels after what was rolled since then, by the sizes that they have now."""
     rolled, rolling, (then, angles, _) = estimate.rolled, estimate.rolling, before
     way = BodyTwist(rolled.x_m - then.x_m, rolled.y_m - then.y_m, rolled.yaw_rad - then.yaw_rad)
@@ -145,11 +149,11 @@ def turned(before: Wheels, estimate: OdometryEstimate, kinematics: OmniKinematic
     return rolled, angles, kinematics.wheel_rates(rolling) if rolling else ()
 
 
-def joint_state_message(wheels: Wheels, stamp: Time) -> JointState:
+def joint_state_message(wheels: Wheels, stamp: Time, settings: MessageSettings) -> JointState:
     """``joint_states``."""
     _, angles, rates = wheels
     return JointState(
-        header=Header(stamp=stamp), name=WHEEL_JOINTS, position=angles, velocity=rates
+        header=Header(stamp=stamp), name=settings.wheels.joints, position=angles, velocity=rates
     )
 
 

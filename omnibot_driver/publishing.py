@@ -68,7 +68,7 @@ class Publishing:
         self._send_transform = transform_publisher(node) if values["publish_tf"] else None
         self._state = node.create_publisher(String, "~/state", LATCHED)
         self._estop_active = node.create_publisher(Bool, "~/estop_active", LATCHED)
-        self._wheels = messages.UNTURNED
+        self._wheels = messages.unturned(settings.wheels)
         self._shown: StateChanged | None = None
         self._told: set[str] = set()
         self._clock_offset_ns = self._simulated_ns = 0

@@ -3,6 +3,7 @@
 """Serialised measurements are what rclpy makes of the same measurements."""
 
 import struct
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -11,16 +12,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
+from sensor_msgs.msg import JointState
 
 from omnibot_driver import cdr, parameters
 from omnibot_driver.cdr import Messages, Serializer, difference
 from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
-from omnibot_driver.messages import MessageSettings, Wheels
+from omnibot_driver.messages import MessageSettings, Wheels, turned, unturned
 
 numbers = st.floats(allow_nan=False, allow_infinity=False, width=32)
 vectors = st.tuples(numbers, numbers, numbers)
@@ -84,6 +87,23 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
         STORE.deserialize_cdr(ours, message_name(message))  # minds every byte too many
         kind = type(message)
         assert deserialize_message(ours, kind) == deserialize_message(theirs, kind)
+
+
+def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
+    """Of a differential drive: 1 m ahead on wheels of 0.1 m is 10 rad."""
+    two = replace(
+        MessageSettings.from_parameters(parameters.check_all({})),
+        wheels=DifferentialKinematics(wheel_radius_m=0.1, track_m=0.4),
+    )
+    ahead = OdometryEstimate(
+        0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), BodyTwist(0.5, 0.0, 0.0)
+    )
+    wheels = turned(unturned(two.wheels), ahead, two.wheels)
+    message = deserialize_message(Serializer(two).joint_state(wheels, 7), JointState)
+    assert message.position == Messages(two).joint_state(wheels, 7).position
+    assert list(message.name) == ["left_wheel_joint", "right_wheel_joint"]
+    assert list(message.position) == pytest.approx([10.0, 10.0])
+    assert list(message.velocity) == pytest.approx([5.0, 5.0])
 
 
 @pytest.mark.parametrize("length", range(21))

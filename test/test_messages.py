@@ -202,8 +202,8 @@ def test_joint_states_are_the_manuals_wheels() -> None:
     estimate = OdometryEstimate(
         0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), BodyTwist(0.1, 0.0, 0.0)
     )
-    wheels = messages.turned(messages.UNTURNED, estimate, SETTINGS.wheels)
-    message = messages.joint_state_message(wheels, STAMP)
+    wheels = messages.turned(messages.unturned(SETTINGS.wheels), estimate, SETTINGS.wheels)
+    message = messages.joint_state_message(wheels, STAMP, SETTINGS)
     assert message.header.stamp == STAMP
     assert list(message.name) == ["wheel_a_joint", "wheel_b_joint", "wheel_c_joint"]
     turned = 0.8660254037844386 / 0.029
@@ -215,8 +215,8 @@ def test_joint_states_are_the_manuals_wheels() -> None:
 def test_joints_whose_rate_is_not_known_have_none() -> None:
     """As sensor_msgs wants it: an empty array, not zeros."""
     estimate = OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), None)
-    wheels = messages.turned(messages.UNTURNED, estimate, SETTINGS.wheels)
-    message = messages.joint_state_message(wheels, STAMP)
+    wheels = messages.turned(messages.unturned(SETTINGS.wheels), estimate, SETTINGS.wheels)
+    message = messages.joint_state_message(wheels, STAMP, SETTINGS)
     assert len(message.position) == 3
     assert not message.velocity
 
@@ -225,7 +225,7 @@ def test_wheels_of_another_size_go_on_from_where_they_stand() -> None:
     """Each way is turned by the radius of its moment; without a way nothing turns."""
     small, large = OmniKinematics(0.029, 0.143), OmniKinematics(0.058, 0.2)
     ahead = [OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(x, 0.0, 0.0)) for x in (1, 2)]
-    before = messages.turned(messages.UNTURNED, ahead[0], small)
+    before = messages.turned(messages.unturned(SETTINGS.wheels), ahead[0], small)
     assert messages.turned(before, ahead[0], large)[1] == before[1]
     after = messages.turned(before, ahead[1], large)
     assert after[1] == pytest.approx([1.5 * angle for angle in before[1]])

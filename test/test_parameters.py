@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
 from omnibot_driver.parameters import (
     BY_NAME,
@@ -208,7 +209,7 @@ def test_values_reach_the_core_under_their_meaning() -> None:
         force_step_mps2=4.5,
         full_scale_mps2=pytest.approx(8 * 9.80665),
     )
-    assert (noise.wheel_scale, noise.base_radius_m) == (0.06, 0.2)
+    assert (noise.wheel_scale, noise.wheels) == (0.06, OmniKinematics(1.0, 0.2))
     assert (noise.unheard_mps2, noise.unheard_radps2) == (3.0, 4.0)
     assert (noise.wheel_drift, noise.wheel_slip) == (0.03, 0.05)
     assert (session.imu.gyro_bias, session.imu.accel_bias) == ((0.1, 0.2, 0.3), (1.0, 2.0, 3.0))

@@ -8,6 +8,8 @@ from typing import Any
 from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.stream import CommandSettings
+from omnibot_driver.core.geometry.kinematics import Kinematics
+from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.imu.bias_correction import ImuCorrection
 from omnibot_driver.core.imu.scale import STANDARD_GRAVITY, ImuScale
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
@@ -35,6 +37,11 @@ def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
     )
 
 
+def kinematics(values: Mapping[str, Any]) -> Kinematics:
+    """The wheels, by checked values."""
+    return OmniKinematics(values["wheel_radius"], values["base_radius"])
+
+
 def session_settings(values: Mapping[str, Any]) -> SessionSettings:
     """What the session needs of checked values."""
     return SessionSettings(
@@ -54,7 +61,7 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
                 wheel_drift=values["odom_wheel_drift"],
                 wheel_scale=values["odom_wheel_scale"],
                 wheel_slip=values["odom_wheel_slip"],
-                base_radius_m=values["base_radius"],
+                wheels=OmniKinematics(wheel_radius_m=1.0, base_radius_m=values["base_radius"]),
                 unheard_mps2=values["odom_gap_acceleration"],
                 unheard_radps2=values["odom_gap_angular_acceleration"],
             ),

@@ -28,7 +28,7 @@ from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, OmniBot
 from omnibot_driver.core.session import Session
-from omnibot_driver.messages import UNTURNED, MessageSettings, turned
+from omnibot_driver.messages import MessageSettings, turned, unturned
 
 MPS2_PER_COUNT = 9.80665 / 16384
 AT_REST = (Pose(), BodyTwist(0.0, 0.0, 0.0), Covariance(), Pose(), BodyTwist(0.0, 0.0, 0.0))
@@ -41,7 +41,11 @@ class Relay:
     def __init__(self, node: Node) -> None:
         values = parameters.check_all({})
         settings = MessageSettings.from_parameters(values)
-        self._make, self._wheels, self._sizes = Serializer(settings), UNTURNED, settings.wheels
+        self._make, self._wheels, self._sizes = (
+            Serializer(settings),
+            unturned(settings.wheels),
+            settings.wheels,
+        )
         self._imus = node.create_publisher(Imu, "imu/data_raw", 10)
         self._odometries = node.create_publisher(Odometry, "odom", 10)
         self._joints = node.create_publisher(JointState, "joint_states", 10)

@@ -14,7 +14,10 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 
 
 class Kinematics(Protocol):
-    """Wheels under a body, none of which slips."""
+    """Wheels under a body, none of which slips; a frozen value."""
+
+    def __hash__(self) -> int:
+        """What is derived of it can be kept."""
 
     @property
     def joints(self) -> tuple[str, ...]:

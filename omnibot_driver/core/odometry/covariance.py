@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
+from omnibot_driver.core.geometry.kinematics import Kinematics
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.values import value
@@ -31,13 +32,14 @@ class OdometryNoise:
 
     ``wheel_drift``: standard deviation in m of a random walk after 1 m of rim; ``wheel_scale``: of
     a wheel's relative size error; ``wheel_slip``: the mean part of the way that slip takes from all
-    wheels alike; ``unheard_mps2``, ``unheard_radps2``: acceleration of a robot that nobody hears.
+    wheels alike; ``wheels``: their geometry, at a radius of 1 m; ``unheard_mps2``,
+    ``unheard_radps2``: acceleration of a robot that nobody hears.
     """
 
     wheel_drift: float = 0.0035
     wheel_scale: float = 0.01
     wheel_slip: float = 0.02
-    base_radius_m: float = 0.143
+    wheels: Kinematics = OmniKinematics(wheel_radius_m=1.0, base_radius_m=0.143)  # noqa: RUF009
     unheard_mps2: float = 1.0
     unheard_radps2: float = 5.0
 
@@ -112,8 +114,8 @@ class Uncertainty:
         self.noise = noise
         self.gap = NOTHING
         self._walk = Covariance()
-        self._levers = [(0.0, 0.0, 0.0)] * 3
-        """What the pose is off by, in m, m, rad, per relative size error of wheel A, B, C."""
+        self._levers: list[tuple[float, float, float]] = []
+        """What the pose is off by, in m, m, rad, per relative size error of each wheel."""
 
     def move(self, heading_rad: float, tangent: Pose) -> None:
         """The body moved along this tangent from this heading.
@@ -126,11 +128,13 @@ class Uncertainty:
         cos, sin = math.cos(heading_rad), math.sin(heading_rad)
         dx_m = cos * tangent.x_m - sin * tangent.y_m
         dy_m = sin * tangent.x_m + cos * tangent.y_m
-        wheels, alone = _wheels(self.noise.base_radius_m)
+        wheels = self.noise.wheels
+        alone = _alone(wheels)
+        before = self._levers or [(0.0, 0.0, 0.0)] * len(alone)
         drift = self.noise.wheel_drift * self.noise.wheel_drift
         levers, errors = [], []
         for (lever_x_m, lever_y_m, lever_rad), rim_m, part in zip(
-            self._levers, wheels.wheel_rates(tangent.over(1.0)), alone, strict=True
+            before, wheels.wheel_rates(tangent.over(1.0)), alone, strict=True
         ):
             x_m = cos * part.x_m - sin * part.y_m
             y_m = sin * part.x_m + cos * part.y_m
@@ -168,20 +172,23 @@ class Uncertainty:
 
     def total(self, open_error: Pose) -> Covariance:
         """Of a pose that is known to be off by ``open_error`` and otherwise at its best."""
-        noise, (a, b, c) = self.noise, self._levers
+        noise, levers = self.noise, self._levers
         scale = noise.wheel_scale * noise.wheel_scale
         slip = noise.wheel_slip * noise.wheel_slip
-        alike = a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]
+        alike = map(sum, zip(*levers, strict=True)) if levers else (0.0, 0.0, 0.0)
         wrong = open_error.x_m, open_error.y_m, open_error.yaw_rad
         known = self._walk if self.gap is NOTHING else self._walk + self.gap
         return known.with_errors(
-            ((scale, *a), (scale, *b), (scale, *c), (slip, *alike), (1.0, *wrong))
+            (*((scale, *lever) for lever in levers), (slip, *alike), (1.0, *wrong))
         )
 
 
 @cache
-def _wheels(base_radius_m: float) -> tuple[OmniKinematics, tuple[Pose, ...]]:
-    """Whose rates are rim speeds; and what a metre of rim of A, B, C alone does to the body."""
-    wheels = OmniKinematics(wheel_radius_m=1.0, base_radius_m=base_radius_m)
-    alone = map(wheels.body_twist, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
-    return wheels, tuple(Pose(twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps) for twist in alone)
+def _alone(wheels: Kinematics) -> tuple[Pose, ...]:
+    """What a metre of rim of each wheel alone does to the body."""
+    count = len(wheels.joints)
+    rates = ([float(n == wheel) for n in range(count)] for wheel in range(count))
+    return tuple(
+        Pose(twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps)
+        for twist in map(wheels.body_twist, rates)
+    )

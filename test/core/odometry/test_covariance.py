@@ -20,6 +20,7 @@ from synthetic_board import (
 )
 
 from omnibot_driver.core.board import DisplacementReading, PoseReading
+from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
@@ -50,6 +51,20 @@ def test_the_covariance_is_positive_definite_and_grows(readings: list[Displaceme
         assert now.yaw_yaw >= before.yaw_yaw
         assert minors(now)[2] >= minors(before)[2] * (1 - 1e-6)
         before = now
+
+
+def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
+    """1 % of one wheel is 0.01 / 0.4 rad after a metre, and half a centimetre of way."""
+    noise = OdometryNoise(
+        wheel_drift=0.0,
+        wheel_scale=0.01,
+        wheel_slip=0.0,
+        wheels=DifferentialKinematics(wheel_radius_m=1.0, track_m=0.4),
+    )
+    odometry = Odometry(OdometrySettings(noise=noise))
+    (ahead,) = odometry.displace(body(1.0, 0.0), 0.0)
+    assert ahead.covariance.yaw_yaw == pytest.approx(2 * 0.025**2, rel=0.01)
+    assert ahead.covariance.xx == pytest.approx(2 * 0.005**2, rel=0.03)
 
 
 def test_a_robot_at_rest_grows_no_less_sure() -> None:
