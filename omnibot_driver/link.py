@@ -20,8 +20,8 @@ from typing import Final, TypeVar
 
 from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.events import Event, Notice
-from omnibot_driver.core.mode_manager import OnExit
 from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
+from omnibot_driver.core.requests import OnExit
 from omnibot_driver.core.session import Session
 from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
 from omnibot_driver.kernel_counts import waited_s

@@ -23,6 +23,7 @@ from rclpy.publisher import Publisher
 from std_msgs.msg import Bool, Float32MultiArray
 
 from omnibot_driver import cdr, declaration, messages, parameters, selfcheck
+from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.omnibot import OmniBot
 from omnibot_driver.core.reporting.diagnosis import Refusals
@@ -62,11 +63,15 @@ class OmniBotDriver(Node):
             obeys=not is_recording(port),
         )
         settings = messages.MessageSettings.from_parameters(self._values)
-        self._publishing = Publishing(self, self._session, self._values, settings)
+        self._publishing = Publishing(
+            self, self._session, self._board.traits, self._values, settings
+        )
         self._refused_at_s: dict[str, float] = {}
         self._refusals = Refusals()
         self._link = self._make_link(port)
-        self._requests = Services(self, self._link, self._values["calibration_file"])
+        self._requests = Services(
+            self, self._link, self._board.traits, self._values["calibration_file"]
+        )
         self._create_inputs()
         if isinstance(self._link, Link):  # a recording is no link to be judged
             self._diagnostics = Diagnostics(self, self._link, lambda: self._refusals, port)
@@ -153,11 +158,13 @@ class OmniBotDriver(Node):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._looks = [self._see_other_types, self._see_namesakes, self._see_no_clock]
         self.create_timer(LOOK_EVERY_S, self._look_around, clock=steady)
-        self.create_subscription(
-            Float32MultiArray, "wheel_cmd", self._obey("wheel_cmd", _wheels), 1
-        )
-        obey = self._obey("cmd_pose", self._pose, may_be_old=messages.is_stamped)
-        self.create_subscription(PoseStamped, "cmd_pose", obey, 1)
+        authorities = self._board.traits.authorities
+        if Authority.WHEELS in authorities:
+            obey = self._obey("wheel_cmd", _wheels)
+            self.create_subscription(Float32MultiArray, "wheel_cmd", obey, 1)
+        if Authority.POSE in authorities:
+            obey = self._obey("cmd_pose", self._pose, may_be_old=messages.is_stamped)
+            self.create_subscription(PoseStamped, "cmd_pose", obey, 1)
         self.create_subscription(Bool, "estop", self._on_estop_topic, 10)
 
     def _obey(

@@ -24,9 +24,10 @@ from omnibot_driver import messages, selfcheck
 from omnibot_driver.cdr import Messages, Serializer, difference
 from omnibot_driver.core.events import Event, Notice, StateChanged
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.mode_manager import RequestDone
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.session import Session
+from omnibot_driver.core.traits import Traits
 from omnibot_driver.transforms import transform_publisher
 
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -42,6 +43,7 @@ class Publishing:
         self,
         node: Node,
         session: Session,
+        traits: Traits,
         values: Mapping[str, Any],
         settings: messages.MessageSettings,
     ) -> None:
@@ -62,7 +64,8 @@ class Publishing:
         )
         self._over = False
         node.context.on_shutdown(self._end)
-        self._imu = node.create_publisher(Imu, "imu/data_raw", 10)
+        if traits.imu:
+            self._imu = node.create_publisher(Imu, "imu/data_raw", 10)
         self._odometry = node.create_publisher(Odometry, "odom", 10)
         self._joints = node.create_publisher(JointState, "joint_states", 10)
         self._send_transform = transform_publisher(node) if values["publish_tf"] else None

@@ -16,7 +16,7 @@ from typing import Final, TypeVar
 
 from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.events import Event, Notice
-from omnibot_driver.core.mode_manager import OnExit
+from omnibot_driver.core.requests import OnExit
 from omnibot_driver.core.session import Session
 from omnibot_driver.outbox import Delivery, Outbox
 from omnibot_driver.recording import Recording

@@ -15,8 +15,9 @@ from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver import calibration
 from omnibot_driver.core.errors import RequestRefused
-from omnibot_driver.core.mode_manager import Request, RequestDone
+from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.core.session import DISCONNECTED, Session
+from omnibot_driver.core.traits import Traits
 from omnibot_driver.link import Link
 from omnibot_driver.replay import Replay
 
@@ -24,18 +25,24 @@ from omnibot_driver.replay import Replay
 class Services:
     """``calibration_file``: where a measured bias is kept; nowhere if empty."""
 
-    def __init__(self, node: Node, link: Link | Replay, calibration_file: str) -> None:
+    def __init__(
+        self, node: Node, link: Link | Replay, traits: Traits, calibration_file: str
+    ) -> None:
         self._node, self._link = node, link
         self._calibration_file = calibration_file
         node.create_service(SetBool, "~/estop", self._on_estop)
         node.create_service(Trigger, "~/reset_odometry", self._on_reset_odometry)
         waiting = ReentrantCallbackGroup()
-        node.create_service(Trigger, "~/start", self._on_start, callback_group=waiting)
-        node.create_service(SetBool, "~/pause", self._on_pause, callback_group=waiting)
-        node.create_service(Trigger, "~/reset", self._on_reset, callback_group=waiting)
-        node.create_service(
-            Trigger, "~/calibrate_gyro", self._on_calibrate_gyro, callback_group=waiting
-        )
+        if Request.START in traits.requests:
+            node.create_service(Trigger, "~/start", self._on_start, callback_group=waiting)
+        if Request.PAUSE in traits.requests:
+            node.create_service(SetBool, "~/pause", self._on_pause, callback_group=waiting)
+        if Request.RESET in traits.requests:
+            node.create_service(Trigger, "~/reset", self._on_reset, callback_group=waiting)
+        if traits.imu:
+            node.create_service(
+                Trigger, "~/calibrate_gyro", self._on_calibrate_gyro, callback_group=waiting
+            )
 
     def _on_estop(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         active = bool(request.data)

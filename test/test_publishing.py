@@ -23,6 +23,7 @@ from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.omnibot import OmniBot, PausedFrame
+from omnibot_driver.core.omnibot.board import TRAITS
 from omnibot_driver.core.omnibot.frames import Frame
 from omnibot_driver.core.omnibot.modes import ModeTracker
 from omnibot_driver.core.session import Session
@@ -48,7 +49,9 @@ def session_with(node: Node) -> tuple[Session, Publishing]:
     session = Session(
         OmniBot(parameters.board_settings(VALUES)), parameters.session_settings(VALUES), run=True
     )
-    return session, Publishing(node, session, VALUES, MessageSettings.from_parameters(VALUES))
+    return session, Publishing(
+        node, session, TRAITS, VALUES, MessageSettings.from_parameters(VALUES)
+    )
 
 
 def test_a_command_waits_for_no_events_of_publishers() -> None:

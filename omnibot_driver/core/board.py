@@ -7,12 +7,14 @@ into readings and wishes into bytes, and keeps the belief about the board's mode
 when something is sent. It knows no ROS, no port and no clock.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Literal, Protocol
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.traits import Traits
 from omnibot_driver.core.values import value
 
 Vector3 = tuple[float, float, float]
@@ -124,6 +126,9 @@ class SampleBoundary:
 class Board(Protocol):
     """One kind of board. Request methods raise RequestRefused where the mode forbids them."""
 
+    traits: Traits
+    """What it has and can do."""
+
     settings: Any
     """What its wire does not tell, in values of its own kind; may be replaced at any time."""
 
@@ -186,8 +191,8 @@ class Board(Protocol):
     def velocity(self, twist: BodyTwist) -> bytes:
         """Drive with this body velocity, already within the limits."""
 
-    def wheels(self, rates_radps: Vector3) -> bytes:
-        """Turn the wheels A, B, C at these rates, already within the limits."""
+    def wheels(self, rates_radps: Sequence[float]) -> bytes:
+        """Turn the wheels at these rates, in their order, already within the limits."""
 
     def meaning(self, data: bytes) -> BodyTwist:
         """The body velocity that the last frame in these bytes commands, in the board's own axes.

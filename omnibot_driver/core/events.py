@@ -5,8 +5,8 @@
 from dataclasses import dataclass
 
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.mode_manager import RequestDone
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.requests import RequestDone
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,12 +9,12 @@ module knows no bytes and reads no clock.
 """
 
 import math
-from dataclasses import dataclass
 from enum import Enum
-from typing import Final, Literal
+from typing import Final
 
 from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.requests import OnExit, Request, RequestDone
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
@@ -29,16 +29,6 @@ LAST_STOPS: Final = 3
 """So many at once when the port is about to be closed: one may be lost."""
 ANSWER_WITHIN_S: Final = 4.5
 RESET_WITHIN_S: Final = 9.5
-
-OnExit = Literal["stop", "pause", "reset"]
-
-
-class Request(Enum):
-    """What can be asked of a board; the value reads well after "a"."""
-
-    START = "start"
-    PAUSE = "pause"
-    RESET = "reset"
 
 
 class Phase(Enum):
@@ -63,15 +53,6 @@ CLOSED: Final = Phase.CLOSED
 SETTLED: Final = Phase.SETTLED
 PAUSED: Final = Wanted.PAUSED
 """For what is asked with every read: Python 3.11 looks for a member of an Enum by a function."""
-
-
-@dataclass(frozen=True, slots=True)
-class RequestDone:
-    """The answer to a request; ``token`` is what the asker handed in."""
-
-    token: object
-    success: bool
-    message: str
 
 
 class ModeManager:

@@ -33,15 +33,12 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuCorrection, ImuEstimate
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits, Refused
 from omnibot_driver.core.measurement.pipeline import Measured, MeasurementPipeline
-from omnibot_driver.core.mode_manager import CLOSED, ModeManager, OnExit, Phase, Request
+from omnibot_driver.core.mode_manager import CLOSED, ModeManager, Phase
 from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.reporting.figures import SessionFigures
 from omnibot_driver.core.reporting.notices import HEADING_ASSUMED, Notices, why_silent
+from omnibot_driver.core.requests import OnExit, Request
 
-SILENCE_S: Final = 1.5
-"""The board says something at least once a second; after this it is not known to be there."""
-UNHEARD_S: Final = 0.3
-"""A robot that is not heard for so long is driven no further: it may be restarting."""
 TELL_EVERY_S: Final = 0.1
 """News need not be looked for with every read."""
 DISCONNECTED: Final = "disconnected"
@@ -77,7 +74,7 @@ class Session:
         control: ControlMethod = "velocity",
         obeys: bool = True,
     ) -> None:
-        self._board = board
+        self._board, self._traits = board, board.traits
         self._mode_manager = ModeManager(board, run=run)
         self._measurement = MeasurementPipeline(
             board, settings.odometry, settings.motion, settings.imu, axis_signs
@@ -148,8 +145,8 @@ class Session:
         """When ``tick`` must be called at the latest; infinity when nothing is due."""
         if self._mode_manager.phase is CLOSED:
             return math.inf
-        silent_at = math.inf if self._silent else self._heard_at + SILENCE_S
-        unheard_at = self._heard_at + UNHEARD_S if self._commands.current else math.inf
+        silent_at = math.inf if self._silent else self._heard_at + self._traits.silence_s
+        unheard_at = self._heard_at + self._traits.unheard_s if self._commands.current else math.inf
         return min(
             silent_at,
             unheard_at,
@@ -245,12 +242,14 @@ class Session:
 
     def tick(self, now: float) -> None:
         """Time passed."""
-        if self._commands.current and now - self._heard_at >= UNHEARD_S:
+        if self._commands.current and now - self._heard_at >= self._traits.unheard_s:
             self._commands.halt(now)
-        if not self._silent and now - self._heard_at >= SILENCE_S:
+        if not self._silent and now - self._heard_at >= self._traits.silence_s:
             self._silent = True
             self._react(self._measurement.release(), now)
-            self._notify([why_silent(SILENCE_S, bytes_came=self._came_at > self._heard_at)])
+            self._notify(
+                [why_silent(self._traits.silence_s, bytes_came=self._came_at > self._heard_at)]
+            )
             if self._board.mode is not Mode.UNKNOWN:
                 self._board.silence()
                 self._measurement.restart()
@@ -282,7 +281,7 @@ class Session:
         self._command(self._commanding.twist(twist, now, age_s=age_s), now)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
-        """Turn wheels A, B, C. Raises CommandRefused, and then nothing changes."""
+        """Turn the wheels. Raises CommandRefused, and then nothing changes."""
         self._command(self._commanding.wheels(rates_radps, now), now)
 
     def command_pose(self, goal: Pose, now: float) -> None:
@@ -445,12 +444,12 @@ class Session:
         if self._leaving:
             raise CommandRefused("motion command refused: the driver is shutting down")
         motion, expires_at = wish
-        unheard = now - self._heard_at >= UNHEARD_S and not motion.stands
+        unheard = now - self._heard_at >= self._traits.unheard_s and not motion.stands
         if reason := why_not_drive(
             self._mode_manager.phase,
             self._board.mode,
             latched=self._commands.latched,
-            unheard_s=UNHEARD_S if unheard else 0.0,
+            unheard_s=self._traits.unheard_s if unheard else 0.0,
             interlock=self._commanding.interlock.arrive(
                 now, self._commands.settings.timeout_s, stands=motion.stands
             ),

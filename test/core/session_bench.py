@@ -11,9 +11,9 @@ from omnibot_driver.core.commands.stream import CommandSettings
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.mode_manager import Request, RequestDone
 from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 

@@ -9,8 +9,8 @@ import pytest
 from omnibot_driver import parameters
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.mode_manager import Request, RequestDone
 from omnibot_driver.core.omnibot import OmniBot
+from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.core.session import Session
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 

@@ -7,7 +7,7 @@ from robots import standing
 from session_bench import OPENING, START, Bench
 
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator import BoardSettings
 
 

@@ -7,7 +7,7 @@ from robots import drive_on, paused, standing
 from session_bench import PAUSE, STOP, Bench
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.mode_manager import Request, RequestDone
+from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.simulator import BoardMode
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from session_bench import EMERGENCY_STOP, PAUSE, STOP, TICK_S, ZEROS, Bench
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.mode_manager import Request, RequestDone
+from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.simulator import BoardMode, BoardSettings
 
 RUNNING = ("nominal", "imu_only")

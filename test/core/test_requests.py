@@ -10,7 +10,7 @@ from session_bench import OPENING, RESET, START, STOP, Bench
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import StateChanged
-from omnibot_driver.core.mode_manager import Request, RequestDone
+from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.simulator import BoardMode
 
 

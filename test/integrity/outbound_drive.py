@@ -21,9 +21,9 @@ from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.shaping import ControlMethod
 from omnibot_driver.core.commands.stream import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.mode_manager import OnExit
 from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.requests import OnExit
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import SILENCE_S, STANDS_WITHIN_S
 

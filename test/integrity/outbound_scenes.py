@@ -18,7 +18,7 @@ from outbound_teller import ANGULAR_SCALE, Shown
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session
 
 FROM_S: Final = 0.3

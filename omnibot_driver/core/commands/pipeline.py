@@ -126,7 +126,7 @@ class CommandPipeline:
         return motion, expires_at
 
     def wheels(self, rates_radps: Sequence[float], now: float) -> Command:
-        """Turn wheels A, B, C."""
+        """Turn the wheels, in the board's order."""
         return self._shaper.wheels(rates_radps), now + self.stream.settings.timeout_s
 
     def pose(self, goal: Pose) -> Command:

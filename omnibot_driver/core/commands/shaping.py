@@ -65,13 +65,14 @@ class CommandShaper:
         )
 
     def wheels(self, rates_radps: Sequence[float]) -> Setpoint:
-        """Turn the wheels A, B, C."""
+        """Turn the wheels, in the board's order."""
         if self._control == "position":
             raise self._at_odds(Authority.WHEELS)
-        if len(rates_radps) != 3:
+        wheels = self._board.traits.wheels
+        if len(rates_radps) != len(wheels):
             raise CommandRefused(
-                f"wheel_cmd refused: it has {len(rates_radps)} values; send exactly 3,"
-                " the rates of wheels A, B, C in rad/s"
+                f"wheel_cmd refused: it has {len(rates_radps)} values; send exactly {len(wheels)},"
+                f" the rates of wheels {', '.join(wheels)} in rad/s"
             )
         require_finite("wheel_cmd", rates_radps)
         limited = self.limits.wheels(rates_radps)

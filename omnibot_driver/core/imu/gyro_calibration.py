@@ -16,7 +16,7 @@ from statistics import fmean
 from typing import Final
 
 from omnibot_driver.core.board import Vector3
-from omnibot_driver.core.mode_manager import RequestDone
+from omnibot_driver.core.requests import RequestDone
 
 MEASURE_S: Final = 2.0
 BLOCK_S: Final = 1.0

@@ -8,10 +8,12 @@ Commanded poses are taken to have the unit of those that are sent, mm and mrad; 
 it. What the board says is told in ``translation``.
 """
 
+from collections.abc import Sequence
 from typing import Final
 
 from omnibot_driver.core.board import BoardFigures, Mode, Reading, SampleBoundary, Vector3
 from omnibot_driver.core.commands.limits import MAX_WORD, slow, to_nearest
+from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.geometry.se2 import Pose
@@ -29,14 +31,26 @@ from omnibot_driver.core.omnibot.outbound import (
 from omnibot_driver.core.omnibot.schedule import TICK_S, Schedule
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
 from omnibot_driver.core.omnibot.translation import Translation
+from omnibot_driver.core.requests import Request
+from omnibot_driver.core.traits import Traits
 
 _STOP: Final = frames.encode(frames.STOP)
 STOP: Final = transmission(_STOP)
 EMERGENCY_STOP: Final = transmission(frames.encode(frames.EMERGENCY_STOP))
+TRAITS: Final = Traits(
+    imu=True,
+    authorities=frozenset(Authority),
+    requests=frozenset(Request),
+    wheels=("A", "B", "C"),
+    unheard_s=0.3,  # it may be restarting
+    silence_s=1.5,  # it says something at least once a second
+)
 
 
 class OmniBot:
     """One board on one line. ``settings`` may be replaced at any time, but not the delta period."""
+
+    traits = TRAITS
 
     def __init__(self, settings: OmniBotSettings) -> None:
         self._schedule = Schedule(settings.delta_period_s)
@@ -170,7 +184,7 @@ class OmniBot:
         counts = (twist.vx_mps * linear, twist.vy_mps * linear, twist.yaw_rate_radps * angular)
         return self._drive(frames.VELOCITY_MODE, counts)
 
-    def wheels(self, rates_radps: Vector3) -> bytes:
+    def wheels(self, rates_radps: Sequence[float]) -> bytes:
         """Independent wheel drive in rad/s: the unit on the wire is that of a rim speed."""
         unit = self._settings.linear_scale * self._settings.wheel_radius_m
         a, b, c = rates_radps

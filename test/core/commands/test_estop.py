@@ -10,7 +10,7 @@ from session_bench import EMERGENCY_STOP, OPENING, START, STOP, Bench
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import StateChanged
-from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.core.requests import Request
 
 LATCHED_AND_RELEASED = ["e-stop latched by the driver", "e-stop released by the driver"]
 

@@ -10,7 +10,7 @@ from robots import drive_on, driving, estop, reconnect
 from session_bench import OPENING, STOP, Bench, bare
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator import BoardMode
 
 

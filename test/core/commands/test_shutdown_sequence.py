@@ -6,7 +6,7 @@ import pytest
 from robots import driving, paused, standing
 from session_bench import EMERGENCY_STOP, PAUSE, RESET, STOP, TICK_S, Bench
 
-from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator import BoardMode
 
 

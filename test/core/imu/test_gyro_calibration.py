@@ -19,7 +19,7 @@ from omnibot_driver.core.imu.gyro_calibration import (
     deviation,
     mean,
 )
-from omnibot_driver.core.mode_manager import RequestDone
+from omnibot_driver.core.requests import RequestDone
 
 NONE: Vector3 = (0.0, 0.0, 0.0)
 GRAVITY: Vector3 = (0.0, 0.0, -9.8)

@@ -10,7 +10,7 @@ from robots import standing
 from session_bench import Bench, bare
 
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator import BoardPose, BoardSettings
 
 

@@ -17,7 +17,7 @@ from robots import drive_on, driving, estop, push, standing
 from session_bench import STOP, TICK_S, Bench
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator import BoardPose, BoardSettings, SimulatedBoard
 from omnibot_driver.simulator.motors import WheelGains
 

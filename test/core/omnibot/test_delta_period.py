@@ -12,7 +12,6 @@ from session_bench import Bench
 from streams import BYTE_S, TICK_S, frames_of
 
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.mode_manager import Request
 from omnibot_driver.core.omnibot import FrameDecoder
 from omnibot_driver.core.omnibot.cost_model import Context, Expectation
 from omnibot_driver.core.omnibot.frame_schedule import FrameSchedule
@@ -20,6 +19,7 @@ from omnibot_driver.core.omnibot.frames import DeltaFrame, ImuFrame, PoseFrame
 from omnibot_driver.core.omnibot.modes import ModeTracker
 from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, Schedule
 from omnibot_driver.core.omnibot.sequence import Sequence
+from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 
 TEN_HZ_S = 0.1

@@ -5,7 +5,7 @@
 import pytest
 from session_bench import TICK_S, Bench
 
-from omnibot_driver.core.mode_manager import Request
+from omnibot_driver.core.requests import Request
 
 
 def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
