@@ -36,7 +36,6 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.reporting.diagnosis import Status
-from omnibot_driver.parameters import kinematics
 
 UNMEASURED_VARIANCE: Final = 1e6
 """For z, roll and pitch, of which a planar odometry says nothing, and for a twist not known."""
@@ -64,8 +63,8 @@ class MessageSettings:
     wheels: Kinematics
 
     @classmethod
-    def from_parameters(cls, values: Mapping[str, Any]) -> "MessageSettings":
-        """From checked parameter values."""
+    def from_parameters(cls, values: Mapping[str, Any], wheels: Kinematics) -> "MessageSettings":
+        """From checked parameter values; ``wheels``: of the board's profile."""
         prefix = values["frame_prefix"]
         return cls(
             odom_frame=prefix + values["odom_frame"],
@@ -75,7 +74,7 @@ class MessageSettings:
             angular_velocity_stddev=values["angular_velocity_stddev"],
             twist_linear_stddev=values["twist_linear_stddev"],
             twist_angular_stddev=values["twist_angular_stddev"],
-            wheels=kinematics(values),
+            wheels=wheels,
         )
 
 

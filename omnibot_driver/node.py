@@ -22,10 +22,9 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import Bool, Float32MultiArray
 
-from omnibot_driver import cdr, declaration, messages, parameters, selfcheck
+from omnibot_driver import boards, cdr, declaration, messages, parameters, selfcheck
 from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.omnibot import OmniBot
 from omnibot_driver.core.reporting.diagnosis import Refusals
 from omnibot_driver.core.session import Session
 from omnibot_driver.diagnostics import Diagnostics
@@ -53,16 +52,17 @@ class OmniBotDriver(Node):
         self._values = declaration.declare(self)
         self.add_post_set_parameters_callback(self._apply_parameters)
         port = self._values["port"]
-        self._board = OmniBot(parameters.board_settings(self._values))
+        self._profile = boards.load(self._values["board"])
+        self._board = self._profile.make(self._values)
         self._session = Session(
             self._board,
-            parameters.session_settings(self._values),
+            parameters.session_settings(self._values, self._profile.kinematics(self._values)),
             run=self._values["auto_start"],
             axis_signs=tuple(self._values["axis_signs"]),
             control=self._values["control_method"],
             obeys=not is_recording(port),
         )
-        settings = messages.MessageSettings.from_parameters(self._values)
+        settings = self._message_settings()
         self._publishing = Publishing(
             self, self._session, self._board.traits, self._values, settings
         )
@@ -138,12 +138,17 @@ class OmniBotDriver(Node):
         )
         self._end(error)
 
+    def _message_settings(self) -> messages.MessageSettings:
+        wheels = self._profile.kinematics(self._values)
+        return messages.MessageSettings.from_parameters(self._values, wheels)
+
     def _apply_parameters(self, changed: list[rclpy.Parameter]) -> None:
         self._values = parameters.check_all({**self._values, **declaration.ours(changed)})
-        self._publishing.settings = messages.MessageSettings.from_parameters(self._values)
+        self._publishing.settings = self._message_settings()
         self._link.reconnect_interval_s = self._values["reconnect_interval"]
-        settings = parameters.session_settings(self._values)
-        board = parameters.board_settings(self._values)
+        wheels = self._profile.kinematics(self._values)
+        settings = parameters.session_settings(self._values, wheels)
+        board = self._profile.settings(self._values)
         self._link.call(lambda session, now: session.configure(settings, now, board=board))
 
     # From ROS to the board

@@ -15,6 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
 from omnibot_driver import cdr, parameters
+from omnibot_driver.boards import omnibot
 from omnibot_driver.cdr import Messages, Serializer, difference
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
@@ -24,6 +25,8 @@ from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.messages import MessageSettings, Wheels, turned, unturned
+
+DEFAULTS = parameters.check_all({})
 
 numbers = st.floats(allow_nan=False, allow_infinity=False, width=32)
 vectors = st.tuples(numbers, numbers, numbers)
@@ -52,7 +55,7 @@ def settings(draw: st.DrawFn) -> MessageSettings:
     values: dict[str, Any] = parameters.check_all({})
     values |= {name: draw(frames) for name in ("odom_frame", "base_frame", "imu_frame")}
     values |= {name: draw(st.floats(1e-6, 10.0)) for name in values if name.endswith("stddev")}
-    return MessageSettings.from_parameters(values)
+    return MessageSettings.from_parameters(values, omnibot.kinematics(values))
 
 
 def padded(data: bytes, like: bytes) -> bytes:
@@ -92,7 +95,7 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
 def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
     """Of a differential drive: 1 m ahead on wheels of 0.1 m is 10 rad."""
     two = replace(
-        MessageSettings.from_parameters(parameters.check_all({})),
+        MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS)),
         wheels=DifferentialKinematics(wheel_radius_m=0.1, track_m=0.4),
     )
     ahead = OdometryEstimate(
@@ -110,7 +113,7 @@ def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
 def test_no_frame_length_is_refused_at_start(length: int) -> None:
     """So each alignment is fast."""
     values = parameters.check_all({"imu_frame": "i" * length or "x", "odom_frame": "o" * 7})
-    assert difference(MessageSettings.from_parameters(values)) == ""
+    assert difference(MessageSettings.from_parameters(values, omnibot.kinematics(values))) == ""
 
 
 @pytest.mark.parametrize(
@@ -126,7 +129,7 @@ def test_a_difference_is_found_at_start(
 ) -> None:
     """In any constant part; values that vary are compared in the test above."""
     monkeypatch.setattr(cdr, name, wrong)
-    chosen = MessageSettings.from_parameters(parameters.check_all({}))
+    chosen = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
     assert difference(chosen) == strange
 
 

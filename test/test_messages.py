@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver import messages, parameters
+from omnibot_driver.boards import omnibot
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.geometry.se2 import Pose
@@ -21,9 +22,10 @@ from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.reporting.diagnosis import Level, Status
 
-SETTINGS = messages.MessageSettings.from_parameters(parameters.check_all({}))
+DEFAULTS = parameters.check_all({})
+SETTINGS = messages.MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
 PREFIXED = messages.MessageSettings.from_parameters(
-    parameters.check_all({"frame_prefix": "robot1/"})
+    parameters.check_all({"frame_prefix": "robot1/"}), omnibot.kinematics(DEFAULTS)
 )
 STAMP = messages.time_message(1_700_000_000_123_456_789)
 

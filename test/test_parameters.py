@@ -9,6 +9,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from omnibot_driver.boards import omnibot
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
@@ -16,7 +17,6 @@ from omnibot_driver.parameters import (
     BY_NAME,
     PARAMETERS,
     Parameter,
-    board_settings,
     check_all,
     session_settings,
 )
@@ -186,7 +186,8 @@ def test_values_reach_the_core_under_their_meaning() -> None:
             "gyro_bias": [0.1, 0.2, 0.3], "accel_bias": [1, 2, 3], "auto_gyro_bias": True,
         }
     )  # fmt: skip
-    board, session = board_settings(values), session_settings(values)
+    board = omnibot.settings(values)
+    session = session_settings(values, omnibot.kinematics(values))
     assert board.baudrate == 57600
     assert (board.linear_scale, board.angular_scale, board.wheel_radius_m) == (71.0, 501.0, 0.03)
     assert (board.position_scale, board.heading_scale) == (900.0, 800.0)

@@ -18,11 +18,12 @@ from rclpy.time import Time
 from sensor_msgs.msg import Imu, JointState
 
 from omnibot_driver import parameters
+from omnibot_driver.boards import omnibot
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
-from omnibot_driver.core.omnibot import OmniBot, PausedFrame
+from omnibot_driver.core.omnibot import PausedFrame
 from omnibot_driver.core.omnibot.board import TRAITS
 from omnibot_driver.core.omnibot.frames import Frame
 from omnibot_driver.core.omnibot.modes import ModeTracker
@@ -47,10 +48,16 @@ def node() -> Iterator[Node]:
 def session_with(node: Node) -> tuple[Session, Publishing]:
     """A session that hears nothing but what a test has it hear."""
     session = Session(
-        OmniBot(parameters.board_settings(VALUES)), parameters.session_settings(VALUES), run=True
+        omnibot.make(VALUES),
+        parameters.session_settings(VALUES, omnibot.kinematics(VALUES)),
+        run=True,
     )
     return session, Publishing(
-        node, session, TRAITS, VALUES, MessageSettings.from_parameters(VALUES)
+        node,
+        session,
+        TRAITS,
+        VALUES,
+        MessageSettings.from_parameters(VALUES, omnibot.kinematics(VALUES)),
     )
 
 
@@ -149,7 +156,7 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
     far = OdometryEstimate(1.0, Pose(), None, Covariance(), rolled=Pose(100.0, 20.0, 3.0))
     publishing.publish([far], 0)
     other = {**VALUES, "wheel_radius": 0.0295, "base_radius": 0.15}
-    publishing.settings = MessageSettings.from_parameters(other)
+    publishing.settings = MessageSettings.from_parameters(other, omnibot.kinematics(other))
     publishing.publish([far], 0)
     before, after = (deserialize_message(data, JointState).position for data in published)
     assert before == after

@@ -15,17 +15,19 @@ from types import FrameType
 import pytest
 
 from omnibot_driver import parameters
+from omnibot_driver.boards import omnibot
 from omnibot_driver.cdr import LITTLE_ENDIAN, Serializer, twist
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
-from omnibot_driver.core.omnibot import FrameDecoder, OmniBot
+from omnibot_driver.core.omnibot import FrameDecoder
 from omnibot_driver.core.session import Session
 from omnibot_driver.messages import MessageSettings, turned, unturned
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 
+DEFAULTS = parameters.check_all({})
 TICK_S = 0.01
 SETTLED = 400
 TICKS = 400
@@ -56,7 +58,9 @@ def opened_session() -> Session:
     """As the driver makes it."""
     values = parameters.check_all({})
     session = Session(
-        OmniBot(parameters.board_settings(values)), parameters.session_settings(values), run=True
+        omnibot.make(values),
+        parameters.session_settings(values, omnibot.kinematics(values)),
+        run=True,
     )
     session.opened(0.0)
     session.take_output(0.0)
@@ -135,7 +139,7 @@ def test_a_command_calls_no_more_than_it_did() -> None:
 
 def test_a_serialised_tick_calls_no_more_than_it_did() -> None:
     """An Imu, an Odometry and a JointState from their estimates."""
-    settings = MessageSettings.from_parameters(parameters.check_all({}))
+    settings = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
     make, before = Serializer(settings), unturned(settings.wheels)
     imu = ImuEstimate(0.0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     pose, rates = Pose(1.0, 2.0, 3.0), BodyTwist(0.1, 0.2, 0.3)

@@ -9,7 +9,7 @@ may be.
 """
 
 from omnibot_driver.parameters.parameter import Parameter, Value
-from omnibot_driver.parameters.settings import board_settings, kinematics, session_settings
+from omnibot_driver.parameters.settings import session_settings
 from omnibot_driver.parameters.table import BY_NAME, PARAMETERS, SECTIONS, check_all, nearest
 
 __all__ = [
@@ -18,9 +18,7 @@ __all__ = [
     "SECTIONS",
     "Parameter",
     "Value",
-    "board_settings",
     "check_all",
-    "kinematics",
     "nearest",
     "session_settings",
 ]

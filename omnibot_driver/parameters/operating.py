@@ -8,6 +8,14 @@ from omnibot_driver.parameters.parameter import Parameter
 
 LINE: Final = (
     Parameter(
+        "board",
+        "omnibot",
+        "",
+        "The motor board at the other end of the line.",
+        choices=("omnibot",),
+        fixed=True,
+    ),
+    Parameter(
         "port",
         "/dev/ttyUSB0",
         "",

@@ -9,41 +9,16 @@ from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.stream import CommandSettings
 from omnibot_driver.core.geometry.kinematics import Kinematics
-from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.imu.bias_correction import ImuCorrection
-from omnibot_driver.core.imu.scale import STANDARD_GRAVITY, ImuScale
+from omnibot_driver.core.imu.scale import STANDARD_GRAVITY
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
 from omnibot_driver.core.odometry.covariance import OdometryNoise
 from omnibot_driver.core.odometry.estimator import OdometrySettings
-from omnibot_driver.core.omnibot import OmniBotSettings
 from omnibot_driver.core.session import SessionSettings
 
 
-def board_settings(values: Mapping[str, Any]) -> OmniBotSettings:
-    """What the board's translator needs of checked values."""
-    return OmniBotSettings(
-        baudrate=values["baudrate"],
-        linear_scale=values["linear_scale"],
-        angular_scale=values["angular_scale"],
-        position_scale=values["position_scale"],
-        heading_scale=values["heading_scale"],
-        wheel_radius_m=values["wheel_radius"],
-        base_radius_m=values["base_radius"],
-        counts_per_revolution=values["counts_per_revolution"],
-        delta_frame=values["delta_frame"],
-        delta_period_s=values["delta_period"],
-        pose_byte_order=values["pose_byte_order"],
-        imu=ImuScale(accel_range_g=values["accel_range"], gyro_range_dps=values["gyro_range"]),
-    )
-
-
-def kinematics(values: Mapping[str, Any]) -> Kinematics:
-    """The wheels, by checked values."""
-    return OmniKinematics(values["wheel_radius"], values["base_radius"])
-
-
-def session_settings(values: Mapping[str, Any]) -> SessionSettings:
-    """What the session needs of checked values."""
+def session_settings(values: Mapping[str, Any], wheels: Kinematics) -> SessionSettings:
+    """What the session needs of checked values; ``wheels``: of the board's profile."""
     return SessionSettings(
         limits=SpeedLimits(
             linear_mps=values["max_linear_speed"],
@@ -61,7 +36,7 @@ def session_settings(values: Mapping[str, Any]) -> SessionSettings:
                 wheel_drift=values["odom_wheel_drift"],
                 wheel_scale=values["odom_wheel_scale"],
                 wheel_slip=values["odom_wheel_slip"],
-                wheels=OmniKinematics(wheel_radius_m=1.0, base_radius_m=values["base_radius"]),
+                wheels=wheels.rims,
                 unheard_mps2=values["odom_gap_acceleration"],
                 unheard_radps2=values["odom_gap_angular_acceleration"],
             ),

@@ -17,7 +17,8 @@ from ratios import Figure, alternate, short
 from truth import SCENARIOS, generate
 
 from omnibot_driver import parameters
-from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, OmniBot, PoseFrame
+from omnibot_driver.boards import omnibot
+from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, PoseFrame
 from omnibot_driver.core.omnibot.frames import Frame
 from omnibot_driver.core.session import Session
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
@@ -166,8 +167,8 @@ def memory(hours: float = 1.0) -> str:
 def _session() -> Session:
     settings = parameters.check_all({})
     session = Session(
-        OmniBot(parameters.board_settings(settings)),
-        parameters.session_settings(settings),
+        omnibot.make(settings),
+        parameters.session_settings(settings, omnibot.kinematics(settings)),
         run=True,
     )
     session.opened(0.0)

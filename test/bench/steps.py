@@ -20,13 +20,14 @@ from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState
 
 from omnibot_driver import parameters
+from omnibot_driver.boards import omnibot
 from omnibot_driver.cdr import Serializer
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
-from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, OmniBot
+from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame
 from omnibot_driver.core.session import Session
 from omnibot_driver.messages import MessageSettings, turned, unturned
 
@@ -40,7 +41,7 @@ class Relay:
 
     def __init__(self, node: Node) -> None:
         values = parameters.check_all({})
-        settings = MessageSettings.from_parameters(values)
+        settings = MessageSettings.from_parameters(values, omnibot.kinematics(values))
         self._make, self._wheels, self._sizes = (
             Serializer(settings),
             unturned(settings.wheels),
@@ -51,8 +52,8 @@ class Relay:
         self._joints = node.create_publisher(JointState, "joint_states", 10)
         self._decoder = FrameDecoder()
         self._session = Session(
-            OmniBot(parameters.board_settings(values)),
-            parameters.session_settings(values),
+            omnibot.make(values),
+            parameters.session_settings(values, omnibot.kinematics(values)),
             run=True,
         )
         self._session.opened(time.monotonic())

@@ -7,6 +7,7 @@ from contextlib import suppress
 import pytest
 
 from omnibot_driver import parameters
+from omnibot_driver.boards import omnibot
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.omnibot import OmniBot
@@ -19,7 +20,8 @@ TICK_S = 0.01
 
 def opened() -> Session:
     values = parameters.check_all({})
-    board, settings = parameters.board_settings(values), parameters.session_settings(values)
+    board = omnibot.settings(values)
+    settings = parameters.session_settings(values, omnibot.kinematics(values))
     session = Session(OmniBot(board), settings, run=True)
     session.opened(0.0)
     return session

@@ -7,7 +7,7 @@ frame has its origin in the middle of the axle.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -21,6 +21,11 @@ class DifferentialKinematics:
     track_m: float
 
     joints: ClassVar = ("left_wheel_joint", "right_wheel_joint")
+
+    @property
+    def rims(self) -> "DifferentialKinematics":
+        """With wheels of 1 m: rates are speeds of the rims."""
+        return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
         """Without its sideways part."""

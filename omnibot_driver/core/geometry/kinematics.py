@@ -20,6 +20,10 @@ class Kinematics(Protocol):
         """What is derived of it can be kept."""
 
     @property
+    def rims(self) -> "Kinematics":
+        """The same with wheels of 1 m, so that rates are speeds of the rims."""
+
+    @property
     def joints(self) -> tuple[str, ...]:
         """Names of the driven wheels' joints, as in the robot's description."""
 

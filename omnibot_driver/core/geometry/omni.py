@@ -8,7 +8,7 @@ Source: the velocity equations and the odometry matrix of the manual's "Control 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -25,6 +25,11 @@ class OmniKinematics:
     base_radius_m: float
 
     joints: ClassVar = ("wheel_a_joint", "wheel_b_joint", "wheel_c_joint")
+
+    @property
+    def rims(self) -> "OmniKinematics":
+        """With wheels of 1 m: rates are speeds of the rims."""
+        return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
         """All of it: three wheels, three degrees of freedom."""

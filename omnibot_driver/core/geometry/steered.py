@@ -9,7 +9,7 @@ body has its origin in the middle of the driven axle.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
@@ -26,6 +26,11 @@ class SteeredKinematics:
 
     joints: ClassVar = DifferentialKinematics.joints
     steering_joint: ClassVar = "front_steering_joint"
+
+    @property
+    def rims(self) -> "SteeredKinematics":
+        """With wheels of 1 m: rates are speeds of the rims."""
+        return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
         """Without its sideways part."""

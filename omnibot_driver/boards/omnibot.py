@@ -1,0 +1,38 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The Neuron OmniBot: what makes it of the driver's parameters."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from omnibot_driver.core.geometry.omni import OmniKinematics
+from omnibot_driver.core.imu.scale import ImuScale
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+
+
+def make(values: Mapping[str, Any]) -> OmniBot:
+    """The board, nothing of which is heard yet."""
+    return OmniBot(settings(values))
+
+
+def settings(values: Mapping[str, Any]) -> OmniBotSettings:
+    """What its wire does not tell, by checked values."""
+    return OmniBotSettings(
+        baudrate=values["baudrate"],
+        linear_scale=values["linear_scale"],
+        angular_scale=values["angular_scale"],
+        position_scale=values["position_scale"],
+        heading_scale=values["heading_scale"],
+        wheel_radius_m=values["wheel_radius"],
+        base_radius_m=values["base_radius"],
+        counts_per_revolution=values["counts_per_revolution"],
+        delta_frame=values["delta_frame"],
+        delta_period_s=values["delta_period"],
+        pose_byte_order=values["pose_byte_order"],
+        imu=ImuScale(accel_range_g=values["accel_range"], gyro_range_dps=values["gyro_range"]),
+    )
+
+
+def kinematics(values: Mapping[str, Any]) -> OmniKinematics:
+    """Its wheels A, B, C."""
+    return OmniKinematics(values["wheel_radius"], values["base_radius"])
