@@ -89,7 +89,7 @@ def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     assert most_calls(FrameDecoder().feed)[kind] <= bound
 
 
-@pytest.mark.parametrize(("kind", "bound"), [(IMU, 48), (DELTA, 156), (POSE, 279)])
+@pytest.mark.parametrize(("kind", "bound"), [(IMU, 48), (DELTA, 158), (POSE, 281)])
 def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     """From the bytes of one read to its events, and what the link asks after each."""
     session = opened_session()

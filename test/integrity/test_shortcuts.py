@@ -30,6 +30,7 @@ from omnibot_driver.core.omnibot.cost_model import NOTHING_KNOWN, Expectation
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics
 from omnibot_driver.core.omnibot.fast_path import Walk, take_run
 from omnibot_driver.core.omnibot.frames import Frame, decode_measured, measure
+from omnibot_driver.core.omnibot.gaps import BYTE_S, InterFrameGaps
 from omnibot_driver.core.omnibot.lower_bound import least_costs
 
 SECONDS = 6.0
@@ -197,7 +198,7 @@ def test_most_of_the_lattice_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
     chunks = chunks_of("driving", "1 byte in 100 lost", "4096-byte blocks", 1)
     for quick in edges:
 
-        def count(search: trellis._Search, quick: bool = quick) -> Sequence[trellis.Piece]:
+        def count(search: trellis._Search, quick: bool = quick) -> Sequence[trellis.Segment]:
             edges[quick] += len(search._edges)
             return pieces(search)
 
@@ -211,7 +212,9 @@ def test_most_of_the_lattice_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
     """Nor does the bound fall, along any edge, by more than the edge costs."""
     least = least_costs(data)
-    search = trellis._Search(data, NOTHING_KNOWN, Expectation(16384.0), [], "big")
+    search = trellis._Search(
+        data, NOTHING_KNOWN, Expectation(16384.0), InterFrameGaps(BYTE_S), "big"
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(trellis, "least_costs", lambda data: [0.0] * (2 * len(data) + 3))
         patch.setattr(trellis, "STEP", inf)

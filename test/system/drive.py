@@ -34,7 +34,8 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Of a drive. Errors in m and rad, of ``odom`` against the board's own pose."""
+    """Of a drive. Sent: since the first that was heard. Errors in m and rad, of ``odom`` against
+    the board's own pose."""
 
     seconds: float
     way_m: float
@@ -141,10 +142,10 @@ def compare(
         way_m,
         line.lost,
         line.flipped,
-        len(words),
+        len(words) - since(imu_found),
         len(imu),
         imu_found.count(None),
-        len(deltas),
+        len(deltas) - since(odom_found),
         len(odom),
         odom_found.count(None),
         max(error for error, _ in errors),
@@ -170,6 +171,11 @@ def trace(
             at, at_s = number, stamp_s
         found.append(number)
     return found
+
+
+def since(found: Sequence[int | None]) -> int:
+    """The first frame that was heard: before it nobody listened."""
+    return next(number for number in found if number is not None)
 
 
 def outwards(middle: int, reach: int) -> Iterator[int]:
