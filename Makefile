@@ -46,7 +46,7 @@ docs: $(VENV)/.docs  ## write what is generated, and build the documents as a si
 pictures: $(VENV)/.test  ## make the pictures of README and documents anew (5 minutes)
 	@$(PY) test/pictures
 
-integrity: $(VENV)/.test  ## measure damaged lines, both ways (15 minutes), into docs/integrity.md
+integrity: $(VENV)/.test  ## measure damaged lines, both ways (20 minutes), into docs/integrity.md
 	$(PY) test/integrity/report.py; inbound=$$?; $(PY) test/integrity/outbound.py && exit $$inbound
 
 bench: $(VENV)/.test  ## measure speed against a floor (11 minutes), into docs/performance.md
