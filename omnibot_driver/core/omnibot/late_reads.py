@@ -81,8 +81,8 @@ def cause(
     * when bytes came faster than the line can send them: they had waited.
 
     The line was idle when a text stands behind the pause, when the bytes that follow the frame
-    begin none, or when ticks that were read one
-    by one are equally late. While a board is paused nothing is due.
+    begin none, or when ticks that were read one by one are equally late. While a board is paused
+    nothing is due.
     """
     if is_text(data, start):
         return Cause.LATE_READER
