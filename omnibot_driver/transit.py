@@ -32,6 +32,9 @@ CLOCK_RETREATS: Final = 10.0
 """A message that seems to be early is so many times less likely to be a sender's than one that is
 late by as much."""
 MOST_SENDERS: Final = 8
+KNOWN_AFTER: Final = 10
+"""Of so many messages one was hardly delayed. The first of a sender may all have been: then those
+that come sooner seem to have been sent later than they were."""
 
 Differences = tuple[float, float]
 """Our clock less a sender's when its message came in, in s: by the time of day, and steady."""
@@ -55,10 +58,14 @@ class Arrival:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """``total_s`` since it was sent, of which it ``waited_s`` to be taken from our own queue."""
+    """``total_s`` since it was sent, of which it ``waited_s`` to be taken from our own queue.
+
+    ``sent_ns``: by our time of day; two possible times while too little is known of its sender.
+    """
 
     total_s: float
     waited_s: float
+    sent_ns: tuple[int, ...] = ()
 
     def require(self, topic: str, longest_s: float) -> None:
         """Raises CommandRefused for a command that was under way for longer."""
@@ -95,7 +102,10 @@ class Transit:
             (arrival.steady_ns - waited_ns - arrival.sent_ns) / 1e9,
         )
         late_s = self._late_s(arrival.number, differences_s, at_s, longest_s)
-        return Delay(late_s + waited_ns / 1e9, waited_ns / 1e9)
+        total_s = late_s + waited_ns / 1e9
+        sent_ns = arrival.now_ns - round(total_s * 1e9)
+        known = self._senders[-1].heard >= KNOWN_AFTER
+        return Delay(total_s, waited_ns / 1e9, (sent_ns,) if known else (sent_ns, arrival.sent_ns))
 
     def _late_s(
         self, number: int | None, differences_s: Differences, at_s: float, longest_s: float
@@ -117,6 +127,7 @@ class _Sender:
 
     def __init__(self, differences_s: Differences, at_s: float) -> None:
         self.number: int | None = None
+        self.heard = 1
         self._offsets = [_Offset(difference_s, at_s) for difference_s in differences_s]
 
     def may_send(self, number: int | None) -> bool:
@@ -133,6 +144,7 @@ class _Sender:
 
     def hear(self, differences_s: Differences, at_s: float, longest_s: float) -> float:
         """It sent a message: for how long that was under way."""
+        self.heard += 1
         return min(
             offset.hear(difference_s, at_s, longest_s)
             for offset, difference_s in zip(self._offsets, differences_s, strict=True)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.transit import (
     HEALS_AFTER_S,
+    KNOWN_AFTER,
     LARGEST_DRIFT,
     MOST_SENDERS,
     Arrival,
@@ -222,3 +223,20 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
     with pytest.raises(CommandRefused, match=r"1\.1 s of it in this driver's queue.* executor"):
         Delay(1.2, 1.1).require("cmd_vel", 0.5)
     Delay(0.5, 0.5).require("cmd_vel", 0.5)
+
+
+def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
+    """The first of a sender was late by half a second: its clock seems to be half a second off."""
+    receiver, sender = Receiver(), Sender()
+    receiver.hear(sender, 100.0, 0.5)
+    seems_ns, says_ns = receiver.hear(sender, 101.0, 0.7).sent_ns
+    assert seems_ns == pytest.approx(DAY_NS + 101.5 * NS, abs=1e6)
+    assert says_ns == DAY_NS + 101 * NS
+
+
+def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
+    """Whatever it says."""
+    receiver, sender = Receiver(), Sender(-HOUR_S)
+    for number in range(KNOWN_AFTER):
+        delay = receiver.hear(sender, 100.0 + number, 0.01)
+    assert delay.sent_ns == (pytest.approx(DAY_NS + (109.01) * NS, abs=1e7),)
