@@ -2,11 +2,12 @@
 
 """The guard: a process of its own that stops the robot when the driver no longer can.
 
-It shares the driver's open port, and hears a heartbeat on its standard input. When the heartbeat
-ceases, or the driver is gone, it repeats the stop that it was given, for a second or until the
-driver is heard again: the emergency stop if the last heartbeat said that it is latched. It knows no
-board, and imports next to nothing, so that it is small and soon there: `keeper.py` starts it as
-``python guard.py PORT_DESCRIPTOR STOP_IN_HEX EMERGENCY_STOP_IN_HEX``.
+It shares the driver's open lines, serial ports or connected sockets, and hears a heartbeat on its
+standard input. When the heartbeat ceases, or the driver is gone, it repeats the stop that it was
+given, for a second or until the driver is heard again: the emergency stop if the last heartbeat
+said that it is latched. It knows no board, and imports next to nothing, so that it is small and
+soon there: `keeper.py` starts it as ``python guard.py STOP EMERGENCY_STOP``. Each is what to write,
+one thing after the other, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``.
 """
 
 import contextlib
@@ -29,17 +30,22 @@ PACE_S = 0.05
 DRIVER = 0
 
 
-def watch(port: int, stop: bytes, emergency_stop: bytes) -> None:
+Words = list[tuple[int, bytes]]
+"""Descriptors, and what is written to them."""
+
+
+def watch(stop: Words, emergency_stop: Words) -> None:
     """Until the driver is gone, and then a second longer unless it said that it goes."""
-    os.set_blocking(port, False)
+    for line in {line for line, _ in stop + emergency_stop}:
+        os.set_blocking(line, False)
     patience_s: float | None = LIMIT_S
     last_words = stop
     while True:
         if not select.select([DRIVER], [], [], patience_s)[0]:
-            speak(port, last_words, until=[DRIVER])
+            speak(last_words, until=[DRIVER])
             patience_s = None
         elif not (heard := os.read(DRIVER, 4096)):
-            speak(port, last_words, until=[])
+            speak(last_words, until=[])
             return
         elif BYE in heard:
             return
@@ -48,27 +54,39 @@ def watch(port: int, stop: bytes, emergency_stop: bytes) -> None:
             last_words = emergency_stop if heard.endswith(LATCHED_BEAT) else stop
 
 
-def speak(port: int, last_words: bytes, until: list[int]) -> None:
+def speak(last_words: Words, until: list[int]) -> None:
     """Say them ``TIMES`` times; stop when there is something to read from one of ``until``."""
-    drop_what_waits(port)
+    lines = {line for line, _ in last_words}
+    for line in lines:
+        drop_what_waits(line)
     for _ in range(TIMES):
-        try:
-            os.write(port, last_words)
-        except BlockingIOError:
-            drop_what_waits(port)
-        except OSError:
-            return  # gone
-        if select.select(until, [], [], PACE_S)[0]:
+        for line, data in last_words:
+            try:
+                if line in lines:
+                    os.write(line, data)
+            except BlockingIOError:
+                drop_what_waits(line)
+            except ConnectionRefusedError:
+                pass  # a datagram that nothing listened for; the next one may be heard
+            except OSError:
+                lines.discard(line)  # gone
+        if not lines or select.select(until, [], [], PACE_S)[0]:
             return
 
 
-def drop_what_waits(port: int) -> None:
+def drop_what_waits(line: int) -> None:
     """Motion commands that are still on their way must not keep the stop waiting."""
     with contextlib.suppress(termios.error):  # a socket, or gone
-        termios.tcflush(port, termios.TCOFLUSH)
+        termios.tcflush(line, termios.TCOFLUSH)
+
+
+def words(argument: str) -> Words:
+    """What `keeper.py` made one argument of."""
+    each = (word.split(":") for word in argument.split(","))
+    return [(int(descriptor), bytes.fromhex(data)) for descriptor, data in each]
 
 
 if __name__ == "__main__":
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)  # whoever ends the driver so need not ask its guard
-    watch(int(sys.argv[1]), bytes.fromhex(sys.argv[2]), bytes.fromhex(sys.argv[3]))
+    watch(words(sys.argv[1]), words(sys.argv[2]))

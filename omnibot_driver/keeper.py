@@ -14,9 +14,11 @@ import struct
 import subprocess
 import sys
 import termios
+from collections.abc import Sequence
 from typing import Final
 
 from omnibot_driver import guard
+from omnibot_driver.core.packets import Packets
 
 BEAT_S: Final = 0.1
 RESTART_S: Final = 1.0
@@ -33,15 +35,19 @@ SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + 1.5
 
 
 class Keeper:
-    """A guard for one open port, from now until ``end``.
+    """A guard for open lines, from now until ``end``.
 
-    ``stop``, ``emergency_stop``: what the guard is to say, by whether the e-stop is latched.
+    ``descriptors``: of the lines, by channel; ``stop``, ``emergency_stop``: what the guard is to
+    say, by whether the e-stop is latched.
     """
 
-    def __init__(self, descriptor: int, stop: bytes, emergency_stop: bytes) -> None:
+    def __init__(self, descriptors: Sequence[int], stop: Packets, emergency_stop: Packets) -> None:
         self._trouble = ""
-        self._descriptor = descriptor
-        self._words = stop.hex(), emergency_stop.hex()
+        self._descriptors = tuple(descriptors)
+        self._words = [
+            ",".join(f"{descriptors[channel]}:{data.hex()}" for channel, data in packets)
+            for packets in (stop, emergency_stop)
+        ]
         self._process: subprocess.Popen[bytes] | None = None
         self._dying: list[subprocess.Popen[bytes]] = []
         """Killed, and not gone yet."""
@@ -111,12 +117,12 @@ class Keeper:
         command = [sys.executable, "-I", "-S", name]
         try:
             self._process = subprocess.Popen(
-                [*command, str(self._descriptor), *self._words],
+                [*command, *self._words],
                 bufsize=0,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
-                pass_fds=(self._descriptor,),
+                pass_fds=self._descriptors,
                 cwd=folder,
                 start_new_session=True,  # ctrl-C is for the driver alone
             )

@@ -20,14 +20,15 @@ from typing import Final, TypeVar
 
 from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.events import Event, Notice
+from omnibot_driver.core.packets import Packet, Packets
 from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
 from omnibot_driver.core.requests import OnExit
 from omnibot_driver.core.session import Session
 from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
 from omnibot_driver.kernel_counts import waited_s
 from omnibot_driver.outbox import Delivery, Outbox
-from omnibot_driver.port import Port
 from omnibot_driver.stall_detector import StallDetector, boot_time_s
+from omnibot_driver.transports import Transport
 
 JOIN_TIMEOUT_S: Final = 3.0
 """Longer than a guard takes to repeat Stop."""
@@ -49,11 +50,11 @@ T = TypeVar("T")
 class Link:
     """One session on one port, which is opened again whenever it is lost.
 
-    ``last_words``: Stop, and the emergency stop, for a guard to say when this process cannot; None:
-    no guard is wanted.
+    ``opener`` opens the transport, whose name for the user is ``port``. ``last_words``: Stop, and
+    the emergency stop, for a guard to say when this process cannot; None: no guard is wanted.
     ``deliver`` gets the session's events; ``refused`` the reason why a command was not obeyed;
     ``report`` a sentence about the port whenever it cannot be had or is lost, and None when it is
-    open; ``on_read`` and ``on_write`` the bytes of each read and each write as they were. They are
+    open; ``on_read`` and ``on_write`` each packet that was read and written. They are
     called one at a time, in the order in which it happened, on the reader's thread or another.
     ``failed`` gets the exception that ended a thread, which nothing but a defect can do.
     """
@@ -61,25 +62,25 @@ class Link:
     def __init__(
         self,
         session: Session,
-        url: str,
-        baudrate: int,
+        opener: Callable[[], Transport],
+        port: str,
         *,
-        last_words: tuple[bytes, bytes] | None,
+        last_words: tuple[Packets, Packets] | None,
         reconnect_interval_s: float,
         deliver: Callable[[Sequence[Event]], None],
         report: Callable[[str | None], None],
         failed: Callable[[BaseException], None],
         refused: Callable[[str], None] = lambda _reason: None,
-        on_read: Callable[[bytes], None] | None = None,
-        on_write: Callable[[bytes], None] | None = None,
+        on_read: Callable[[Packet], None] | None = None,
+        on_write: Callable[[Packet], None] | None = None,
     ) -> None:
         self._session = session
-        self._url = url
+        self._name = port
         self._trouble = ""
         self._opened = self._received = self._sent = 0
         self._overruns: int | None = None
         self._count_at = -math.inf
-        self._open = partial(Port, url, baudrate)
+        self._open = opener
         self._last_words = last_words
         self.reconnect_interval_s = self._wait_s = reconnect_interval_s
         self._deliver, self._report, self._failed = deliver, report, failed
@@ -91,7 +92,7 @@ class Link:
         self._closing = threading.Event()
         self._leaving = self._stands = False
         self._on_exit: OnExit = "stop"
-        self._port: Port | None = None
+        self._port: Transport | None = None
         self._write_error: LinkError | None = None
         self._keeper: Keeper | None = None
         self._unguarded_told = False
@@ -136,8 +137,10 @@ class Link:
         with self._changed:
             return self._write_error is not None
 
-    def command(self, action: Callable[[Session, T, float], None], wish: T, sent_ns: int) -> None:
-        """``call``, with a wish that was sent at this time of day, as far as is known.
+    def command(
+        self, action: Callable[[Session, T, float], None], wish: T, sent_ns: Sequence[int]
+    ) -> None:
+        """``call``, with a wish that was sent at one of these times of day, as far as is known.
 
         Raises CommandRefused for one that has been waiting while this process stood still. Every
         refusal is delivered as well, in its place among the events.
@@ -147,7 +150,7 @@ class Link:
                 now = time.monotonic()
                 try:
                     boot_s = boot_time_s()
-                    if not self._standstill.outlived_by(sent_ns, boot_s):
+                    if not all(self._standstill.outlived_by(at_ns, boot_s) for at_ns in sent_ns):
                         self._heed_standstill(boot_s)
                         raise CommandRefused(WAITED)
                     action(self._session, wish, now)
@@ -164,7 +167,7 @@ class Link:
         """All that is counted and measured, at one moment."""
         with self._changed:
             link = LinkFigures(
-                port=self._url,
+                port=self._name,
                 trouble=self._trouble,
                 opened=self._opened,
                 received_bytes=self._received,
@@ -185,7 +188,7 @@ class Link:
                 self._leaving = True
                 self._on_exit = on_exit
                 self._stop_for_good()
-                self._write(self._session.shutdown_sequence(on_exit))
+                self._write(self._session.shutdown_sequence(on_exit, time.monotonic()))
                 if self._port is not None:
                     told = self._write_error is None
                     self._stands = told and self._session.stands
@@ -256,7 +259,7 @@ class Link:
                 longest_s = max(LONGEST_WAIT_S, self.reconnect_interval_s)
                 self._wait_s = min(BACK_OFF * self._wait_s, longest_s)
 
-    def _attach(self, port: Port) -> None:
+    def _attach(self, port: Transport) -> None:
         keeper, notices = self._guarded(port)
         with self._changed:
             self._port, self._write_error, self._keeper = port, None, keeper
@@ -269,27 +272,27 @@ class Link:
             self._settle()
         self._outbox.deliver()
 
-    def _guarded(self, port: Port) -> tuple[Keeper | None, list[Notice]]:
+    def _guarded(self, port: Transport) -> tuple[Keeper | None, list[Notice]]:
         if self._last_words is None or port.ends_with_us:
             return None, []
-        if port.descriptor is not None:
-            return Keeper(port.descriptor, *self._last_words), []
+        if port.descriptors is not None:
+            return Keeper(port.descriptors, *self._last_words), []
         told, self._unguarded_told = self._unguarded_told, True
         text = f"this kind of port cannot be shared with a guard process: {WITHOUT_GUARD}"
         return None, [] if told else [Notice(text)]
 
-    def _read(self, port: Port) -> None:
+    def _read(self, port: Transport) -> None:
         while not self._closing.is_set():
-            data = port.read()
+            packet = channel, data = port.read()
             if data and self._on_read is not None:
-                self._tell(partial(self._on_read, data))
+                self._tell(partial(self._on_read, packet))
             with self._lock:
                 if self._write_error is not None:
                     raise self._write_error
                 if not data:
                     continue
                 now = time.monotonic()
-                measured = self._session.hear(data, now)
+                measured = self._session.hear(data, now, channel)
                 claimed = bool(measured) and self._outbox.claim()
                 if measured and not claimed:
                     self._outbox.put(partial(self._deliver, measured))
@@ -309,7 +312,7 @@ class Link:
                     self._settle()
             self._outbox.deliver()
 
-    def _count(self, port: Port, now: float) -> None:
+    def _count(self, port: Transport, now: float) -> None:
         """With the lock held: what the kernel lost, now and then."""
         if now < self._count_at:
             return
@@ -318,11 +321,11 @@ class Link:
         if self._overruns:
             self._session.overran(self._overruns)
 
-    def _detach(self, port: Port, *, comes_back: bool) -> None:
+    def _detach(self, port: Transport, *, comes_back: bool) -> None:
         """Whatever ended the reading, the robot is not left with a command to carry out."""
         with self._changed:
             if self._write_error is None:
-                self._write(self._session.shutdown_sequence(self._on_exit))
+                self._write(self._session.shutdown_sequence(self._on_exit, time.monotonic()))
             else:  # Stop, right behind whatever is out of the kernel's reach
                 port.write_if_room(self._session.broken_off())
             stopped = self._stands if self._closing.is_set() else comes_back
@@ -379,22 +382,23 @@ class Link:
 
         What there is to tell takes its place in the order.
         """
-        if data := self._session.take_output(time.monotonic()):
-            self._write(data)
+        if packets := self._session.take_output(time.monotonic()):
+            self._write(packets)
         if self._session.wake_at < self._pacing_until or self._leaving:
             self._changed.notify_all()
         if events := self._session.take_events():
             self._outbox.put(partial(self._deliver, events))
 
-    def _write(self, data: bytes) -> None:
-        if not data or self._port is None or self._write_error is not None:
+    def _write(self, packets: Packets) -> None:
+        if not packets or self._port is None or self._write_error is not None:
             return
         try:
-            self._port.write(data)
-            self._sent += len(data)
+            self._port.write(packets)
+            self._sent += sum(len(data) for _, data in packets)
         except LinkError as error:
             self._write_error = error
             self._port.interrupt()
         else:
             if self._on_write is not None:
-                self._outbox.put(partial(self._on_write, data))
+                for packet in packets:
+                    self._outbox.put(partial(self._on_write, packet))

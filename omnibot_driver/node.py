@@ -102,8 +102,8 @@ class OmniBotDriver(Node):
         stop = self._board.stop()
         return Link(
             self._session,
+            self._profile.opener(self._values),
             port,
-            self._values["baudrate"],
             last_words=(stop, self._board.emergency_stop() + stop)
             if self._values["guard"]
             else None,
@@ -203,7 +203,7 @@ class OmniBotDriver(Node):
                 action(session, message, now)
 
             with contextlib.suppress(CommandRefused):
-                self._link.command(obey, message, now_ns - round(delay.total_s * 1e9))
+                self._link.command(obey, message, delay.sent_ns)
 
         return callback
 

@@ -25,6 +25,7 @@ from omnibot_driver.cdr import Messages, Serializer, difference
 from omnibot_driver.core.events import Event, Notice, StateChanged
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.packets import Packet
 from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.session import Session
 from omnibot_driver.core.traits import Traits
@@ -56,7 +57,7 @@ class Publishing:
                 " ordinary ones, which takes the processor a little more time"
             )
         self.settings = settings
-        self._port = values["port"]
+        self._port, self._channels = values["port"], traits.channels
         self._clock = node.get_clock()
         self._time_is_simulated = self._clock.ros_time_is_active
         self._time_watch = self._clock.create_jump_callback(
@@ -93,7 +94,7 @@ class Publishing:
     def settings(self, settings: messages.MessageSettings) -> None:
         self._settings, self._make = settings, self._maker(settings)
 
-    def taps(self) -> dict[str, Callable[[bytes], None]]:
+    def taps(self) -> dict[str, Callable[[Packet], None]]:
         """What a link is to say of the wire itself."""
         return {
             "on_read": self._raw_publisher("~/raw_rx"),
@@ -162,12 +163,17 @@ class Publishing:
         """Time begins or ceases to be simulated; to ask each time would cost a microsecond."""
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
-    def _raw_publisher(self, topic: str) -> Callable[[bytes], None]:
-        publisher = self._node.create_publisher(UInt8MultiArray, topic, RAW_DEPTH)
+    def _raw_publisher(self, topic: str) -> Callable[[Packet], None]:
+        """Of each channel: by its name, where it has one."""
+        publishers = [
+            self._node.create_publisher(UInt8MultiArray, f"{topic}/{name}".rstrip("/"), RAW_DEPTH)
+            for name in self._channels
+        ]
 
-        def publish(data: bytes) -> None:
+        def publish(packet: Packet) -> None:
+            channel, data = packet
             with contextlib.suppress(RCLError):  # the last words outlive ROS
-                publisher.publish(messages.raw_message(data))
+                publishers[channel].publish(messages.raw_message(data))
 
         return publish
 

@@ -83,7 +83,9 @@ class Replay:
         """Nothing is written, so nothing is in its way."""
         return False
 
-    def command(self, action: Callable[[Session, T, float], None], wish: T, _sent_ns: int) -> None:
+    def command(
+        self, action: Callable[[Session, T, float], None], wish: T, _sent_ns: Sequence[int]
+    ) -> None:
         """``call``; nobody is moved by it."""
         self.call(lambda session, now: action(session, wish, now))
 

@@ -3,7 +3,8 @@
 """What can be seen of the driver's surroundings, and should be set otherwise.
 
 The adapter of an open port, the clock, nodes of the same name. Reads sysfs; knows no pyserial, no
-ROS, no board. What stands in the way of opening a port, its permissions among it, ``port.py`` says.
+ROS, no board. What stands in the way of opening a port, its permissions among it, ``transports``
+says.
 """
 
 from collections.abc import Iterable

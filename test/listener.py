@@ -4,23 +4,26 @@
 
 import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from omnibot_driver.core.commands.limits import SpeedLimits
-from omnibot_driver.core.commands.stream import CommandSettings
+from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.events import Event
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.packets import packed
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link
 from omnibot_driver.simulator import SimulatedBoard
+from omnibot_driver.transports.serial_port import SerialPort
 
 PATIENCE_S = 20.0
 STOP = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 EMERGENCY_STOP = bytes(8) + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
 START = bytes(8) + b"S"
-LAST_WORDS = (STOP, EMERGENCY_STOP + STOP)
+LAST_WORDS = (packed(STOP), packed(EMERGENCY_STOP + STOP))
 
 
 class Listener:
@@ -66,8 +69,8 @@ def session(*, run: bool = True, obeys: bool = True) -> Session:
 def link_to(url: str, listener: Listener, session: Session, **taps: Callable[[Any], None]) -> Link:
     return Link(
         session,
+        partial(SerialPort, url, 115200),
         url,
-        115200,
         last_words=LAST_WORDS,
         reconnect_interval_s=0.02,
         deliver=listener.deliver,

@@ -7,6 +7,7 @@ import contextlib
 import os
 import select
 import signal
+import socket
 import threading
 import time
 import tty
@@ -17,6 +18,7 @@ import pytest
 from terminal import fill
 
 from omnibot_driver import guard
+from omnibot_driver.core.packets import packed
 from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
 
 PATIENCE_S = 20.0
@@ -118,7 +120,7 @@ def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
 
 def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
     """It has stopped the robot itself; not a byte is added."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     alive(keeper, 0.2)
     keeper.end(stopped=True)
     keeper.end(stopped=True)
@@ -128,14 +130,14 @@ def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
 
 def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None:
     """For a second, since the board may be deaf just now; then it leaves."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.end(stopped=False)
     assert line.hear(guard.TIMES * LAST_WORDS) == guard.TIMES * LAST_WORDS
 
 
 def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line: Line) -> None:
     """And it goes on guarding: the next time as well."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     longest_s = alive(keeper, 2 * guard.LIMIT_S)
     os.write(line.near, b"so far: ")
     assert line.hear(b"so far: ") == b"so far: " or longest_s > 0.9 * guard.LIMIT_S
@@ -149,7 +151,7 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
     """What waits there is old commands; nobody reads until the guard has gone."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     line.fill()
     keeper.end(stopped=False)
     line.hear(LAST_WORDS)
@@ -157,7 +159,7 @@ def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
 
 def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
     """It leaves, and so does the driver."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     process = keeper._process
     assert process is not None
     started(process.pid)
@@ -168,7 +170,7 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
     """And the new one guards."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGKILL)
     told = beat_until(keeper, lambda: line.children() not in ([first], []))
@@ -187,7 +189,7 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
     """The driver drives on without."""
     with monkeypatch.context() as without:
         without.setattr("sys.executable", "/no/python")
-        keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+        keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
         assert "no guard process can be started" in keeper.beat(1000.0)
     assert keeper.beat(1000.5) == ""
     assert line.children() == []
@@ -198,7 +200,7 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
 
 def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
     """Stopped, it would not stop the robot; nobody waits until its pipe is full."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     started(first)
     os.kill(first, signal.SIGSTOP)
@@ -216,7 +218,7 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
 ) -> None:
     """As in an uninterruptible sleep. It is replaced, nobody waits for it, and it is reaped."""
     monkeypatch.setattr("subprocess.Popen.wait", lambda *_: pytest.fail("a beat waits"))
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     started(first)
     os.kill(first, signal.SIGSTOP)
@@ -236,7 +238,7 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
 
 def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
     """On a host where nothing can be killed, starting more of them helps nobody."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     stopped: set[int] = set()
     with monkeypatch.context() as undying:
         undying.setattr("subprocess.Popen.kill", lambda _process: None)
@@ -256,7 +258,7 @@ def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.M
 
 def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
     """It does not hear the good-bye."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)
     keeper.end(stopped=True)
@@ -267,7 +269,7 @@ def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As in an uninterruptible sleep, which a stopped process stands for that no signal reaches."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)
     monkeypatch.setattr("subprocess.Popen.kill", lambda _process: None)
@@ -284,7 +286,7 @@ def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
     """Ctrl-C does not reach its session; SIGTERM to a whole group does, and is not for it."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     assert os.getsid(pid) == pid
     started(pid)
@@ -296,7 +298,7 @@ def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
 
 def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(line: Line) -> None:
     """``pkill -9 -f omnibot_driver``, in a hurry, while the robot drives."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     started(pid)
     _interpreter, *arguments = Path(f"/proc/{pid}/cmdline").read_text().split("\0")
@@ -308,7 +310,7 @@ def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(line: Line) -> Non
 
 def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
     """None of the driver's sockets and files; no module but a few of Python's own."""
-    keeper = Keeper(line.near, LAST_WORDS, LATCHED_WORDS)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     started(pid)
     opened = [os.readlink(entry) for entry in Path(f"/proc/{pid}/fd").iterdir()]
@@ -329,3 +331,37 @@ def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
     }
     assert imported == {"contextlib", "os", "select", "signal", "sys", "termios"}
     assert not any(isinstance(node, ast.ImportFrom) for node in ast.walk(tree))
+
+
+def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line: Line) -> None:
+    """Each hears its own words."""
+    other = Line()
+    try:
+        words = ((0, b"drive stands"), (1, b"front stands"))
+        keeper = Keeper([line.near, other.near], words, words)
+        line.hang_up()
+        keeper.end(stopped=False)
+        assert b"drive" not in other.hear(b"front stands")
+        os.write(other.near, b"end")
+        assert other.hear(b"end").count(b"front stands") == guard.TIMES
+    finally:
+        other.close()
+
+
+def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> None:
+    """Each stop is a datagram; those that nobody took end nothing."""
+    host = socket.socket(type=socket.SOCK_DGRAM)
+    host.bind(("127.0.0.1", 0))
+    address = host.getsockname()
+    driver = socket.socket(type=socket.SOCK_DGRAM)
+    driver.connect(address)
+    keeper = Keeper([driver.fileno()], packed(b"SM"), packed(b"ES"))
+    host.close()
+    late = threading.Timer(0.0, keeper.end, kwargs={"stopped": False})
+    late.start()
+    with socket.socket(type=socket.SOCK_DGRAM) as again:
+        again.bind(address)
+        again.settimeout(PATIENCE_S)
+        assert again.recv(99) == b"SM"
+    late.join()
+    driver.close()

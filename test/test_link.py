@@ -18,10 +18,11 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.packets import joined
 from omnibot_driver.core.session import Session
 from omnibot_driver.keeper import BEAT_S, Keeper
-from omnibot_driver.port import Port
 from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
+from omnibot_driver.transports.serial_port import SerialPort
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
@@ -115,7 +116,13 @@ def test_every_read_and_every_write_can_be_listened_to(board: PtyBoard) -> None:
     """Byte for byte as they were, the opening and the farewell included."""
     read, written = [], []
     listener, ours = Listener(), session()
-    link = link_to(board.path, listener, ours, on_read=read.append, on_write=written.append)
+    link = link_to(
+        board.path,
+        listener,
+        ours,
+        on_read=lambda packet: read.append(packet[1]),
+        on_write=lambda packet: written.append(packet[1]),
+    )
     link.start()
     listener.wait_for(lambda: len(read) > 10)
     link.close("stop")
@@ -130,8 +137,12 @@ def test_an_estop_is_written_before_the_call_returns(
 ) -> None:
     """Whoever presses it and is answered need not wait for another thread."""
     written: list[bytes] = []
-    write = Port.write
-    monkeypatch.setattr(Port, "write", lambda port, data: write(port, data) or written.append(data))
+    write = SerialPort.write
+    monkeypatch.setattr(
+        SerialPort,
+        "write",
+        lambda port, packets: write(port, packets) or written.append(joined(packets)),
+    )
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
@@ -186,7 +197,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     listener.wait_for(lambda: ours.state == "nominal")
     link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
     drive = partial(link.command, Session.command_twist, BodyTwist(0.2, 0.0, 0.0))
-    drive(time.time_ns())
+    drive([time.time_ns()])
     assert board.wait_for(lambda b: b.driven, PATIENCE_S)
     hold, held = threading.Event(), threading.Event()
 
@@ -202,11 +213,13 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     hold.set()
     holder.join(PATIENCE_S)
     with pytest.raises(CommandRefused, match="waited"):
-        drive(sent_ns)
+        drive([sent_ns])
+    with pytest.raises(CommandRefused, match="waited while the driver stood still"):
+        drive([time.time_ns(), sent_ns])  # or so, as little is known of its sender
     listener.wait_for(lambda: any("stood still" in str(event) for event in listener.events))
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
 
-    listener.wait_for(lambda: obeyed(lambda: drive(time.time_ns())))
+    listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
     link.close("stop")
 
 
@@ -223,7 +236,7 @@ def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.M
     listener.wait_for(lambda: ours.state == "nominal")
     drive = partial(link.command, Session.command_twist, BodyTwist(0.3, 0.0, 0.0))
     for _ in range(20):  # a machine that hangs is another standstill
-        drive(time.time_ns())
+        drive([time.time_ns()])
         if board.wait_for(lambda b: b.commands[-1].kind == "velocity", 0.3):
             break
     assert board.board.commands[-1].kind == "velocity"
@@ -231,8 +244,8 @@ def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.M
     assert board.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
     listener.wait_for(lambda: any("for 3600." in str(event) for event in listener.events))
     with pytest.raises(CommandRefused, match="waited"):
-        drive(time.time_ns() - 1_000_000_000)  # while it was suspended, by a clock that went on
-    listener.wait_for(lambda: obeyed(lambda: drive(time.time_ns())))
+        drive([time.time_ns() - 1_000_000_000])  # while it was suspended, by a clock that went on
+    listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
     assert board.wait_for(lambda b: b.commands[-1].kind == "velocity", PATIENCE_S)
     link.close("stop")
 
@@ -243,7 +256,7 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
     ours, listener = session(), Listener()
     hear, take_events, deliver = ours.hear, ours.take_events, listener.deliver
 
-    def heard(data: bytes, now: float) -> list[ImuEstimate]:
+    def heard(data: bytes, now: float, _channel: int) -> list[ImuEstimate]:
         estimates = hear(data, now)
         happened.extend(estimates)
         return estimates
@@ -299,7 +312,7 @@ def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard
     link.call(lambda s, now: s.estop(True, now, by="a button"))
     drive = partial(link.command, Session.command_twist, BodyTwist(0.3, 0.0, 0.0))
     with pytest.raises(CommandRefused):
-        drive(time.time_ns())
+        drive([time.time_ns()])
     assert board.wait_for(lambda b: kinds(b).count("estop") > 3, PATIENCE_S)
     link.call(lambda s, now: s.estop(False, now, by="a button"))
     assert not listener.refused
@@ -321,7 +334,7 @@ def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) 
     for _ in range(20):
         link.call(lambda s, now: s.estop(True, now))
         with pytest.raises(CommandRefused):
-            drive(time.time_ns())
+            drive([time.time_ns()])
         link.call(lambda s, now: s.estop(False, now))
     link.close("stop")
     texts = [event.text for event in listener.events if isinstance(event, Notice)]

@@ -116,7 +116,7 @@ def test_a_replay_tells_what_was_told_when_it_was_recorded() -> None:
         "sim://?seed=2",
         listener,
         ours,
-        on_read=lambda data: tape.append((time.monotonic_ns(), data)),
+        on_read=lambda packet: tape.append((time.monotonic_ns(), packet[1])),
     )
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
@@ -189,7 +189,7 @@ def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
     tape = Tape(itertools.takewhile(lambda _: not stop.is_set(), endless), speed=1.0)
     replay, heard = start(tape)
     heard.wait_for(lambda: heard.session.state == "nominal")
-    replay.command(Session.command_twist, BodyTwist(0.3, 0.0, 0.0), 0)
+    replay.command(Session.command_twist, BodyTwist(0.3, 0.0, 0.0), ())
     replay.call(lambda s, now: s.request(Request.PAUSE, "token", now))
     stop.set()
     heard.wait_for(lambda: ENDED in heard.events)

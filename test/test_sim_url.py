@@ -12,10 +12,10 @@ from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
-from omnibot_driver.port import Port
 from omnibot_driver.simulator import SimulatedBoard
 from omnibot_driver.simulator.motors import TICK_S
 from omnibot_driver.simulator.running import UNREAD_LIMIT
+from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.urls.protocol_sim import InProcessBoard
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
@@ -74,7 +74,7 @@ def test_options_come_after_a_question_mark() -> None:
 def test_options_that_it_does_not_know_are_refused(url: str, why: str) -> None:
     """By a sentence that names the option, the whole list and an example."""
     with pytest.raises(LinkError) as refusal:
-        Port(url, 115200)
+        SerialPort(url, 115200)
     assert why in str(refusal.value)
     assert "simulator --help" in str(refusal.value)
 

@@ -6,12 +6,13 @@ A profile is the one place where a board meets the shell around the core: what m
 driver's parameters. The rest of the driver knows none of them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any, Final, Protocol, cast
 
 from omnibot_driver.core.board import Board
 from omnibot_driver.core.geometry.kinematics import Kinematics
+from omnibot_driver.transports import Transport
 
 PROFILES: Final = {"omnibot": "omnibot_driver.boards.omnibot"}
 """By the value of the parameter ``board``: the module that is its profile."""
@@ -25,6 +26,9 @@ class Profile(Protocol):
 
     def settings(self, values: Mapping[str, Any]) -> object:
         """What ``Board.settings`` is to be replaced by when parameters change."""
+
+    def opener(self, values: Mapping[str, Any]) -> Callable[[], Transport]:
+        """What opens the line to it."""
 
     def kinematics(self, values: Mapping[str, Any]) -> Kinematics:
         """The wheels, by checked values."""

@@ -2,12 +2,14 @@
 
 """The Neuron OmniBot: what makes it of the driver's parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.imu.scale import ImuScale
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.transports.serial_port import SerialPort
 
 
 def make(values: Mapping[str, Any]) -> OmniBot:
@@ -31,6 +33,11 @@ def settings(values: Mapping[str, Any]) -> OmniBotSettings:
         pose_byte_order=values["pose_byte_order"],
         imu=ImuScale(accel_range_g=values["accel_range"], gyro_range_dps=values["gyro_range"]),
     )
+
+
+def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
+    """A device, or any URL that pyserial knows."""
+    return partial(SerialPort, values["port"], values["baudrate"])
 
 
 def kinematics(values: Mapping[str, Any]) -> OmniKinematics:

@@ -3,21 +3,20 @@
 """What any motor board offers a driver: the seam at which further boards join.
 
 Readings are what a board measured, in SI units, with no trace of its bytes. A ``Board`` turns bytes
-into readings and wishes into bytes, and keeps the belief about the board's mode; it never decides
-when something is sent. It knows no ROS, no port and no clock.
+into readings and requests into bytes, keeps the belief about the board's mode, and makes the
+actuator that says orders. It knows no ROS, no port and no clock.
 """
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
-from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.commands.actuator import Actuator
+from omnibot_driver.core.commands.stop_proof import StopProof
+from omnibot_driver.core.packets import NO_PACKETS, Packets
+from omnibot_driver.core.readings import Reading, SampleBoundary, Vector3
 from omnibot_driver.core.traits import Traits
-from omnibot_driver.core.values import value
-
-Vector3 = tuple[float, float, float]
 
 
 class Mode(Enum):
@@ -35,64 +34,6 @@ class Mode(Enum):
         self.running = name in ("nominal", "imu_only")
 
 
-@value(frozen=True, slots=True)
-class ImuReading:
-    """Specific force in m/s² and angular velocity in rad/s, in the sensor's own axes.
-
-    ``lost`` readings of this kind seem to be missing before it, by what was received of them.
-    """
-
-    specific_force: Vector3
-    angular_velocity: Vector3
-    lost: int = 0
-
-
-@value(frozen=True, slots=True)
-class DisplacementReading:
-    """Motion during the last ``duration_s``; ``lost`` frames of this kind are missing before it.
-
-    ``duration_s`` is None where nobody knows it: the first after a pause holds all motion since.
-    ``restarted``: the board's counters seem to begin anew here, and its earth frame with them.
-    """
-
-    dx_m: float
-    dy_m: float
-    dyaw_rad: float
-    frame: Literal["earth", "body"]
-    duration_s: float | None
-    lost: int
-    restarted: bool = False
-
-
-@value(frozen=True, slots=True)
-class PoseReading:
-    """The board's own dead reckoning, in the earth frame it has chosen for itself.
-
-    ``lost`` displacements that it includes are known to be missing before it; they are not counted
-    again by the next displacement. ``restarted``: its counter begins anew, and so did the
-    displacements' some time before.
-    """
-
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    lost: int = 0
-    restarted: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class PausedReading:
-    """The board said that it is paused (or still initialising).
-
-    ``continues``: it has said so just before, so it has not restarted meanwhile.
-    """
-
-    continues: bool = False
-
-
-Reading = ImuReading | DisplacementReading | PoseReading | PausedReading
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardFigures:
     """What a board's translator counts, since the driver began.
@@ -101,30 +42,17 @@ class BoardFigures:
     the framing was lost, with ``discarded_bytes``; ``saturated``: commands that did not fit.
     """
 
-    rates_hz: Vector3
+    rates_hz: Vector3 = (0.0, 0.0, 0.0)
     faults: int = 0
     discarded_bytes: int = 0
     saturated: int = 0
 
 
-@value(frozen=True, slots=True)
-class SampleBoundary:
-    """Where a read ended among the samples.
-
-    The beginning of one tells when it was taken better than an end that is delivered late, and what
-    was not there yet tells too. ``ahead``: how many samples after the last ImuReading were in hand
-    (0, 1), the last of them whole or ``cut``. It was to be whole ``latest_s`` after the read, or
-    before; the next one, or the one that was cut, not before ``earliest_s`` after it.
-    """
-
-    ahead: int
-    latest_s: float
-    earliest_s: float
-    cut: bool = False
-
-
 class Board(Protocol):
-    """One kind of board. Request methods raise RequestRefused where the mode forbids them."""
+    """One kind of board. Requests raise RequestRefused where the mode forbids them.
+
+    What has a body here is what a board does that has nothing to say to it.
+    """
 
     traits: Traits
     """What it has and can do."""
@@ -137,71 +65,74 @@ class Board(Protocol):
         """The present belief."""
 
     @property
-    def tick_s(self) -> float:
-        """The nominal time from one ImuReading to the next."""
-
-    @property
     def edge(self) -> SampleBoundary | None:
         """Where the last read ended. None while the framing is in doubt, or it told nothing new."""
+        return None
 
     @property
     def figures(self) -> BoardFigures:
         """For whoever looks after the line."""
-
-    def gravity_advice(self, gravity_mps2: float) -> str:
-        """What such a specific force at rest says of the settings; empty where it is gravity."""
+        return BoardFigures()
 
     @property
     def advice(self) -> str | None:
         """What a user should set otherwise, by what the board sends; None while all is well."""
+        return None
+
+    def gravity_advice(self, gravity_mps2: float) -> str:
+        """What such a specific force at rest says of the settings; empty where it is gravity."""
+        return ""
 
     def connect(self) -> None:
         """The line is new: nothing that was held or believed is worth anything any more."""
 
-    def receive(self, data: bytes, now: float) -> list[Reading]:
+    def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """What these bytes complete, in the order of the line; ``mode`` follows."""
 
     def flush(self, now: float) -> list[Reading]:
         """The line is closed: what can still be told from what was held."""
+        return []
 
     def silence(self) -> None:
         """Nothing was understood for so long that the mode is unknown again."""
 
-    def wake(self) -> bytes:
+    @property
+    def wake_at(self) -> float:
+        """When ``due`` has to be asked again; infinity where a board needs nothing of its own."""
+        return math.inf
+
+    def due(self, now: float) -> Packets:
+        """What keeps the board talking, and is no command: subscriptions, polls, relays.
+
+        It counts as written.
+        """
+        return NO_PACKETS
+
+    def actuator(self, proof: StopProof) -> Actuator:
+        """What says orders to it, and tells ``proof`` of stops and motions. Made once."""
+
+    def wake(self) -> Packets:
         """What makes a board in any state listen, ends any half command, and stops the wheels."""
 
-    def start(self) -> bytes:
+    def start(self) -> Packets:
         """Run, whatever it did before; harmless to repeat."""
+        return NO_PACKETS
 
-    def pause(self) -> bytes:
+    def pause(self) -> Packets:
         """Pause a running board. Refused when it is not known to run."""
+        return NO_PACKETS
 
-    def force_pause(self) -> bytes:
+    def force_pause(self) -> Packets:
         """Pause, whatever it did before and whatever of ours is still on the way to it."""
+        return NO_PACKETS
 
-    def reset(self) -> bytes:
+    def reset(self) -> Packets:
         """Reboot; the mode is unknown until the board is heard again."""
+        return NO_PACKETS
 
-    def stop(self) -> bytes:
-        """Stand still."""
+    def stop(self) -> Packets:
+        """Stand still: what a guard can say without knowing the board."""
 
-    def emergency_stop(self) -> bytes:
-        """The board's own emergency stop."""
-
-    def velocity(self, twist: BodyTwist) -> bytes:
-        """Drive with this body velocity, already within the limits."""
-
-    def wheels(self, rates_radps: Sequence[float]) -> bytes:
-        """Turn the wheels at these rates, in their order, already within the limits."""
-
-    def meaning(self, data: bytes) -> BodyTwist:
-        """The body velocity that the last frame in these bytes commands, in the board's own axes.
-
-        Of ``velocity`` and ``wheels``, as rounded; at rest for every other.
-        """
-
-    def drive_to(self, pose: Pose) -> bytes:
-        """Go to this pose in the board's own earth frame, and stay.
-
-        Raises CommandRefused where the line cannot say it.
-        """
+    def emergency_stop(self) -> Packets:
+        """The board's own emergency stop, and nothing else."""
+        return NO_PACKETS

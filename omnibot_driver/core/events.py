@@ -24,4 +24,12 @@ class Notice:
     text: str
 
 
-Event = ImuEstimate | OdometryEstimate | StateChanged | RequestDone | Notice
+@dataclass(frozen=True, slots=True)
+class Extra:
+    """What else a board told, in a value of a kind of its own, at ``stamp_s``."""
+
+    stamp_s: float
+    content: object
+
+
+Event = ImuEstimate | OdometryEstimate | Extra | StateChanged | RequestDone | Notice

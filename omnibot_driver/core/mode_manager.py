@@ -14,6 +14,7 @@ from typing import Final
 
 from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.requests import OnExit, Request, RequestDone
 
 START_RETRY_S: Final = 0.5
@@ -63,7 +64,8 @@ class ModeManager:
         self.answers: list[RequestDone] = []
         self._board = board
         self._wanted = Wanted.RUNNING if run else Wanted.ANY
-        self._output = b""
+        self.output: Packets = NO_PACKETS
+        """What to write now, before anything else; see ``take_output``."""
         self._said_at = self._data_at = -math.inf
         self._flowed_s = 0.0
         self._paused_with_p = self._was_running = False
@@ -72,10 +74,10 @@ class ModeManager:
         self._token: object = None
         self._deadline = math.inf
 
-    def take_output(self) -> bytes:
+    def take_output(self) -> Packets:
         """What to write now, before anything else."""
-        data, self._output = self._output, b""
-        return data
+        packets, self.output = self.output, NO_PACKETS
+        return packets
 
     @property
     def wake_at(self) -> float:
@@ -91,7 +93,7 @@ class ModeManager:
 
     def opened(self, now: float) -> None:
         """The port is open; the board may be in any state, half-way through a command too."""
-        self._output = b""
+        self.output = NO_PACKETS
         self._begin(now)
 
     def closed(self) -> None:
@@ -183,12 +185,12 @@ class ModeManager:
         elif self.phase is Phase.STARTING and now - self._said_at >= START_RETRY_S:
             self._say(self._board.start(), now)
 
-    def shutdown_sequence(self, on_exit: OnExit, *, proved: bool) -> bytes:
-        """The last bytes to the board, which stops it unless it is ``proved`` to stand."""
+    def shutdown_sequence(self, on_exit: OnExit, *, proved: bool) -> Packets:
+        """The last packets to the board, which stops it unless it is ``proved`` to stand."""
         stops = 0 if proved else LAST_STOPS
         return stops * self._board.stop() + self._last_request(on_exit)
 
-    def _last_request(self, on_exit: OnExit) -> bytes:
+    def _last_request(self, on_exit: OnExit) -> Packets:
         settled = self.phase is Phase.SETTLED
         if on_exit == "reset":
             return self._board.reset()
@@ -196,11 +198,11 @@ class ModeManager:
             return self._board.pause()
         if on_exit == "pause" and not (settled and self._board.mode is Mode.PAUSED):
             return self._board.force_pause()
-        return b""
+        return NO_PACKETS
 
     def _begin(self, now: float) -> None:
         """The opening sequence; a board that is not wanted running gets no S."""
-        self._output += self._board.wake()
+        self.output += self._board.wake()
         self.phase = Phase.SETTLED
         if self._wanted is Wanted.RUNNING:
             self.phase = Phase.STARTING
@@ -212,8 +214,8 @@ class ModeManager:
         self._paused_with_p, self._shown_at = with_p, math.inf
         self._flowed_s = 0.0
 
-    def _say(self, data: bytes, now: float) -> None:
-        self._output += data
+    def _say(self, packets: Packets, now: float) -> None:
+        self.output += packets
         self._said_at, self._flowed_s = now, 0.0
 
     def _settle(self, message: str) -> None:

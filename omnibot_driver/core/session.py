@@ -12,20 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from omnibot_driver.core.board import (
-    Board,
-    DisplacementReading,
-    Mode,
-    PausedReading,
-    PoseReading,
-    Reading,
-    Vector3,
-)
+from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.commands.interlocks import why_not_calibrate, why_not_drive
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.pipeline import Command, CommandPipeline
+from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.commands.shaping import ControlMethod
-from omnibot_driver.core.commands.stream import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import Event, Notice, StateChanged
 from omnibot_driver.core.geometry.se2 import Pose, Signs
@@ -35,6 +27,14 @@ from omnibot_driver.core.measurement.outlier_filter import MotionLimits, Refused
 from omnibot_driver.core.measurement.pipeline import Measured, MeasurementPipeline
 from omnibot_driver.core.mode_manager import CLOSED, ModeManager, Phase
 from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.packets import NO_PACKETS, Packets
+from omnibot_driver.core.readings import (
+    DisplacementReading,
+    PausedReading,
+    PoseReading,
+    Reading,
+    Vector3,
+)
 from omnibot_driver.core.reporting.figures import SessionFigures
 from omnibot_driver.core.reporting.notices import HEADING_ASSUMED, Notices, why_silent
 from omnibot_driver.core.requests import OnExit, Request
@@ -90,7 +90,7 @@ class Session:
             obeys=obeys,
             monitored=settings.motion_monitor,
         )
-        self._commands = self._commanding.stream
+        self._commands = self._commanding.policy
         self._heard_at = self._came_at = -math.inf
         self._silent = self._leaving = False
         self._last: Reading | None = None
@@ -150,6 +150,7 @@ class Session:
         return min(
             silent_at,
             unheard_at,
+            self._board.wake_at,
             self._mode_manager.wake_at,
             self._commands.wake_at,
             self._imu.calibration.wake_at,
@@ -166,14 +167,14 @@ class Session:
         self._commanding.monitor(settings.motion_monitor)
         if board is not None:
             self._board.settings = board
-            self._notify(self._commanding.encode_anew(now))
+            self._notify(self._commanding.check_anew(now))
         self._measurement.configure(settings.odometry, settings.motion, settings.imu)
 
     def opened(self, now: float) -> None:
         """The port is open."""
         self._board.connect()
-        self._commanding.begin()
-        self._commands.connect()
+        self._commanding.begin(now)
+        self._commands.connect(now)
         self._measurement.restart()
         self._silent, self._heard_at, self._came_at = False, now, -math.inf
         self._mode_manager.opened(now)
@@ -185,14 +186,14 @@ class Session:
         self._react(self._measurement.release(), now)
         self._mode_manager.closed()
         self._imu.calibration.give_up("the port was lost meanwhile; call again once it is back")
-        self._commands.discard()
+        self._commands.discard(now)
 
-    def receive(self, data: bytes, now: float) -> None:
+    def receive(self, data: bytes, now: float, channel: int = 0) -> None:
         """Bytes came in at ``now``."""
-        self._events += self.hear(data, now)
+        self._events += self.hear(data, now, channel)
         self.process(now)
 
-    def hear(self, data: bytes, now: float) -> list[ImuEstimate]:
+    def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """``receive``, but for what can wait until these are told: ``process`` is to follow.
 
         Whoever commands in between is as one who came before the bytes. That must not be where they
@@ -200,7 +201,7 @@ class Session:
         """
         self._came_at = now
         before = self._board.mode
-        estimates = self._take_in(self._board.receive(data, now), now)
+        estimates = self._take_in(self._board.receive(data, now, channel), now)
         after = self._board.mode
         if after is before:
             return estimates
@@ -223,6 +224,7 @@ class Session:
             return True
         if (
             now < self._tell_at
+            and now < self._board.wake_at
             and not self._measurement.undigested
             and not self._events
             and self._mode_manager.at_rest
@@ -313,7 +315,7 @@ class Session:
         if active:
             if not self.estop_active:
                 self._notify([f"e-stop latched by {by}"])
-            self._commands.latch()
+            self._commands.latch(now)
             if self._closed:
                 return "e-stop latched; the port is not open: the stop is sent as soon as it is"
             if self._board.mode is Mode.UNKNOWN:
@@ -351,33 +353,39 @@ class Session:
         """The board has shown that the robot stands, and no motion was commanded since."""
         return self._commands.proof.proved
 
-    def shutdown_sequence(self, on_exit: OnExit) -> bytes:
-        """The last bytes to write before the port is closed."""
+    def shutdown_sequence(self, on_exit: OnExit, now: float) -> Packets:
+        """The last packets to write before the port is closed."""
         proved = self._commands.quiet and self.stands
-        data = self._mode_manager.shutdown_sequence(on_exit, proved=proved)
-        self._commands.discard()
-        return data + (self._board.emergency_stop() if self.estop_active else b"")
+        packets = self._mode_manager.shutdown_sequence(on_exit, proved=proved)
+        self._commands.discard(now)
+        return packets + self._estop_again()
 
-    def broken_off(self) -> bytes:
+    def broken_off(self) -> Packets:
         """What is to follow a write that failed half-way, before the port is closed."""
-        return self._board.wake() + (self._board.emergency_stop() if self.estop_active else b"")
+        return self._board.wake() + self._estop_again()
+
+    def _estop_again(self) -> Packets:
+        return self._board.emergency_stop() if self.estop_active else NO_PACKETS
 
     # What comes of it
 
-    def take_output(self, now: float) -> bytes:
-        """The bytes to write now; they count as written."""
+    def take_output(self, now: float) -> Packets:
+        """What to write now; it counts as written."""
         if self._mode_manager.phase is CLOSED:
-            return b""
-        if data := self._mode_manager.take_output():
-            self._commands.wrote(data, now)
+            return NO_PACKETS
+        packets = self._board.due(now) if now >= self._board.wake_at else NO_PACKETS
+        if self._mode_manager.output:
+            said = self._mode_manager.take_output()
+            self._commanding.wrote(said, now)
+            packets += said
         if due := self._commands.due(now):
-            self._commanding.wrote(due, now)
-            data += due
+            self._commanding.said(now)
+            packets += due
         if self._commands.unconfirmed:
             self._commands.unconfirmed = False
             measured = self._commands.proof.measured
             self._notify(self._notices_due.unconfirmed(self._board.mode, measured=measured))
-        return data
+        return packets
 
     def take_events(self) -> list[Event]:
         """What happened since the last call, in order."""
@@ -415,7 +423,7 @@ class Session:
                 if reading.restarted:
                     self._commands.halt(now)
             elif isinstance(reading, PausedReading):
-                self._commanding.begin()
+                self._commanding.begin(now)
                 self._commands.proof.paused()
                 if self._board.mode.running:  # again, within one read
                     self._commands.halt(now)
@@ -444,19 +452,19 @@ class Session:
         if self._leaving:
             raise CommandRefused("motion command refused: the driver is shutting down")
         motion, expires_at = wish
-        unheard = now - self._heard_at >= self._traits.unheard_s and not motion.stands
+        unheard = now - self._heard_at >= self._traits.unheard_s and not motion.is_zero
         if reason := why_not_drive(
             self._mode_manager.phase,
             self._board.mode,
             latched=self._commands.latched,
             unheard_s=self._traits.unheard_s if unheard else 0.0,
             interlock=self._commanding.interlock.arrive(
-                now, self._commands.settings.timeout_s, stands=motion.stands
+                now, self._commands.settings.timeout_s, stands=motion.is_zero
             ),
         ):
             raise CommandRefused(f"motion command refused: {reason}")
         self._commands.command(motion, now, expires_at=expires_at)
-        if not motion.stands:
+        if not motion.is_zero:
             self._imu.calibration.give_up(
                 "a motion command came in; stop the sender, then call again"
             )

@@ -12,15 +12,23 @@ from omnibot_driver.core.requests import Request
 class Traits:
     """Constant for a board while the driver runs.
 
-    ``imu``: whether it sends ImuReadings; ``authorities``: who may command motion; ``requests``:
-    what else can be asked of it; ``wheels``: names of those that ``wheel_cmd`` turns, in its order;
-    ``unheard_s``: a robot that is not heard for so long is driven no further; ``silence_s``: after
-    it a board that says nothing is not known to be there.
+    ``channels``: names of the lines to it; one alone needs no name. ``imu_period_s``: from one
+    ImuReading to the next, one for each tick of the board's clock; None for a board without an
+    IMU, whose readings are stamped by their arrival. ``authorities``: who may command motion;
+    ``requests``: what else can be asked of it; ``wheels``: names of those that ``wheel_cmd`` turns,
+    in its order; ``unheard_s``: a robot that is not heard for so long is driven no further;
+    ``silence_s``: after it a board that says nothing is not known to be there.
     """
 
-    imu: bool
+    channels: tuple[str, ...] = ("",)
+    imu_period_s: float | None
     authorities: frozenset[Authority]
     requests: frozenset[Request]
     wheels: tuple[str, ...] = ()
     unheard_s: float
     silence_s: float
+
+    @property
+    def imu(self) -> bool:
+        """Whether it sends ImuReadings."""
+        return self.imu_period_s is not None

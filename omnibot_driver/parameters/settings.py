@@ -5,15 +5,15 @@
 from collections.abc import Mapping
 from typing import Any
 
-from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.commands.limits import SpeedLimits
-from omnibot_driver.core.commands.stream import CommandSettings
+from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.geometry.kinematics import Kinematics
 from omnibot_driver.core.imu.bias_correction import ImuCorrection
 from omnibot_driver.core.imu.scale import STANDARD_GRAVITY
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
 from omnibot_driver.core.odometry.covariance import OdometryNoise
 from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.core.session import SessionSettings
 
 

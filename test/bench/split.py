@@ -19,8 +19,8 @@ from rclpy.publisher import Publisher
 
 from omnibot_driver.core.omnibot.decoder import FrameDecoder
 from omnibot_driver.core.session import Session
-from omnibot_driver.port import Port
 from omnibot_driver.publishing import Publishing
+from omnibot_driver.transports.serial_port import SerialPort
 
 spent: dict[str, float] = {}
 within: list[float] = []
@@ -48,7 +48,7 @@ def timed(owner: type, name: str, stage: str) -> None:
     setattr(owner, name, measured)
 
 
-timed(Port, "read", "read")
+timed(SerialPort, "read", "read")
 timed(FrameDecoder, "feed", "decode")
 timed(Session, "hear", "measure (clock, plausibility, odometry, IMU)")
 timed(Session, "heed", "measure (clock, plausibility, odometry, IMU)")

@@ -6,9 +6,9 @@ from itertools import pairwise
 
 from lossy_odometry import Line, loses_nothing
 
-from omnibot_driver.core.board import PoseReading
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.readings import PoseReading
 from omnibot_driver.simulator import BoardPose, BoardSettings
 
 PERIOD_S = 0.04

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable
 from random import Random
 
-from omnibot_driver.core.board import DisplacementReading, PausedReading, PoseReading
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
 from omnibot_driver.core.omnibot import OmniBotSettings, decode
 from omnibot_driver.core.omnibot.frames import DeltaFrame, Frame, PausedFrame, PoseFrame
 from omnibot_driver.core.omnibot.translation import Translation
+from omnibot_driver.core.readings import DisplacementReading, PausedReading, PoseReading
 from omnibot_driver.simulator import BoardMode, BoardSettings, SimulatedBoard
 
 TICK_S = 0.01

@@ -6,14 +6,15 @@ from dataclasses import replace
 from typing import Any, Literal
 
 from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.commands.shaping import ControlMethod
-from omnibot_driver.core.commands.stream import CommandSettings
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
-from omnibot_driver.core.requests import Request, RequestDone
+from omnibot_driver.core.packets import joined
+from omnibot_driver.core.requests import OnExit, Request, RequestDone
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
 
@@ -72,7 +73,7 @@ class Bench:
 
     def settle(self) -> None:
         """What the shell does after every input."""
-        data = self.session.take_output(self.now)
+        data = joined(self.session.take_output(self.now))
         if data:
             self.written.append((self.now, data))
             if self.hears:
@@ -135,6 +136,10 @@ class Bench:
     def read_deltas_as(self, frame: Literal["earth", "body"]) -> None:
         """Whatever frame the board sends them in."""
         self.session.configure(self._settings, self.now, board=OmniBotSettings(delta_frame=frame))
+
+    def last_words(self, on_exit: OnExit) -> bytes:
+        """What is written before the port is closed."""
+        return joined(self.session.shutdown_sequence(on_exit, self.now))
 
     def written_since(self, mark: int) -> bytes:
         """What was written after the first ``mark`` writes."""

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 from hypothesis import strategies as st
 
-from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.omnibot import (
@@ -19,6 +18,7 @@ from omnibot_driver.core.omnibot import (
     encode,
 )
 from omnibot_driver.core.omnibot.frames import Frame
+from omnibot_driver.core.readings import DisplacementReading
 
 # Words the board's bytes are hard to tell apart by: header look-alikes, FF in either byte, edges.
 TREACHEROUS_WORDS = [-6, -5, -4, -1, 0, 255, -256, 0x5061, 32767, -32768]

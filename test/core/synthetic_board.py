@@ -9,9 +9,9 @@ import math
 
 import pytest
 
-from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 PERIOD_S = 0.04
 SETTINGS = OdometrySettings()

@@ -21,10 +21,10 @@ from synthetic_board import (
     xyyaw,
 )
 
-from omnibot_driver.core.board import PoseReading
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import Odometry
+from omnibot_driver.core.readings import PoseReading
 
 # Heading
 

@@ -11,6 +11,7 @@ from omnibot_driver.boards import omnibot
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.omnibot import OmniBot
+from omnibot_driver.core.packets import joined
 from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.core.session import Session
 from omnibot_driver.simulator import BoardSettings, SimulatedBoard
@@ -41,13 +42,13 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(drives: bool
         if drives and tick % 5 == 0:
             with suppress(CommandRefused):
                 session.command_twist(BodyTwist(0.1, 0.0, 0.0), now)
-        board.receive(session.take_output(now))
+        board.receive(joined(session.take_output(now)))
         told += len(session.take_events())
         if data:
             session.hear(data, now)
             if not session.process(now):
                 nothing_left += 1
-                assert session.take_output(now) == b""
+                assert session.take_output(now) == ()
                 assert session.take_events() == []
         if session.wake_at <= now:
             session.tick(now)

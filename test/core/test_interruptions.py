@@ -15,11 +15,11 @@ from lossy_drives import (
 )
 from lossy_odometry import DELTA, POSE, TEXT, loses_nothing
 
-from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.estimator import Odometry, OdometrySettings
 from omnibot_driver.core.omnibot import DeltaFrame, ImuFrame, OmniBot, OmniBotSettings, encode
 from omnibot_driver.core.omnibot.translation import Translation
+from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 # InterFrameGaps and restarts
 

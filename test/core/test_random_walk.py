@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from session_bench import EMERGENCY_STOP, PAUSE, STOP, TICK_S, ZEROS, Bench
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.packets import joined
 from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.simulator import BoardMode, BoardSettings
 
@@ -48,7 +49,7 @@ class Walk(Bench):
     def settle(self) -> None:
         if self.session.state not in RUNNING:
             self.commanded_at = None
-        data = self.session.take_output(self.now)
+        data = joined(self.session.take_output(self.now))
         if data:
             self.judge(data)
             self.written.append((self.now, data))

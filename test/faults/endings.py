@@ -39,7 +39,7 @@ node.OmniBotDriver._on_estop_topic = end
 HANGS: Final = """
 import time
 from omnibot_driver.core.session import Session
-Session.shutdown_sequence = lambda self, on_exit: time.sleep(60.0)
+Session.shutdown_sequence = lambda self, on_exit, now: time.sleep(60.0)
 """
 GROUP: Final = "import os; os.setpgid(0, 0)"
 TERMINAL: Final = """

@@ -18,11 +18,12 @@ from outbound_words import is_motion, parse
 
 from omnibot_driver import guard
 from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.commands.shaping import ControlMethod
-from omnibot_driver.core.commands.stream import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.packets import joined
 from omnibot_driver.core.requests import OnExit
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import SILENCE_S, STANDS_WITHIN_S
@@ -138,7 +139,7 @@ class _Rehearsal:
     def _settle(self, now: float) -> None:
         if now >= self._session.wake_at:
             self._session.tick(now)
-        if data := self._session.take_output(now):
+        if data := joined(self._session.take_output(now)):
             self._writes.append(Write(now, data))
             for _, mode, words in parse(data).frames:
                 if is_motion(mode, words):
@@ -165,15 +166,15 @@ class _Rehearsal:
             if not (session.stands and session.fall_silent(now)):
                 break
         stands = session.stands
-        self._writes.append(Write(now, session.shutdown_sequence(self._scene.on_exit)))
+        self._writes.append(Write(now, joined(session.shutdown_sequence(self._scene.on_exit, now))))
         if not stands:
             self._writes += self._guards_words(now)
 
     def _guards_words(self, now: float) -> Iterator[Write]:
         """What the guard writes; it drops what waits."""
-        words = self._bot.stop()
+        words = joined(self._bot.stop())
         if self._session.estop_active:
-            words = self._bot.emergency_stop() + words
+            words = joined(self._bot.emergency_stop()) + words
         begin_s = now + self._scene.guard_after_s
         for number in range(guard.TIMES):
             yield Write(begin_s + number * guard.PACE_S, words, flush=number == 0)

@@ -17,6 +17,7 @@ from session_bench import TICK_S, Bench
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Notice
+from omnibot_driver.core.packets import joined
 from omnibot_driver.simulator import BoardSettings
 from omnibot_driver.simulator.motors import MotorConstants, WheelGains
 
@@ -120,7 +121,7 @@ class RoughDrive(Bench):
         for event in self.session.take_events():
             if isinstance(event, Notice):
                 self._hear(event.text)
-        if data := self.session.take_output(self.now):
+        if data := joined(self.session.take_output(self.now)):
             self._on_the_way.append((self.now + self._out_late_s, data))
         while self._on_the_way and self._on_the_way[0][0] <= self.now:
             self.board.receive(self._on_the_way.popleft()[1])

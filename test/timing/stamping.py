@@ -21,9 +21,9 @@ from busy import READERS
 from carriage import CHUNKERS, Chunks, Received, receive
 from truth import SCENARIOS, TICK_S, Truth, generate
 
-from omnibot_driver.core.board import ImuReading, PausedReading
 from omnibot_driver.core.imu.scale import ImuScale
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.readings import ImuReading, PausedReading
 from omnibot_driver.core.timing.device_clock import DeviceClock
 
 JITTER_S = 60e-6

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver import calibration
-from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.console import Console, digits

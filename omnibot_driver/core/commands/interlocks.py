@@ -41,7 +41,7 @@ def why_not_calibrate(
         return f"the board is {mode.value}; call ~/start, then call again"
     if measuring:
         return "a calibration is under way; wait for its answer, then call again"
-    if current is not None and not current.stands:
+    if current is not None and not current.is_zero:
         return (
             f"the robot is commanded by {current.authority.value}; stop the sender, then call again"
         )

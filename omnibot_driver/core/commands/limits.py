@@ -65,10 +65,9 @@ class SpeedLimits:
         )
         return BodyTwist(vx, vy, yaw_rate)
 
-    def wheels(self, wanted_radps: Sequence[float]) -> tuple[float, float, float]:
-        """All three wheels slowed alike until the fastest is within its limit."""
-        a, b, c = slow(wanted_radps, self.wheel_radps)
-        return a, b, c
+    def wheels(self, wanted_radps: Sequence[float]) -> tuple[float, ...]:
+        """All wheels slowed alike until the fastest is within its limit."""
+        return slow(wanted_radps, self.wheel_radps)
 
 
 def require_finite(what: str, values: Sequence[float]) -> None:

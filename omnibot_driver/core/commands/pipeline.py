@@ -2,7 +2,7 @@
 
 """Motion commands, from a wish to what comes of it: when each expires, and whether the robot obeys.
 
-Composes the helm, the command stream and the motion monitor with its interlock. Knows no modes and
+Composes shaping, policy, the actuator and the motion monitor with its interlock. Knows no modes and
 no requests: whether a robot may be driven now is decided elsewhere.
 """
 
@@ -10,12 +10,14 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from omnibot_driver.core.board import Board, DisplacementReading
+from omnibot_driver.core.board import Board
 from omnibot_driver.core.commands.limits import SpeedLimits, require_timely
 from omnibot_driver.core.commands.motion_interlock import MotionInterlock
+from omnibot_driver.core.commands.policy import CommandPolicy, CommandSettings
+from omnibot_driver.core.commands.set_point_stream import PACE_S
 from omnibot_driver.core.commands.set_points import GoalSetpoint, Setpoint
 from omnibot_driver.core.commands.shaping import CommandShaper, ControlMethod
-from omnibot_driver.core.commands.stream import PACE_S, CommandSettings, CommandStream
+from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose, Signs
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -23,6 +25,8 @@ from omnibot_driver.core.measurement.pipeline import Estimate
 from omnibot_driver.core.motion_monitor.monitor import ADVICE, Fault, MotionMonitor
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
+from omnibot_driver.core.packets import Packets
+from omnibot_driver.core.readings import DisplacementReading
 from omnibot_driver.core.reporting.figures import CommandFigures
 
 Command = tuple[Setpoint, float]
@@ -31,7 +35,7 @@ NEVER: Final = math.inf
 
 
 class CommandPipeline:
-    """``stream`` is what goes out; ``obeys``: whether the robot can be expected to do it;
+    """``policy`` is what is wanted; ``obeys``: whether the robot can be expected to do it;
     ``interlock`` refuses motion after it did not; ``monitored``: whether that is looked after.
     """
 
@@ -47,12 +51,11 @@ class CommandPipeline:
         obeys: bool,
         monitored: bool,
     ) -> None:
-        self._stop = board.stop()
-        self.stream = CommandStream(
-            commands, stop=self._stop, emergency_stop=board.emergency_stop()
-        )
+        proof = StopProof()
+        self._actuator = board.actuator(proof)
+        self.policy = CommandPolicy(commands, self._actuator, proof)
         self._odometry = odometry
-        self._shaper = CommandShaper(board, odometry, limits, axis_signs, control)
+        self._shaper = CommandShaper(board, self._actuator, odometry, limits, axis_signs, control)
         self.interlock = MotionInterlock()
         self._board, self._axis_signs = board, axis_signs
         self._monitor = MotionMonitor()
@@ -64,24 +67,24 @@ class CommandPipeline:
 
         What was commanded under looser ones ends.
         """
-        stricter = commands.timeout_s < self.stream.settings.timeout_s or limits.stricter_than(
+        stricter = commands.timeout_s < self.policy.settings.timeout_s or limits.stricter_than(
             self._shaper.limits
         )
-        self._shaper.limits, self.stream.settings = limits, commands
-        current = self.stream.current
-        if not stricter or current is None or current.stands or isinstance(current, GoalSetpoint):
+        self._shaper.limits, self.policy.settings = limits, commands
+        current = self.policy.current
+        if not stricter or current is None or current.is_zero or isinstance(current, GoalSetpoint):
             return []
-        self.stream.halt(now)
+        self.policy.halt(now)
         return ["the robot is stopped, as its limits are stricter now: command it anew"]
 
-    def encode_anew(self, now: float) -> list[str]:
+    def check_anew(self, now: float) -> list[str]:
         """The board's settings have changed: the command that is repeated is said in them."""
-        if self.stream.current is None:
+        if self.policy.current is None:
             return []
         try:
-            self.stream.current.encode_anew(self._stop)
+            self.policy.current.check_anew()
         except CommandRefused as error:
-            self.stream.halt(now)
+            self.policy.halt(now)
             return [f"robot stopped, the current command does not fit the new scale: {error}"]
         return []
 
@@ -94,55 +97,59 @@ class CommandPipeline:
 
     def figures(self, now: float) -> CommandFigures:
         """Who commands, and how."""
-        current = self.stream.current
+        current = self.policy.current
         return CommandFigures(
             source=current.authority.value if current else None,
-            age_s=now - self.stream.commanded_at,
+            age_s=now - self.policy.commanded_at,
             limited=self._shaper.limited,
-            estop=self.stream.latched,
+            estop=self.policy.latched,
             monitored=self.monitored or not self._obeys,
             trips=self.interlock.trips,
-            interlock=self.interlock.reason(self.stream.settings.timeout_s),
+            interlock=self.interlock.reason(self.policy.settings.timeout_s),
         )
 
-    def begin(self) -> None:
+    def begin(self, now: float) -> None:
         """What was commanded and seen has nothing to do with what comes."""
-        self.stream.discard()
+        self.policy.discard(now)
         self._monitor.begin()
 
     def release(self, now: float) -> None:
         """End the e-stop."""
-        self.stream.release(now)
+        self.policy.release(now)
         self._monitor.release()
 
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
         """Drive the body. Raises CommandRefused, as all wishes do."""
-        timeout_s = self.stream.settings.timeout_s
+        timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s
         if age_s:
             require_timely("cmd_vel", age_s, timeout_s)
             expires_at -= max(0.0, age_s)
-        motion = self._shaper.base(twist, before=self.stream.current, since=now - PACE_S)
+        motion = self._shaper.base(twist, before=self.policy.current, since=now - PACE_S)
         return motion, expires_at
 
     def wheels(self, rates_radps: Sequence[float], now: float) -> Command:
         """Turn the wheels, in the board's order."""
-        return self._shaper.wheels(rates_radps), now + self.stream.settings.timeout_s
+        return self._shaper.wheels(rates_radps), now + self.policy.settings.timeout_s
 
     def pose(self, goal: Pose) -> Command:
         """Drive to a pose in the odometry frame."""
         return self._shaper.pose(goal), NEVER
 
-    def wrote(self, data: bytes, now: float) -> None:
-        """The stream said this."""
-        goal = isinstance(self.stream.current, GoalSetpoint)
-        self._monitor.set_point(None if goal else self._board.meaning(data), now)
+    def wrote(self, packets: Packets, now: float) -> None:
+        """A request to the board went out."""
+        self._actuator.wrote(packets, now)
+
+    def said(self, now: float) -> None:
+        """What was wanted went out: it is what the robot is expected to do."""
+        goal = isinstance(self.policy.current, GoalSetpoint)
+        self._monitor.set_point(None if goal else self._actuator.commanded, now)
 
     def look(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> list[str]:
         """Compare what the robot did with what was commanded; sentences for the user."""
-        self.stream.proof.look(reading, now)
+        self.policy.proof.look(reading, now)
         fault = self._check(reading, estimates, now) if self.monitored and self._obeys else None
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
@@ -159,7 +166,7 @@ class CommandPipeline:
         if not seconds or reading.restarted:
             self._monitor.begin()
             return None
-        if self.stream.current is None:
+        if self.policy.current is None:
             self._monitor.set_point(AT_REST, now)
         newest = estimates[-1] if estimates else None
         if isinstance(newest, OdometryEstimate) and newest.rolling is not None:
@@ -174,7 +181,7 @@ class CommandPipeline:
         if fault is None:
             return []
         if fault in ADVICE:
-            self.stream.halt(now)
+            self.policy.halt(now)
             self.interlock.trip(now)
             seen = "" if fault is Fault.BEYOND_LIMITS else self._seen()
             until = self.interlock.until.value
@@ -186,7 +193,7 @@ class CommandPipeline:
                 f" cable to the board. {until}"
             ]
         if fault is Fault.UNCOMMANDED:
-            self.stream.halt(now)
+            self.policy.halt(now)
         return [fault.value] if self._monitor.is_news(fault) else []
 
     def _seen(self) -> str:
@@ -201,7 +208,7 @@ class CommandPipeline:
 
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
         """Drop a goal that is another place by now, or that the robot drives away from."""
-        goal = self.stream.current
+        goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):
             return []
         if goal.alignment != self._odometry.alignments:
@@ -218,5 +225,5 @@ class CommandPipeline:
             )
         else:
             return []
-        self.stream.halt(now)
+        self.policy.halt(now)
         return [f"the goal of cmd_pose is discarded: {why}"]

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is commanded, as the frame that says it now.
+"""What is commanded, as the order that it is at each moment.
 
-A ``Motion`` is one command. The stream asks it for its frame whenever one goes out, so a set-point
-that nears its target by an acceleration limit needs no timer of its own. Whether it may be
-commanded, and when a frame goes out, is others' business.
+A ``Setpoint`` is one command. The actuator asks it for its order whenever a frame goes out, so a
+set-point that nears its target by an acceleration limit needs no timer of its own. Whether it may
+be commanded, and when a frame goes out, is others' business.
 """
 
 import math
@@ -13,6 +13,7 @@ from enum import Enum
 from typing import Final, Protocol
 
 from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.orders import Drive, GoTo, Order
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 
@@ -41,27 +42,24 @@ class Setpoint(Protocol):
         """Whose command it is."""
 
     @property
-    def stands(self) -> bool:
+    def is_zero(self) -> bool:
         """Whether it is a wish to stand still, which never waits and is no ramp's business."""
 
     @property
     def settled(self) -> bool:
-        """False while each next frame is another one."""
+        """False while each next order is another one."""
 
-    def frame(self, now: float) -> bytes:
-        """The frame to write at this time."""
+    def order(self, now: float) -> Order:
+        """What to order at this time."""
 
-    def encode_anew(self, stop: bytes) -> None:
-        """From now on by the board's present settings; what makes ``stop``, stands.
-
-        Raises CommandRefused where they cannot say it.
-        """
+    def check_anew(self) -> None:
+        """The board's settings have changed. Raises CommandRefused where they cannot say it."""
 
 
 class BaseSetpoint:
     """A body velocity, approached by the acceleration limits from what was commanded before.
 
-    ``encode`` makes a velocity a frame; what it makes ``stop`` of, stands.
+    ``is_zero`` is the actuator's. Raises CommandRefused.
     """
 
     authority: Final = Authority.BASE
@@ -70,17 +68,16 @@ class BaseSetpoint:
         self,
         wanted: BodyTwist,
         limits: SpeedLimits,
-        encode: Callable[[BodyTwist], bytes],
+        is_zero: Callable[[Order], bool],
         *,
-        stop: bytes,
-        before: Setpoint | None,
+        before: "Setpoint | None",
         since: float,
     ) -> None:
-        self._wanted, self._limits, self._encode = wanted, limits, encode
-        self._frame = encode(wanted)
-        self.stands = self._frame == stop
+        self._wanted, self._limits, self._is_zero = wanted, limits, is_zero
+        self._order = Drive(wanted)
+        self.is_zero = is_zero(self._order)
         self._setpoint, self._reached_at = wanted, since
-        self.settled = self.stands or not (limits.linear_mps2 or limits.angular_radps2)
+        self.settled = self.is_zero or not (limits.linear_mps2 or limits.angular_radps2)
         """Whether the set-point has arrived."""
         if not self.settled:
             self._setpoint = AT_REST
@@ -88,78 +85,74 @@ class BaseSetpoint:
                 self._setpoint = before._setpoint
                 self._reached_at = max(before._reached_at, since)
 
-    def frame(self, now: float) -> bytes:
+    def order(self, now: float) -> Order:
         """The set-point of this time; asking moves it."""
         if not self.settled:
             duration_s = min(now - self._reached_at, LONGEST_STEP_S)
             self._setpoint = self._limits.approach(self._setpoint, self._wanted, duration_s)
-            self._frame = self._encode(self._setpoint)
+            self._order = Drive(self._setpoint)
             self.settled = self._setpoint == self._wanted
         self._reached_at = now
-        return self._frame
+        return self._order
 
-    def encode_anew(self, stop: bytes) -> None:
-        """The set-point; a ramp goes on."""
-        self.stands = self._encode(self._wanted) == stop
-        if self.stands:
+    def check_anew(self) -> None:
+        """A ramp goes on."""
+        self.is_zero = self._is_zero(Drive(self._wanted))
+        if self.is_zero:
             self._setpoint, self.settled = self._wanted, True
-        self._frame = self._encode(self._setpoint)
+            self._order = Drive(self._wanted)
 
 
 class SteadySetpoint:
-    """A command whose frame does not change, unless ``encode`` makes another one of it."""
+    """A command whose order does not change. Raises CommandRefused."""
 
     settled: Final = True
 
     def __init__(
-        self,
-        authority: Authority,
-        frame: bytes,
-        *,
-        stands: bool,
-        encode: Callable[[], bytes] | None = None,
+        self, authority: Authority, order: Order, is_zero: Callable[[Order], bool]
     ) -> None:
-        self.authority, self.stands = authority, stands
-        self._frame, self._encode = frame, encode
+        self.authority = authority
+        self._order, self._is_zero = order, is_zero
+        self.is_zero = is_zero(order)
 
-    def frame(self, now: float) -> bytes:
+    def order(self, now: float) -> Order:
         """Always the same."""
-        return self._frame
+        return self._order
 
-    def encode_anew(self, stop: bytes) -> None:
-        """By ``encode``."""
-        if self._encode is not None:
-            self._frame = self._encode()
-            self.stands = self._frame == stop
+    def check_anew(self) -> None:
+        """Whether the same order stands still now."""
+        self.is_zero = self._is_zero(self._order)
 
 
 class GoalSetpoint:
-    """A pose to drive to: ``place`` in the odometry frame, as that lay at this ``alignment``.
+    """A pose to drive to: ``goal`` in the odometry frame, as that lay at this ``alignment``.
 
-    ``encode`` makes its frame.
+    ``place`` is the same in the board's frame. Raises CommandRefused.
     """
 
     authority: Final = Authority.POSE
-    stands: Final = False
+    is_zero: Final = False
     settled: Final = True
 
-    def __init__(self, place: Pose, encode: Callable[[], bytes], alignment: int) -> None:
+    def __init__(
+        self, goal: Pose, place: Pose, alignment: int, check: Callable[[Order], object]
+    ) -> None:
         self.alignment = alignment
-        self._place, self._encode = place, encode
-        self._frame = encode()
+        self._goal, self._order, self._check = goal, GoTo(place), check
         self._nearest_m = self._nearest_rad = math.inf
+        self.check_anew()
 
-    def frame(self, now: float) -> bytes:
+    def order(self, now: float) -> Order:
         """Always the same."""
-        return self._frame
+        return self._order
 
-    def encode_anew(self, stop: bytes) -> None:
-        """The same place in the board's frame."""
-        self._frame = self._encode()
+    def check_anew(self) -> None:
+        """Whether it can still be said."""
+        self._check(self._order)
 
     def is_left_by(self, pose: Pose) -> bool:
         """Whether a robot that is here now has been plainly nearer before."""
-        way = pose.way_to(self._place)
+        way = pose.way_to(self._goal)
         self._nearest_m = min(self._nearest_m, way.way_m)
         self._nearest_rad = min(self._nearest_rad, abs(way.yaw_rad))
         return (

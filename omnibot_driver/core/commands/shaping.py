@@ -1,17 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From wishes to motions: checked, limited, in the board's own axes and frame.
+"""From wishes to set-points: checked, limited, in the board's own axes and frame.
 
 Knows what may be wished for and where the board's switch stands; not what mode the board is in, nor
 when anything is sent.
 """
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Literal
 
 from omnibot_driver.core.board import Board, Mode
+from omnibot_driver.core.commands.actuator import Actuator
 from omnibot_driver.core.commands.limits import SpeedLimits, require_finite
+from omnibot_driver.core.commands.orders import TurnWheels
 from omnibot_driver.core.commands.set_points import (
     Authority,
     BaseSetpoint,
@@ -33,14 +34,14 @@ class CommandShaper:
     def __init__(
         self,
         board: Board,
+        actuator: Actuator,
         odometry: Odometry,
         limits: SpeedLimits,
         axis_signs: Signs,
         control: ControlMethod,
     ) -> None:
         self.limits = limits
-        self._board, self._odometry = board, odometry
-        self._stop = board.stop()
+        self._board, self._actuator, self._odometry = board, actuator, odometry
         self._axis_signs, self._control = axis_signs, control
         self.limited = 0
         """Wishes that went beyond the limits."""
@@ -58,8 +59,7 @@ class CommandShaper:
         return BaseSetpoint(
             BodyTwist(x * limited.vx_mps, y * limited.vy_mps, yaw * limited.yaw_rate_radps),
             self.limits,
-            self._board.velocity,
-            stop=self._stop,
+            self._actuator.is_zero,
             before=before,
             since=since,
         )
@@ -77,13 +77,7 @@ class CommandShaper:
         require_finite("wheel_cmd", rates_radps)
         limited = self.limits.wheels(rates_radps)
         self.limited += limited != tuple(rates_radps)
-        frame = self._board.wheels(limited)
-        return SteadySetpoint(
-            Authority.WHEELS,
-            frame,
-            stands=frame == self._stop,
-            encode=partial(self._board.wheels, limited),
-        )
+        return SteadySetpoint(Authority.WHEELS, TurnWheels(limited), self._actuator.is_zero)
 
     def pose(self, goal: Pose) -> Setpoint:
         """Drive to a pose in the odometry frame and stay there."""
@@ -96,8 +90,7 @@ class CommandShaper:
                 "cmd_pose refused: where the board believes to be is not known; this needs its"
                 " poses (nominal mode) and `use_board_pose`. After a restart, wait a second"
             )
-        encode = partial(self._board.drive_to, place)
-        return GoalSetpoint(goal, encode, self._odometry.alignments)
+        return GoalSetpoint(goal, place, self._odometry.alignments, self._actuator.is_zero)
 
     def _at_odds(self, authority: Authority) -> CommandRefused:
         return CommandRefused(

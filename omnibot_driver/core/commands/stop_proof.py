@@ -9,7 +9,7 @@ went out; not what is done while the proof is missing. Time is an argument.
 import math
 from typing import Final
 
-from omnibot_driver.core.board import DisplacementReading
+from omnibot_driver.core.readings import DisplacementReading
 
 STILL_MPS: Final = 0.01
 STILL_RADPS: Final = 0.03

@@ -4,8 +4,9 @@
 
 from dataclasses import dataclass
 
-from omnibot_driver.core.board import Board, DisplacementReading, ImuReading, Vector3
+from omnibot_driver.core.board import Board
 from omnibot_driver.core.imu.gyro_calibration import GyroCalibration
+from omnibot_driver.core.readings import DisplacementReading, ImuReading, Vector3
 from omnibot_driver.core.reporting.figures import ImuFigures
 from omnibot_driver.core.values import value
 

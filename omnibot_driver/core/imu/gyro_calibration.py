@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from statistics import fmean
 from typing import Final
 
-from omnibot_driver.core.board import Vector3
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.core.requests import RequestDone
 
 MEASURE_S: Final = 2.0

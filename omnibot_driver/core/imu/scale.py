@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from omnibot_driver.core.board import Vector3
+from omnibot_driver.core.readings import Vector3
 
 STANDARD_GRAVITY: Final = 9.80665
 

@@ -21,8 +21,9 @@ from math import hypot
 from operator import sub
 from typing import Final
 
-from omnibot_driver.core.board import (
+from omnibot_driver.core.readings import (
     DisplacementReading,
+    ExtraReading,
     ImuReading,
     PausedReading,
     PoseReading,
@@ -94,6 +95,8 @@ class OutlierFilter:
             return self._admit_displacement(reading, stamp_s)
         if isinstance(reading, PausedReading):
             return [*self.release(), (reading, stamp_s)]
+        if isinstance(reading, ExtraReading):
+            return [(reading, stamp_s)]
         if self._held_motion:
             self._held_motion.append((reading, stamp_s))
             return []

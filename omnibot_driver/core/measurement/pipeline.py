@@ -9,13 +9,8 @@ what else is made of it (``flush``).
 
 from collections.abc import Sequence
 
-from omnibot_driver.core.board import (
-    Board,
-    DisplacementReading,
-    ImuReading,
-    PoseReading,
-    Reading,
-)
+from omnibot_driver.core.board import Board
+from omnibot_driver.core.events import Extra
 from omnibot_driver.core.geometry.se2 import Signs
 from omnibot_driver.core.imu.bias_correction import BiasCorrector, ImuCorrection, ImuEstimate
 from omnibot_driver.core.measurement.outlier_filter import (
@@ -26,9 +21,17 @@ from omnibot_driver.core.measurement.outlier_filter import (
 )
 from omnibot_driver.core.measurement.statistics import StreamStatistics
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.readings import (
+    DisplacementReading,
+    ExtraReading,
+    ImuReading,
+    PoseReading,
+    Reading,
+)
+from omnibot_driver.core.timing.arrival_clock import ArrivalClock
 from omnibot_driver.core.timing.device_clock import DeviceClock
 
-Estimate = ImuEstimate | OdometryEstimate
+Estimate = ImuEstimate | OdometryEstimate | Extra
 Measured = tuple[Reading, Sequence[Estimate]]
 """A reading that is sure, and what came of it."""
 
@@ -48,8 +51,9 @@ class MeasurementPipeline:
         self.inertial = BiasCorrector(board, imu)
         self._tally = StreamStatistics()
         self._board = board
-        self._clock = DeviceClock(board.tick_s)
-        self._outliers = OutlierFilter(motion, board.tick_s)
+        period_s = board.traits.imu_period_s
+        self._clock = DeviceClock(period_s) if period_s else ArrivalClock()
+        self._outliers = OutlierFilter(motion, period_s or 0.0)
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
         """Of each read the readings, and how old the newest was."""
         self.undigested: list[Stamped] = []
@@ -140,5 +144,7 @@ class MeasurementPipeline:
             return self.odometry.settle(reading)
         if isinstance(reading, ImuReading):
             return [self.inertial.estimate(reading, stamp_s)]
+        if isinstance(reading, ExtraReading):
+            return [Extra(stamp_s, reading.content)]
         self._clock.restart()
         return []

@@ -7,7 +7,7 @@ them.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from omnibot_driver.core.board import (
+from omnibot_driver.core.readings import (
     DisplacementReading,
     ImuReading,
     PoseReading,

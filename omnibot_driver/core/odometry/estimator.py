@@ -12,7 +12,6 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.geometry.se2 import Pose, Signs, log_of, roll
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.covariance import NOTHING, Covariance, OdometryNoise
@@ -20,6 +19,7 @@ from omnibot_driver.core.odometry.gap_interpolation import GapInterpolation
 from omnibot_driver.core.odometry.pending_displacements import PendingDisplacements, advanced
 from omnibot_driver.core.odometry.pose_gate import PoseGate, expected
 from omnibot_driver.core.odometry.pose_tracker import PoseTracker
+from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0

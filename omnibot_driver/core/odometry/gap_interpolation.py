@@ -8,9 +8,9 @@ Knows displacements and headings; not where the robot is, nor what a guess does 
 import math
 from typing import Final
 
-from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.geometry.se2 import Pose, log_of
 from omnibot_driver.core.odometry.pending_displacements import chord
+from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
 """Board time that a bridge stands for at the most; a robot that is not heard is soon stopped."""

@@ -7,8 +7,8 @@ Knows how a displacement moves a pose; not why one waits, nor what comes of it.
 
 from dataclasses import replace
 
-from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.geometry.se2 import Pose, roll
+from omnibot_driver.core.readings import DisplacementReading
 
 
 class PendingDisplacements:

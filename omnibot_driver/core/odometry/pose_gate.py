@@ -9,10 +9,10 @@ what comes of a belief.
 import math
 from typing import Final
 
-from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.pending_displacements import advanced
+from omnibot_driver.core.readings import DisplacementReading
 
 BELIEVED_M: Final = 0.02
 BELIEVED_TURN_RAD: Final = 0.05

@@ -1,44 +1,34 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The OmniBot board as a ``core.board.Board``: its bytes as readings, wishes as its bytes.
+"""The OmniBot board as a ``core.board.Board``: its bytes as readings, requests as its bytes.
 
-Source: the board's manual ver. 0.3. Velocity and wheel commands are in the firmware's own unit,
-which ``linear_scale`` and ``angular_scale`` translate (70 and 500 are the vendor's, found by hand).
-Commanded poses are taken to have the unit of those that are sent, mm and mrad; nobody has verified
-it. What the board says is told in ``translation``.
+Source: the board's manual ver. 0.3. What the board says is told in ``translation``, what it is
+ordered to do in ``command_encoder``.
 """
 
-from collections.abc import Sequence
+import math
 from typing import Final
 
-from omnibot_driver.core.board import BoardFigures, Mode, Reading, SampleBoundary, Vector3
-from omnibot_driver.core.commands.limits import MAX_WORD, slow, to_nearest
+from omnibot_driver.core.board import BoardFigures, Mode
+from omnibot_driver.core.commands.set_point_stream import SetpointStream
 from omnibot_driver.core.commands.set_points import Authority
-from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.geometry.omni import OmniKinematics
-from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.imu.scale import ACCEL_COUNTS_PER_G, gravity_advice
 from omnibot_driver.core.omnibot import frames
+from omnibot_driver.core.omnibot.command_encoder import EMERGENCY_STOP, STOP, CommandEncoder
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
 from omnibot_driver.core.omnibot.modes import Happening
-from omnibot_driver.core.omnibot.outbound import (
-    begins_with_a_letter,
-    harmless,
-    motion,
-    transmission,
-)
+from omnibot_driver.core.omnibot.outbound import transmission
 from omnibot_driver.core.omnibot.schedule import TICK_S, Schedule
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
 from omnibot_driver.core.omnibot.translation import Translation
+from omnibot_driver.core.packets import NO_PACKETS, Packets, packed
+from omnibot_driver.core.readings import Reading, SampleBoundary
 from omnibot_driver.core.requests import Request
 from omnibot_driver.core.traits import Traits
 
-_STOP: Final = frames.encode(frames.STOP)
-STOP: Final = transmission(_STOP)
-EMERGENCY_STOP: Final = transmission(frames.encode(frames.EMERGENCY_STOP))
 TRAITS: Final = Traits(
-    imu=True,
+    imu_period_s=TICK_S,
     authorities=frozenset(Authority),
     requests=frozenset(Request),
     wheels=("A", "B", "C"),
@@ -51,12 +41,13 @@ class OmniBot:
     """One board on one line. ``settings`` may be replaced at any time, but not the delta period."""
 
     traits = TRAITS
+    wake_at = math.inf
 
     def __init__(self, settings: OmniBotSettings) -> None:
         self._schedule = Schedule(settings.delta_period_s)
         self._translation = Translation(settings)
         self._statistics = DecoderStatistics()
-        self._saturated = 0
+        self._encoder = CommandEncoder(settings)
         self.settings = settings
         self.connect()
 
@@ -67,7 +58,7 @@ class OmniBot:
 
     @settings.setter
     def settings(self, settings: OmniBotSettings) -> None:
-        self._settings = self._translation.settings = settings
+        self._settings = self._translation.settings = self._encoder.settings = settings
         byte_s = 10 / settings.baudrate
         self._nothing_begun = SampleBoundary(0, 0.0, (frames.IMU_LENGTH - 1) * byte_s)
 
@@ -87,11 +78,6 @@ class OmniBot:
     def mode(self) -> Mode:
         """The present belief."""
         return self._modes.mode
-
-    @property
-    def tick_s(self) -> float:
-        """Of the control loop, which samples the IMU."""
-        return TICK_S
 
     @property
     def edge(self) -> SampleBoundary | None:
@@ -118,7 +104,7 @@ class OmniBot:
             rates_hz=self._schedule.rates_hz,
             faults=self._statistics.faults,
             discarded_bytes=self._statistics.discarded_bytes,
-            saturated=self._saturated,
+            saturated=self._encoder.saturated,
         )
 
     def gravity_advice(self, gravity_mps2: float) -> str:
@@ -130,7 +116,7 @@ class OmniBot:
         """Which parameter is set wrong, by what the board sends."""
         return self._translation.suspicion.advice
 
-    def receive(self, data: bytes, now: float) -> list[Reading]:
+    def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """The readings that these bytes complete, in the order of the line."""
         if self._translation.lone_to_come and (frame := self._decoder.take_single(data, now)):
             return [self._translation.lone(frame, now)]
@@ -146,86 +132,42 @@ class OmniBot:
         """Nothing was understood for so long that the mode is unknown again."""
         self._translation.apply(Happening.HEARD_NOTHING)
 
-    def wake(self) -> bytes:
-        """Stop; the zeros before it wake the board."""
-        return STOP
+    def due(self, now: float) -> Packets:
+        """Nothing: it sends by itself."""
+        return NO_PACKETS
 
-    def start(self) -> bytes:
+    def actuator(self, proof: StopProof) -> SetpointStream:
+        """Frames, repeated."""
+        return SetpointStream(self._encoder, proof)
+
+    def wake(self) -> Packets:
+        """Stop; the zeros before it wake the board."""
+        return packed(STOP)
+
+    def start(self) -> Packets:
         """S."""
         self._translation.apply(Happening.SENT_START)
-        return transmission(frames.FORCE_START)
+        return packed(transmission(frames.FORCE_START))
 
-    def pause(self) -> bytes:
+    def pause(self) -> Packets:
         """Stop, then P: a toggle, so refused unless the board is known to run."""
         self._translation.apply(Happening.SENT_PAUSE)
-        return transmission(_STOP, frames.TOGGLE_PAUSE)
+        return packed(transmission(frames.encode(frames.STOP), frames.TOGGLE_PAUSE))
 
-    def force_pause(self) -> bytes:
+    def force_pause(self) -> Packets:
         """Stop, S, P: S makes it run in any case, so that the toggle has one outcome."""
-        return transmission(_STOP, frames.FORCE_START, frames.TOGGLE_PAUSE)
+        stop = frames.encode(frames.STOP)
+        return packed(transmission(stop, frames.FORCE_START, frames.TOGGLE_PAUSE))
 
-    def reset(self) -> bytes:
+    def reset(self) -> Packets:
         """Stop, then R."""
         self._translation.apply(Happening.SENT_RESET)
-        return transmission(_STOP, frames.RESET)
+        return packed(transmission(frames.encode(frames.STOP), frames.RESET))
 
-    def stop(self) -> bytes:
+    def stop(self) -> Packets:
         """The manual's Stop, which stands still whatever the board's control switch says."""
-        return STOP
+        return packed(STOP)
 
-    def emergency_stop(self) -> bytes:
+    def emergency_stop(self) -> Packets:
         """The manual's E-stop."""
-        return EMERGENCY_STOP
-
-    def velocity(self, twist: BodyTwist) -> bytes:
-        """Base vector control; Stop when it rounds to nothing."""
-        settings = self._settings
-        linear, angular = settings.linear_scale, settings.angular_scale
-        counts = (twist.vx_mps * linear, twist.vy_mps * linear, twist.yaw_rate_radps * angular)
-        return self._drive(frames.VELOCITY_MODE, counts)
-
-    def wheels(self, rates_radps: Sequence[float]) -> bytes:
-        """Independent wheel drive in rad/s: the unit on the wire is that of a rim speed."""
-        unit = self._settings.linear_scale * self._settings.wheel_radius_m
-        a, b, c = rates_radps
-        return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
-
-    def meaning(self, data: bytes) -> BodyTwist:
-        """By the mode and the words of the last command frame."""
-        settings = self._settings
-        mode, a, b, c = frames.last_command(data)
-        linear = settings.linear_scale
-        if mode == frames.VELOCITY_MODE:
-            return BodyTwist(a / linear, b / linear, c / settings.angular_scale)
-        if mode == frames.WHEEL_MODE:
-            rims = OmniKinematics(wheel_radius_m=1.0, base_radius_m=settings.base_radius_m)
-            return rims.body_twist((a / linear, b / linear, c / linear))
-        return BodyTwist(0.0, 0.0, 0.0)
-
-    def drive_to(self, pose: Pose) -> bytes:
-        """Base vector control with the switch on position; the origin is a pose like any other."""
-        position, heading = self._settings.position_scale, self._settings.heading_scale
-        counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)
-        if not all(abs(count) < MAX_WORD + 0.5 for count in counts):
-            raise CommandRefused(
-                f"cmd_pose refused: in the board's own frame it is x {pose.x_m:.2f} m,"
-                f" y {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad, and no more than"
-                f" {MAX_WORD / position:.2f} m and {MAX_WORD / heading:.2f} rad can be said:"
-                " ~/reset begins a new frame where the robot stands"
-            )
-        if any(begins_with_a_letter(to_nearest(count)) for count in counts):
-            raise CommandRefused(
-                f"cmd_pose refused: in the board's own frame it is x {pose.x_m:.2f} m,"
-                f" y {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad, and a damaged line could turn"
-                " one of these numbers into a command to start, pause or reset the board: choose"
-                " another goal, or call ~/reset, which begins a new frame where the robot stands"
-            )
-        return motion(frames.command(frames.VELOCITY_MODE, *harmless(counts)))
-
-    def _drive(self, mode: int, counts: Vector3) -> bytes:
-        a, b, c = counts
-        if abs(a) > MAX_WORD or abs(b) > MAX_WORD or abs(c) > MAX_WORD:
-            self._saturated += 1
-            a, b, c = slow(counts, MAX_WORD)
-        words = harmless((a, b, c))
-        return motion(frames.command(mode, *words)) if any(words) else STOP
+        return packed(EMERGENCY_STOP)

@@ -11,11 +11,11 @@ import math
 import struct
 from typing import Final, Literal
 
-from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.geometry.se2 import Pose, roll
 from omnibot_driver.core.odometry.pending_displacements import chord
 from omnibot_driver.core.omnibot.frames import ByteOrder, PoseFrame
 from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, TICK_S, USUAL, Schedule
+from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 SURE: Final = 10
 """So many poses that speak against a setting, and none for it: two seconds."""

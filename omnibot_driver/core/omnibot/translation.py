@@ -9,14 +9,6 @@ mrad.
 import math
 from typing import Final
 
-from omnibot_driver.core.board import (
-    DisplacementReading,
-    ImuReading,
-    PausedReading,
-    PoseReading,
-    Reading,
-    Vector3,
-)
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.omnibot.frame_schedule import LENGTH, FrameSchedule
 from omnibot_driver.core.omnibot.frames import (
@@ -32,6 +24,14 @@ from omnibot_driver.core.omnibot.modes import Happening, ModeTracker
 from omnibot_driver.core.omnibot.schedule import Schedule
 from omnibot_driver.core.omnibot.sequence import Sequence
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
+from omnibot_driver.core.readings import (
+    DisplacementReading,
+    ImuReading,
+    PausedReading,
+    PoseReading,
+    Reading,
+    Vector3,
+)
 
 DELTA_LSB: Final = 1e-4
 """m, m, rad."""

@@ -4,9 +4,10 @@
 
 from dataclasses import dataclass
 
-from omnibot_driver.core.board import BoardFigures, Vector3
+from omnibot_driver.core.board import BoardFigures
 from omnibot_driver.core.measurement.outlier_filter import Refused
 from omnibot_driver.core.measurement.statistics import StreamStatistics
+from omnibot_driver.core.readings import Vector3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -21,7 +21,7 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
-from omnibot_driver.core.board import (
+from omnibot_driver.core.readings import (
     DisplacementReading,
     ImuReading,
     PoseReading,

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
-from omnibot_driver.core.board import Vector3
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.tools.calibrate.commission_result import Found, result_of
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.log import Log

@@ -112,7 +112,7 @@ def _drive(robot: Any, console: Console, drive: Drive, arguments: argparse.Names
         turn=abs(drive.places[-1].yaw_rad) + 1.0,
         seconds=3 * seconds,
     )
-    with console.progress(f"CommandPipeline {drive.name}") as told:
+    with console.progress(f"Driving {drive.name}") as told:
         law = visit(drive.places, speed, turning)
         log = robot.drive(law, bounds, show=lambda s: told(s / seconds))
     path: Column = log.odometry.pose

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.tools.needs import ToolError
 
 Topic = Literal["cmd_vel", "wheel_cmd"]

@@ -23,8 +23,8 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float32MultiArray
 
-from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.tools.calibrate.interruption import Interruption
 from omnibot_driver.tools.calibrate.listener import ODOMETRY, Listener
 from omnibot_driver.tools.calibrate.log import Log

@@ -62,7 +62,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
         acceleration=ACCELERATION,
         angular_acceleration=2 * ACCELERATION,
     )
-    with console.progress(f"CommandPipeline for {total_s:.0f} s") as told:
+    with console.progress(f"Driving for {total_s:.0f} s") as told:
         log = robot.drive(stairs(steps), bounds, monitored=False, show=lambda s: told(s / total_s))
     return result(speeds(log, scales, at_rest.up, at_rest.bias_radps), now)
 

@@ -14,7 +14,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from omnibot_driver.core.board import Vector3
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.tools.calibrate.log import Column, Log
 from omnibot_driver.tools.needs import ToolError
 

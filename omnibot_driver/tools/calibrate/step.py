@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from omnibot_driver.core.board import Vector3
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.motion import Bounds, Law, stairs
 from omnibot_driver.tools.calibrate.result import Result

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.tools.calibrate.motion import Law
 
 NEAR_M: Final = 0.005

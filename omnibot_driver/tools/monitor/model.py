@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.core.reporting.diagnosis import RUNNING, Level, Status
 from omnibot_driver.tools.monitor.rates import Rate
 

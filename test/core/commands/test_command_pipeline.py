@@ -8,7 +8,7 @@ import pytest
 from session_bench import STOP, Bench, bare
 
 from omnibot_driver.core.commands.limits import SpeedLimits
-from omnibot_driver.core.commands.stream import PACE_S
+from omnibot_driver.core.commands.set_point_stream import PACE_S
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.simulator import BoardSettings
 

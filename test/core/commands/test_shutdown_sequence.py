@@ -6,7 +6,7 @@ import pytest
 from robots import driving, paused, standing
 from session_bench import EMERGENCY_STOP, PAUSE, RESET, STOP, TICK_S, Bench
 
-from omnibot_driver.core.requests import Request
+from omnibot_driver.core.requests import OnExit, Request
 from omnibot_driver.simulator import BoardMode
 
 
@@ -19,16 +19,16 @@ def bench() -> Bench:
     ("on_exit", "expected"), [("stop", b""), ("pause", STOP + PAUSE), ("reset", STOP + RESET)]
 )
 def test_the_farewell_stops_the_robot_whatever_else_it_does(
-    bench: Bench, on_exit: str, expected: bytes
+    bench: Bench, on_exit: OnExit, expected: bytes
 ) -> None:
     """Stop comes first."""
-    assert bench.session.shutdown_sequence(on_exit) == 3 * STOP + expected
+    assert bench.last_words(on_exit) == 3 * STOP + expected
 
 
 def test_a_farewell_to_a_paused_board_does_not_unpause_it() -> None:
     """P is a toggle."""
     bench = paused()
-    assert bench.session.shutdown_sequence("pause") == 3 * STOP
+    assert bench.last_words("pause") == 3 * STOP
 
 
 def test_a_farewell_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
@@ -40,7 +40,7 @@ def test_a_farewell_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
         bench.speaks = True
         bench.run(0.01)
         bench.speaks = False
-    bench.board.receive(bench.session.shutdown_sequence("pause"))
+    bench.board.receive(bench.last_words("pause"))
     bench.hears = False
     bench.run(1.0)
     assert bench.board.mode is BoardMode.PAUSED
@@ -51,7 +51,7 @@ def test_a_farewell_while_a_start_is_in_flight_ends_paused() -> None:
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)
     bench.settle()
-    bench.board.receive(bench.session.shutdown_sequence("pause"))
+    bench.board.receive(bench.last_words("pause"))
     bench.hears = False
     bench.run(1.0)
     assert bench.board.mode is BoardMode.PAUSED
@@ -60,7 +60,7 @@ def test_a_farewell_while_a_start_is_in_flight_ends_paused() -> None:
 def test_a_farewell_under_estop_repeats_the_estop(bench: Bench) -> None:
     """The last thing the board hears is that it must not move."""
     bench.session.estop(True, bench.now)
-    assert bench.session.shutdown_sequence("stop") == 3 * STOP + EMERGENCY_STOP
+    assert bench.last_words("stop") == 3 * STOP + EMERGENCY_STOP
 
 
 def left(bench: Bench) -> None:
@@ -81,7 +81,7 @@ def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends(
     bench.run(0.2)
     assert bench.session.stands
     assert bench.written_since(start) == b""
-    assert bench.session.shutdown_sequence("stop") == b""
+    assert bench.last_words("stop") == b""
 
 
 def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
@@ -92,7 +92,7 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
     assert bench.session.fall_silent(bench.now)
     bench.run(0.2)
     assert not bench.session.stands
-    assert bench.session.shutdown_sequence("stop") == 3 * STOP
+    assert bench.last_words("stop") == 3 * STOP
 
 
 def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:

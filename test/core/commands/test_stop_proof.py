@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from robots import driving
 from session_bench import Bench
 
-from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.commands.stop_proof import STILL_MPS, STILL_RADPS, StopProof
 from omnibot_driver.core.omnibot.frames import DELTA_HEADER
+from omnibot_driver.core.readings import DisplacementReading
 
 PERIOD_S = 0.04
 

@@ -9,7 +9,7 @@ from robots import driving
 from session_bench import STOP, Bench
 
 from omnibot_driver.core.commands.limits import SpeedLimits
-from omnibot_driver.core.commands.stream import CommandSettings
+from omnibot_driver.core.commands.policy import CommandSettings
 
 TURNS_WHEELS = Bench.turn_wheels, (5.0, 0.0, 0.0)
 DRIVES = Bench.drive, (0.4,)

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.core.board import Vector3
 from omnibot_driver.core.imu.gyro_calibration import (
     LARGEST_BIAS_RADPS,
     STILL_RADPS,
@@ -19,6 +18,7 @@ from omnibot_driver.core.imu.gyro_calibration import (
     deviation,
     mean,
 )
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.core.requests import RequestDone
 
 NONE: Vector3 = (0.0, 0.0, 0.0)

@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.core.board import (
+from omnibot_driver.core.measurement.outlier_filter import MotionLimits, OutlierFilter
+from omnibot_driver.core.readings import (
     DisplacementReading,
     ImuReading,
     PausedReading,
     PoseReading,
     Reading,
 )
-from omnibot_driver.core.measurement.outlier_filter import MotionLimits, OutlierFilter
 
 PERIOD_S, TICK_S, G = 0.04, 0.01, 9.80665
 

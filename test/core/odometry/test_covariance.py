@@ -19,11 +19,11 @@ from synthetic_board import (
     body,
 )
 
-from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.simulator import BoardSettings
 
 

@@ -22,10 +22,10 @@ from synthetic_board import (
     xyyaw,
 )
 
-from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.simulator import BoardPose, BoardSettings, SimulatedBoard
 
 # Ways

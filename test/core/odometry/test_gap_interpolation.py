@@ -5,9 +5,9 @@
 import pytest
 from synthetic_board import PERIOD_S, Trip, body, xyyaw
 
-from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.gap_interpolation import GapInterpolation
+from omnibot_driver.core.readings import DisplacementReading
 
 
 def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> DisplacementReading:

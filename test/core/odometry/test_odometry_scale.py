@@ -8,7 +8,7 @@ import pytest
 from session_bench import Bench
 
 from omnibot_driver.core.commands.limits import SpeedLimits
-from omnibot_driver.core.commands.stream import CommandSettings
+from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.session import SessionSettings
 from omnibot_driver.simulator import BoardPose, BoardSettings

@@ -8,14 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.core.board import (
-    DisplacementReading,
-    ImuReading,
-    Mode,
-    PausedReading,
-    PoseReading,
-    Reading,
-)
+from omnibot_driver.core.board import Mode
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.imu.scale import ImuScale
 from omnibot_driver.core.omnibot import (
@@ -28,6 +21,14 @@ from omnibot_driver.core.omnibot import (
     encode,
 )
 from omnibot_driver.core.omnibot.frames import Frame
+from omnibot_driver.core.packets import joined
+from omnibot_driver.core.readings import (
+    DisplacementReading,
+    ImuReading,
+    PausedReading,
+    PoseReading,
+    Reading,
+)
 
 ZEROS = bytes(8)
 STOP = ZEROS + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
@@ -196,20 +197,20 @@ def test_faults_are_counted_over_all_connections() -> None:
 
 def test_stop_and_emergency_stop_are_the_manuals() -> None:
     """From the appendix."""
-    assert bot().stop() == STOP
-    assert bot().emergency_stop() == ZEROS + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
+    assert joined(bot().stop()) == STOP
+    assert joined(bot().emergency_stop()) == ZEROS + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
 
 
 def test_waking_is_eight_zeros_and_stop() -> None:
     """Zeros end any half command and are no letters."""
-    assert bot().wake() == STOP
+    assert joined(bot().wake()) == STOP
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_start_is_s_in_every_mode(mode: Mode) -> None:
     """It is harmless, and does not change the belief."""
     board = in_mode(mode)
-    assert board.start() == ZEROS + b"\x53"
+    assert joined(board.start()) == ZEROS + b"\x53"
     assert board.mode is mode
 
 
@@ -218,7 +219,7 @@ def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -
     """A toggle is for boards whose state is known; a refusal changes nothing."""
     board = in_mode(mode)
     if mode.running:
-        assert board.pause() == STOP + ZEROS + b"\x50"
+        assert joined(board.pause()) == STOP + ZEROS + b"\x50"
     else:
         with pytest.raises(RequestRefused):
             board.pause()
@@ -229,7 +230,7 @@ def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -
 def test_reset_is_stop_and_r(mode: Mode) -> None:
     """Afterwards the mode is unknown."""
     board = in_mode(mode)
-    assert board.reset() == STOP + ZEROS + b"\x52"
+    assert joined(board.reset()) == STOP + ZEROS + b"\x52"
     assert board.mode is Mode.UNKNOWN
 
 

@@ -15,7 +15,9 @@ from strategies import twists, words
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.omnibot import OmniBotSettings
+from omnibot_driver.core.omnibot.command_encoder import CommandEncoder
+from omnibot_driver.core.packets import packed
 
 STOP = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 
@@ -23,8 +25,8 @@ HARMFUL = re.compile(rb"[SPR]|\xff\xfe")
 """What acts by itself where the header before it is lost."""
 
 
-def bot(**settings: object) -> OmniBot:
-    return OmniBot(OmniBotSettings(**settings))  # type: ignore[arg-type]
+def encoder(**settings: object) -> CommandEncoder:
+    return CommandEncoder(OmniBotSettings(**settings))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -40,26 +42,26 @@ def test_a_velocity_is_70_lsb_for_a_metre_and_500_for_a_radian(
     twist: tuple[float, float, float], typed: str
 ) -> None:
     """The vendor's scales, in mode 1."""
-    assert bare(bot().velocity(BodyTwist(*twist))) == bytes.fromhex(typed)
+    assert bare(encoder().velocity(BodyTwist(*twist))) == bytes.fromhex(typed)
 
 
 def test_the_scales_are_those_of_the_settings() -> None:
     """100 LSB per m/s, 200 per rad/s."""
-    board = bot(linear_scale=100.0, angular_scale=200.0)
+    commands = encoder(linear_scale=100.0, angular_scale=200.0)
     typed = bytes.fromhex("FF FE 01 00 64 FF 38 00 C8")
-    assert bare(board.velocity(BodyTwist(1.0, -2.0, 1.0))) == typed
+    assert bare(commands.velocity(BodyTwist(1.0, -2.0, 1.0))) == typed
 
 
 def test_wheel_rates_are_rim_speeds_in_the_linear_unit() -> None:
     """10 rad/s at 29 mm is 0.29 m/s: 20.3 LSB; mode 2."""
-    assert bare(bot().wheels((10.0, -10.0, 1.0))) == bytes.fromhex("FF FE 02 00 14 FF EC 00 02")
-    wide = bot(wheel_radius_m=0.058)
+    assert bare(encoder().wheels((10.0, -10.0, 1.0))) == bytes.fromhex("FF FE 02 00 14 FF EC 00 02")
+    wide = encoder(wheel_radius_m=0.058)
     assert bare(wide.wheels((10.0, 0.0, 0.0))) == bytes.fromhex("FF FE 02 00 29 00 00 00 00")
 
 
 def test_commands_are_rounded_to_the_nearest() -> None:
     """0.0493 m/s is 3.451 LSB, 0.0508 m/s is 3.556."""
-    assert bare(bot().velocity(BodyTwist(0.0493, -0.0508, 0.0)))[3:7] == bytes.fromhex(
+    assert bare(encoder().velocity(BodyTwist(0.0493, -0.0508, 0.0)))[3:7] == bytes.fromhex(
         "00 03 FF FC"
     )
 
@@ -67,7 +69,7 @@ def test_commands_are_rounded_to_the_nearest() -> None:
 @given(twists)
 def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -> None:
     """Zeros in mode 1 would mean: drive to the origin, with the switch on position."""
-    command = bare(bot().velocity(twist))
+    command = bare(encoder().velocity(twist))
     assert command != bytes.fromhex("FF FE 01 00 00 00 00 00 00")
     counts = (70 * twist.vx_mps, 70 * twist.vy_mps, 500 * twist.yaw_rate_radps)
     if max(map(abs, counts)) < 0.5:
@@ -79,8 +81,8 @@ def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -
 @pytest.mark.parametrize("tiny", [0.0, -0.0, 0.005, -0.007, 5e-324])
 def test_almost_nothing_is_the_stop_frame(tiny: float) -> None:
     """Body and wheels."""
-    assert bot().velocity(BodyTwist(tiny, -tiny, tiny / 10)) == STOP
-    assert bot().wheels((tiny, -tiny, tiny)) == STOP
+    assert encoder().velocity(BodyTwist(tiny, -tiny, tiny / 10)) == STOP
+    assert encoder().wheels((tiny, -tiny, tiny)) == STOP
 
 
 @given(st.tuples(*[st.floats(-1e308, 1e308)] * 3).filter(lambda v: max(map(abs, v)) < 1e305))
@@ -88,7 +90,7 @@ def test_a_command_too_large_for_the_wire_keeps_its_direction(
     values: tuple[float, float, float],
 ) -> None:
     """Scaled down as a whole; never an exception, never a word that wraps round."""
-    command = bare(bot().velocity(BodyTwist(*values)))
+    command = bare(encoder().velocity(BodyTwist(*values)))
     counts = (70 * values[0], 70 * values[1], 500 * values[2])
     largest = max(1.0, max(map(abs, counts)) / 32767)
     sent = [int.from_bytes(command[n : n + 2], "big", signed=True) for n in (3, 5, 7)]
@@ -103,7 +105,7 @@ def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int
     """Whole counts survive scaling, rounding and the wire, but for what could act by itself."""
     x, y, omega = (max(-32767, word) for word in (x, y, omega))
     assume(not HARMFUL.search(struct.pack(">3h", x, y, omega)))
-    command = bare(bot().velocity(BodyTwist(x / 70, y / 70, omega / 500)))
+    command = bare(encoder().velocity(BodyTwist(x / 70, y / 70, omega / 500)))
     sent = tuple(int.from_bytes(command[n : n + 2], "big", signed=True) for n in (3, 5, 7))
     assert sent == (x, y, omega)
 
@@ -121,7 +123,7 @@ def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
     pose: tuple[float, float, float], typed: str
 ) -> None:
     """In mode 1; the origin is a place like any other."""
-    assert bare(bot().drive_to(Pose(*pose))) == bytes.fromhex(typed)
+    assert bare(encoder().drive_to(Pose(*pose))) == bytes.fromhex(typed)
 
 
 @pytest.mark.parametrize("far", [33.0, -33.0, 1e300, math.inf, math.nan])
@@ -133,25 +135,25 @@ def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
     values = [0.0, 0.0, 0.0]
     values[place] = far
     with pytest.raises(CommandRefused, match=r"32\.77 m and 32\.77 rad.*~/reset"):
-        bot().drive_to(Pose(*values))
+        encoder().drive_to(Pose(*values))
 
 
 def test_commands_that_do_not_fit_the_wire_are_counted() -> None:
     """One at the very end of it is not."""
-    board = bot(linear_scale=10_000.0)
-    board.velocity(BodyTwist(3.2767, 0.0, 0.0))
-    assert board.figures.saturated == 0
-    board.velocity(BodyTwist(3.3, 0.0, 0.0))
-    assert board.figures.saturated == 1
-    sent = bare(board.velocity(BodyTwist(6.5534, 2.0, 0.0)))
+    commands = encoder(linear_scale=10_000.0)
+    commands.velocity(BodyTwist(3.2767, 0.0, 0.0))
+    assert commands.saturated == 0
+    commands.velocity(BodyTwist(3.3, 0.0, 0.0))
+    assert commands.saturated == 1
+    sent = bare(commands.velocity(BodyTwist(6.5534, 2.0, 0.0)))
     assert sent == bytes.fromhex("FF FE 01 7F FF 27 10 00 00")  # twice too fast: slowed as a whole
 
 
 def test_settings_may_be_replaced_while_it_runs() -> None:
     """Scales hold from the next command on."""
-    board = bot()
-    board.settings = OmniBotSettings(linear_scale=100.0)
-    assert bare(board.velocity(BodyTwist(1.0, 0.0, 0.0)))[3:5] == b"\x00\x64"
+    commands = encoder()
+    commands.settings = OmniBotSettings(linear_scale=100.0)
+    assert bare(commands.velocity(BodyTwist(1.0, 0.0, 0.0)))[3:5] == b"\x00\x64"
 
 
 @pytest.mark.parametrize(
@@ -171,7 +173,7 @@ def test_a_frame_means_the_velocity_that_it_commands(
     typed: str, twist: tuple[float, float, float]
 ) -> None:
     """The last one that was written; zeros before it mean nothing."""
-    found = bot().meaning(bytes(8) + bytes.fromhex(typed))
+    found = encoder().meaning(packed(bytes(8) + bytes.fromhex(typed)))
     assert (found.vx_mps, found.vy_mps, found.yaw_rate_radps) == pytest.approx(twist, abs=1e-9)
 
 
@@ -179,7 +181,7 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
     """Half a unit, or one and a half where a byte would be a letter."""
-    found = bot().meaning(bot().velocity(twist))
+    found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)
     assert found.vx_mps == pytest.approx(twist.vx_mps, abs=1.51 / 70)
     assert found.vy_mps == pytest.approx(twist.vy_mps, abs=1.51 / 70)

@@ -19,9 +19,9 @@ from lossy_drives import (
 )
 from lossy_odometry import DELTA, POSE, loses_nothing
 
-from omnibot_driver.core.board import DisplacementReading, PoseReading
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 # Gaps
 

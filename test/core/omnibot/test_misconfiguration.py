@@ -8,10 +8,10 @@ import pytest
 from session_bench import Bench
 from synthetic_board import earth
 
-from omnibot_driver.core.board import PoseReading
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings, PoseFrame
 from omnibot_driver.core.omnibot.misconfiguration import MOST_DELTAS, MisconfigurationChecks
 from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S
+from omnibot_driver.core.readings import PoseReading
 from omnibot_driver.simulator import (
     BoardPose,
     BoardSettings,

@@ -14,7 +14,9 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.omnibot.command_encoder import CommandEncoder
 from omnibot_driver.core.omnibot.outbound import harmless
+from omnibot_driver.core.packets import joined
 
 COUNTS = st.floats(-32767.0, 32767.0)
 LETTERS = b"SPR"
@@ -71,25 +73,25 @@ def test_everything_goes_out_behind_zeros() -> None:
     board = OmniBot(OmniBotSettings())
     zeros = "00 00 00 00 00 00 00 00 "
     stop = zeros + "ff fe 02 00 00 00 00 00 00"
-    assert board.stop().hex(" ") == stop
-    assert board.emergency_stop().hex(" ") == zeros + "ff fe 10 00 00 00 00 00 00"
-    assert board.start().hex(" ") == zeros + "53"
-    assert board.force_pause().hex(" ") == f"{stop} {zeros}53 {zeros}50"
-    assert board.reset().hex(" ") == f"{stop} {zeros}52"
-    command = board.velocity(BodyTwist(0.2, -0.1, 0.5))
+    assert joined(board.stop()).hex(" ") == stop
+    assert joined(board.emergency_stop()).hex(" ") == zeros + "ff fe 10 00 00 00 00 00 00"
+    assert joined(board.start()).hex(" ") == zeros + "53"
+    assert joined(board.force_pause()).hex(" ") == f"{stop} {zeros}53 {zeros}50"
+    assert joined(board.reset()).hex(" ") == f"{stop} {zeros}52"
+    command = CommandEncoder(OmniBotSettings()).velocity(BodyTwist(0.2, -0.1, 0.5))
     assert command.hex(" ") == zeros[:12] + "ff fe 01 00 0e ff f9 00 fa"
 
 
 @pytest.mark.parametrize("x_mm", [0x5000, 0x5210, 0x53FF])
 def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
     """Another place half a metre away is no goal that anybody asked for."""
-    board = OmniBot(OmniBotSettings())
+    encoder = CommandEncoder(OmniBotSettings())
     with pytest.raises(CommandRefused, match=r"start, pause or reset the board"):
-        board.drive_to(Pose(x_mm / 1000, 0.0, 0.0))
-    assert bare(board.drive_to(Pose(0x4F00 / 1000, 0.0, 0.0)))[3:5] == bytes.fromhex("4F 00")
+        encoder.drive_to(Pose(x_mm / 1000, 0.0, 0.0))
+    assert bare(encoder.drive_to(Pose(0x4F00 / 1000, 0.0, 0.0)))[3:5] == bytes.fromhex("4F 00")
 
 
 def test_a_goal_whose_low_byte_is_a_letter_is_moved_by_a_millimetre() -> None:
     """0.083 m is 53 hex."""
-    board = OmniBot(OmniBotSettings())
-    assert bare(board.drive_to(Pose(0.083, 0.0, 0.0)))[3:5] == bytes.fromhex("00 54")
+    encoder = CommandEncoder(OmniBotSettings())
+    assert bare(encoder.drive_to(Pose(0.083, 0.0, 0.0)))[3:5] == bytes.fromhex("00 54")

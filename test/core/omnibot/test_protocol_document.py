@@ -26,12 +26,15 @@ from omnibot_driver.core.omnibot import (
     decode,
     encode,
 )
+from omnibot_driver.core.omnibot.command_encoder import CommandEncoder
+from omnibot_driver.core.packets import joined
 from omnibot_driver.parameters import BY_NAME
 
 DOCUMENT = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text(encoding="utf-8")
 
 EXAMPLE = re.compile(r"((?:[0-9A-F]{2} )+) *-> (\S+)((?: -?[\d.]+)*)\s*(?:# (.*))?")
 BOARD = OmniBot(OmniBotSettings())
+ENCODER = CommandEncoder(OmniBotSettings())
 
 APPENDIX = {
     "Stop": "FF FE 02 00 00 00 00 00 00",
@@ -85,7 +88,7 @@ SENT_AS_IT_IS = {
     "S": b"\x53",
     "P": b"\x50",
     "R": b"\x52",
-    "opening": BOARD.wake() + BOARD.start(),
+    "opening": joined(BOARD.wake() + BOARD.start()),
 }
 
 
@@ -166,7 +169,7 @@ def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None
     assert {example.word for example, _ in wishes} == {"velocity", "wheels"}
     for example, (a, b, c) in wishes:
         wheels = example.word == "wheels"
-        sent = BOARD.wheels((a, b, c)) if wheels else BOARD.velocity(BodyTwist(a, b, c))
+        sent = ENCODER.wheels((a, b, c)) if wheels else ENCODER.velocity(BodyTwist(a, b, c))
         assert bytes(4) + example.data == sent
 
 

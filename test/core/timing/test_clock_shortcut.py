@@ -9,14 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from serial_line import Board, Chunker, bursts, crumbs, ftdi, late, singles
 
-from omnibot_driver.core.board import (
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.readings import (
     DisplacementReading,
     ImuReading,
     PoseReading,
     Reading,
     SampleBoundary,
 )
-from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.timing import device_clock
 from omnibot_driver.core.timing.device_clock import DeviceClock
 

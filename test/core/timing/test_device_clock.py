@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from serial_line import Board, Chunker, Read, blocks, bursts, crumbs, ftdi, late, singles
 
-from omnibot_driver.core.board import DisplacementReading, ImuReading, SampleBoundary
 from omnibot_driver.core.imu.scale import STANDARD_GRAVITY
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.readings import DisplacementReading, ImuReading, SampleBoundary
 from omnibot_driver.core.timing.device_clock import DeviceClock
 
 SEEDS = range(3)

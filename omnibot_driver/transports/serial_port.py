@@ -22,11 +22,10 @@ from typing import Final
 import serial
 
 from omnibot_driver.core.errors import LinkError
+from omnibot_driver.core.packets import Packet, Packets, joined
 from omnibot_driver.kernel_counts import overruns
+from omnibot_driver.transports import READ_TIMEOUT_S, WRITE_TIMEOUT_S
 
-READ_TIMEOUT_S: Final = 0.2
-"""How soon a port that cannot be interrupted returns to look whether it is still wanted."""
-WRITE_TIMEOUT_S: Final = 0.2
 MOST_AT_ONCE: Final = 4096
 PEER_OPTIONS: Final = {
     socket.TCP_KEEPIDLE: 1,
@@ -41,8 +40,8 @@ PSEUDO_TERMINALS: Final = range(136, 144)
 serial.protocol_handler_packages.append("omnibot_driver.urls")
 
 
-class Port:
-    """An open port, exclusively ours. Raises LinkError when it cannot be opened.
+class SerialPort:
+    """A ``Transport`` of one channel of bytes: an open port, exclusively ours.
 
     Linux raises DTR and RTS when the first program opens a port. Closing leaves them raised, so
     that a board that is wired to them restarts once after plugging in at the most.
@@ -52,8 +51,7 @@ class Port:
         self._url = url
         self._is_terminal = False
         self._peer: socket.socket | None = None
-        self.descriptor: int | None = None
-        """What another process may inherit to write the same bytes; None where there is none."""
+        self._descriptor: int | None = None
         self._arrivals: select.poll | None = None
         try:
             self._serial = serial.serial_for_url(
@@ -75,6 +73,11 @@ class Port:
             raise LinkError(_explain(url, error)) from error
 
     @property
+    def descriptors(self) -> tuple[int, ...] | None:
+        """One, where the port has one."""
+        return None if self._descriptor is None else (self._descriptor,)
+
+    @property
     def ends_with_us(self) -> bool:
         """Nothing outside this process hears what is written."""
         return self._url.lower().startswith("sim://")
@@ -82,14 +85,14 @@ class Port:
     @property
     def overruns(self) -> int | None:
         """How often the kernel lost bytes since the port is open; None: it does not count."""
-        count = None if self.descriptor is None else overruns(self.descriptor)
+        count = None if self._descriptor is None else overruns(self._descriptor)
         return None if count is None else count - self._overruns_before
 
-    def read(self) -> bytes:
-        """All that has come in, waiting for the first byte; nothing after a while without one.
+    def read(self) -> Packet:
+        """All that has come in, waiting for the first byte."""
+        return 0, self._read()
 
-        Raises LinkError when the port is gone.
-        """
+    def _read(self) -> bytes:
         data = b""
         try:
             if self._arrivals is not None:
@@ -102,23 +105,24 @@ class Port:
                 raise LinkError(f"lost {self._url} while reading: {error}") from error
         return data  # what came before the loss; the next call finds it again
 
-    def write(self, data: bytes) -> None:
-        """All of it, or LinkError; then nothing that was written and is still here will be sent."""
+    def write(self, packets: Packets) -> None:
+        """All of it at once."""
+        data = joined(packets)
         try:
-            if self.descriptor is None:
+            if self._descriptor is None:
                 self._serial.write(data)
             else:
-                _write_whole(self.descriptor, data)
+                _write_whole(self._descriptor, data)
         except OSError as error:
             with contextlib.suppress(OSError, termios.error):
                 self._serial.reset_output_buffer()
             raise LinkError(f"lost {self._url} while writing: {error}") from error
 
-    def write_if_room(self, data: bytes) -> None:
-        """As much of it as is taken at once, be it nothing."""
-        if self.descriptor is not None:
+    def write_if_room(self, packets: Packets) -> None:
+        """As much of it as is taken at once."""
+        if self._descriptor is not None:
             with contextlib.suppress(OSError):
-                os.write(self.descriptor, data)
+                os.write(self._descriptor, joined(packets))
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, where the port can do so."""
@@ -131,15 +135,15 @@ class Port:
         if self._is_terminal:
             with contextlib.suppress(OSError):
                 fcntl.ioctl(self._serial.fileno(), termios.TIOCNXCL)
-        self._is_terminal, self.descriptor = False, None
+        self._is_terminal, self._descriptor = False, None
         self._serial.close()
         if self._peer is not None:
             self._peer.close()  # pyserial leaves a socket open whose peer has gone
 
     def _settle_in(self) -> None:
         with contextlib.suppress(io.UnsupportedOperation):
-            self.descriptor = self._serial.fileno()
-        descriptor = self.descriptor
+            self._descriptor = self._serial.fileno()
+        descriptor = self._descriptor
         self._overruns_before = overruns(descriptor) or 0 if descriptor is not None else 0
         self._is_terminal = descriptor is not None and os.isatty(descriptor)
         if type(self._serial) is serial.Serial:  # what its URLs are made of may look at each read

@@ -18,14 +18,15 @@ import serial.rfc2217
 from listener import PATIENCE_S, STOP
 
 from omnibot_driver.core.errors import LinkError
-from omnibot_driver.port import PEER_OPTIONS, Port
+from omnibot_driver.core.packets import packed
+from omnibot_driver.transports.serial_port import PEER_OPTIONS, SerialPort
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
-def connected(server: socket.socket) -> tuple[Port, socket.socket]:
+def connected(server: socket.socket) -> tuple[SerialPort, socket.socket]:
     """A port at this server, and the far end."""
-    port = Port(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
+    port = SerialPort(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
     return port, server.accept()[0]
 
 
@@ -35,12 +36,12 @@ def test_a_peer_that_vanished_without_a_word_is_given_up(
 ) -> None:
     """A half-open connection: nothing is acknowledged, nothing is refused."""
     options = {**PEER_OPTIONS, socket.TCP_USER_TIMEOUT: 300}
-    monkeypatch.setattr("omnibot_driver.port.PEER_OPTIONS", options)
+    monkeypatch.setattr("omnibot_driver.transports.serial_port.PEER_OPTIONS", options)
     with socket.create_server(("127.0.0.1", 0)) as server:
         port, far = connected(server)
         with far, closing(port):
             drop_everything(far)
-            port.write(said)
+            port.write(packed(said))
             with pytest.raises(LinkError, match="lost"):
                 go_on(port.read)
 
@@ -65,20 +66,20 @@ def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port, far = connected(server)
         with far, closing(port), pytest.raises(LinkError, match="while writing"):
-            go_on(lambda: port.write(bytes(100_000)))
+            go_on(lambda: port.write(packed(bytes(100_000))))
 
 
 def test_a_board_behind_a_socket_is_served_as_well() -> None:
     """Any pyserial URL will do: ``socket://host:port`` reads and writes the same bytes."""
     server = socket.create_server(("127.0.0.1", 0))
-    port = Port(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
+    port = SerialPort(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
     far, _ = server.accept()
     far.sendall(b"Paused: 0 \n")
     received = b""
     while len(received) < 11:
-        received += port.read()
+        received += port.read()[1]
     assert received == b"Paused: 0 \n"
-    port.write(STOP)
+    port.write(packed(STOP))
     assert far.recv(100) == STOP
     far.close()
     with pytest.raises(LinkError, match="lost"):
@@ -120,11 +121,11 @@ def test_a_board_behind_rfc2217_is_served_as_well() -> None:
 
     server = threading.Thread(target=serve)
     server.start()
-    port = Port(f"rfc2217://127.0.0.1:{listener.getsockname()[1]}", 115200)
-    port.write(b"Paused: 0 \n")
+    port = SerialPort(f"rfc2217://127.0.0.1:{listener.getsockname()[1]}", 115200)
+    port.write(packed(b"Paused: 0 \n"))
     received = b""
     while len(received) < 11:
-        received += port.read()
+        received += port.read()[1]
     assert received == b"Paused: 0 \n"
     port.close()
     done.set()

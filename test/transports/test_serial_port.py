@@ -12,7 +12,8 @@ from listener import PATIENCE_S, STOP
 from terminal import Terminal
 
 from omnibot_driver.core.errors import LinkError
-from omnibot_driver.port import Port
+from omnibot_driver.core.packets import packed
+from omnibot_driver.transports.serial_port import SerialPort
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
@@ -40,15 +41,15 @@ def test_every_way_a_port_can_refuse_says_what_to_do(
 
     monkeypatch.setattr("serial.serial_for_url", refuse)
     with pytest.raises(LinkError, match=advice) as caught:
-        Port("/dev/ttyUSB0", 115200)
+        SerialPort("/dev/ttyUSB0", 115200)
     assert caught.value.__cause__ is error
 
 
 def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
     """By the kernel's list of locks."""
-    port = Port(terminal.path, 115200)
+    port = SerialPort(terminal.path, 115200)
     with pytest.raises(LinkError, match=rf"in use by another program \(process {os.getpid()}, "):
-        Port(terminal.path, 115200)
+        SerialPort(terminal.path, 115200)
     port.close()
 
 
@@ -58,7 +59,7 @@ def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
     attributes = termios.tcgetattr(near)
     attributes[2] |= termios.HUPCL
     termios.tcsetattr(near, termios.TCSANOW, attributes)
-    Port(terminal.path, 115200).close()
+    SerialPort(terminal.path, 115200).close()
     assert not termios.tcgetattr(near)[2] & termios.HUPCL
     os.close(near)
 
@@ -74,11 +75,11 @@ def test_a_real_terminal_is_exclusive_until_it_is_closed(
         os.close(near)
         return answer != bytes(4)
 
-    port = Port(terminal.path, 115200)
+    port = SerialPort(terminal.path, 115200)
     assert not exclusive()
     port.close()
-    monkeypatch.setattr("omnibot_driver.port.PSEUDO_TERMINALS", ())
-    port = Port(terminal.path, 115200)
+    monkeypatch.setattr("omnibot_driver.transports.serial_port.PSEUDO_TERMINALS", ())
+    port = SerialPort(terminal.path, 115200)
     assert os.geteuid() != 0 or exclusive()
     port.close()
     assert not exclusive()
@@ -90,22 +91,22 @@ TIOCGEXCL = 0x80045440
 
 def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) -> None:
     """What waited in the kernel is given up: a board that listens again hears the newest."""
-    port = Port(terminal.path, 115200)
+    port = SerialPort(terminal.path, 115200)
     terminal.fill()
     with pytest.raises(LinkError, match="while writing"):
-        port.write(STOP)
-    port.write(STOP)
+        port.write(packed(STOP))
+    port.write(packed(STOP))
     port.close()
 
 
 def test_a_write_that_is_taken_in_pieces_is_completed(terminal: Terminal) -> None:
     """The kernel takes what there is room for, and the rest when somebody reads."""
-    port = Port(terminal.path, 115200)
+    port = SerialPort(terminal.path, 115200)
     message = b"".join(b"%05d" % number for number in range(8000))
     reader = threading.Thread(target=lambda: heard.append(terminal.read_until(b"07999")))
     heard: list[bytes] = []
     reader.start()
-    port.write(message)
+    port.write(packed(message))
     reader.join(PATIENCE_S)
     assert heard == [message]
     port.close()

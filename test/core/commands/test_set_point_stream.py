@@ -3,37 +3,65 @@
 """Pacing, repeating, timing out and the latch, with frames that mean nothing."""
 
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.core.commands.set_points import Authority, SteadySetpoint
-from omnibot_driver.core.commands.stream import (
-    MOTION_PACE_S,
-    PACE_S,
+from omnibot_driver.core.commands.orders import EMERGENCY_STOP, Order
+from omnibot_driver.core.commands.orders import STOP as STAND
+from omnibot_driver.core.commands.policy import (
     STOPPING_S,
     UNPROVED_S,
+    CommandPolicy,
     CommandSettings,
-    CommandStream,
 )
+from omnibot_driver.core.commands.set_point_stream import MOTION_PACE_S, PACE_S, SetpointStream
+from omnibot_driver.core.commands.set_points import Authority, SteadySetpoint
+from omnibot_driver.core.commands.stop_proof import StopProof
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.packets import Packets, joined, packed
 
 STOP, ESTOP, GO, TURN = b"stop", b"estop", b"go", b"turn"
 BOTH = ESTOP + STOP
 TIMEOUT_S = 0.5
 
 
-def order(
-    stream: CommandStream, frame: bytes, now: float, authority: Authority = Authority.BASE
-) -> None:
-    motion = SteadySetpoint(authority, frame, stands=frame == STOP)
-    stream.command(motion, now, expires_at=now + TIMEOUT_S)
+class Words:
+    """An encoder of orders that are their own bytes."""
+
+    def encode(self, order: Order | bytes) -> Packets:
+        if isinstance(order, bytes):
+            return packed(order)
+        return packed(ESTOP if order is EMERGENCY_STOP else STOP)
+
+    def meaning(self, packets: Packets) -> BodyTwist:
+        return BodyTwist(0.0, 0.0, 0.0)
+
+
+class Stream(CommandPolicy):
+    """The policy with a stream of set-points, in bytes."""
+
+    def __init__(self, settings: CommandSettings) -> None:
+        proof = StopProof()
+        self.actuator = SetpointStream(Words(), proof)
+        super().__init__(settings, self.actuator, proof)
+
+    def write(self, now: float) -> bytes:
+        return joined(self.due(now))
+
+
+def order(stream: Stream, frame: bytes, now: float, authority: Authority = Authority.BASE) -> None:
+    wanted: Any = STAND if frame == STOP else frame
+    setpoint = SteadySetpoint(authority, wanted, stream.actuator.is_zero)
+    stream.command(setpoint, now, expires_at=now + TIMEOUT_S)
 
 
 class Climbing:
     """A motion that is another with each frame until it has arrived."""
 
-    authority, stands, plain = Authority.BASE, False, True
+    authority, is_zero = Authority.BASE, False
 
     def __init__(self, frames: int) -> None:
         self.left = frames
@@ -42,27 +70,29 @@ class Climbing:
     def settled(self) -> bool:
         return not self.left
 
-    def frame(self, now: float) -> bytes:
+    def order(self, now: float) -> Any:
         self.left = max(0, self.left - 1)
         return GO + bytes([self.left])
 
+    def check_anew(self) -> None:
+        pass
+
 
 @pytest.fixture
-def stream() -> CommandStream:
+def stream() -> Stream:
     return make_stream()
 
 
-def make_stream() -> CommandStream:
-    settings = CommandSettings(timeout_s=TIMEOUT_S, rate_hz=20.0)
-    return CommandStream(settings, stop=STOP, emergency_stop=ESTOP)
+def make_stream() -> Stream:
+    return Stream(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=20.0))
 
 
-def run(stream: CommandStream, start: float, end: float) -> list[tuple[float, bytes]]:
+def run(stream: Stream, start: float, end: float) -> list[tuple[float, bytes]]:
     """Serve the stream whenever it wants to be, as the pacer does."""
     written = []
     now = start
     while now <= end:
-        frame = stream.due(now)
+        frame = stream.write(now)
         if frame:
             written.append((now, frame))
         assert stream.wake_at > now, "the pacer would spin"
@@ -70,24 +100,24 @@ def run(stream: CommandStream, start: float, end: float) -> list[tuple[float, by
     return written
 
 
-def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: CommandStream) -> None:
+def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> None:
     """No timer stands between a command and the wire."""
     order(stream, GO, 1.0)
-    assert stream.due(1.0) == GO
+    assert stream.write(1.0) == GO
 
 
-def test_within_the_pace_only_the_newest_command_goes_out(stream: CommandStream) -> None:
+def test_within_the_pace_only_the_newest_command_goes_out(stream: Stream) -> None:
     """More frames a second would only be more of them to be damaged."""
     order(stream, GO, 1.0)
-    stream.due(1.0)
+    stream.write(1.0)
     order(stream, b"older", 1.002)
-    assert stream.due(1.002) == b""
+    assert stream.write(1.002) == b""
     order(stream, TURN, 1.004)
     assert stream.wake_at == pytest.approx(1.0 + MOTION_PACE_S)
-    assert stream.due(1.0 + MOTION_PACE_S) == TURN
+    assert stream.write(1.0 + MOTION_PACE_S) == TURN
 
 
-def test_the_current_command_is_repeated_at_the_command_rate(stream: CommandStream) -> None:
+def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> None:
     """Nothing acknowledges a command, so it is said again."""
     order(stream, GO, 1.0)
     written = run(stream, 1.0, 1.449)
@@ -98,7 +128,7 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: CommandStre
 @pytest.mark.parametrize(("stands", "for_s"), [(True, STOPPING_S), (False, UNPROVED_S)])
 @pytest.mark.parametrize("rate_hz", [1.0, 20.0])
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
-    stream: CommandStream, stands: bool, for_s: float, rate_hz: float
+    stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
     """For a second at least, for five at most, 20 times a second; then the line is quiet."""
     stream.settings = CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz)
@@ -114,60 +144,60 @@ def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     assert stream.unconfirmed is not stands
 
 
-def test_stop_never_waits(stream: CommandStream) -> None:
+def test_stop_never_waits(stream: Stream) -> None:
     """Not even for the pace of a command that has just gone out."""
     order(stream, GO, 1.0)
-    stream.due(1.0)
+    stream.write(1.0)
     order(stream, STOP, 1.001)
-    assert stream.due(1.001) == STOP
+    assert stream.write(1.001) == STOP
 
 
-def test_a_repetition_does_not_make_a_new_command_wait(stream: CommandStream) -> None:
+def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
     """Only new commands are thinned."""
     order(stream, GO, 1.0)
-    stream.due(1.0)
-    assert stream.due(1.05) == GO
+    stream.write(1.0)
+    assert stream.write(1.05) == GO
     order(stream, TURN, 1.051)
-    assert stream.due(1.051) == TURN
+    assert stream.write(1.051) == TURN
 
 
 def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
     """At a command rate of 1 Hz too: one Stop may be lost."""
-    stream = CommandStream(CommandSettings(rate_hz=1.0), stop=STOP, emergency_stop=ESTOP)
+    stream = Stream(CommandSettings(rate_hz=1.0))
     order(stream, STOP, 1.0)
     assert len(run(stream, 1.0, 1.49)) == pytest.approx(10, abs=1)
 
 
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
-    stream: CommandStream,
+    stream: Stream,
 ) -> None:
     """The zeros before the letter may have completed a frame that was cut."""
     order(stream, GO, 1.0)
-    stream.due(1.0)
-    stream.wrote(b"S", 1.02)
-    assert stream.due(1.02) == GO
+    stream.write(1.0)
+    stream.actuator.wrote(packed(b"S"), 1.02)
+    assert stream.write(1.02) == GO
 
 
-def test_a_new_line_hears_a_latched_estop_at_once(stream: CommandStream) -> None:
+def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
     """Twice, whenever it was said last."""
-    stream.latch()
-    stream.due(1.0)
-    stream.connect()
-    assert stream.due(1.001) == 2 * BOTH
+    stream.latch(1.0)
+    stream.write(1.0)
+    stream.connect(1.001)
+    assert stream.write(1.001) == 2 * BOTH
 
 
-def test_a_flood_of_stops_keeps_the_pace(stream: CommandStream) -> None:
+def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
     """Once Stop is out, saying it a thousand times a second would only fill the line."""
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001
         order(stream, STOP, now)
-        written.append(stream.due(now))
+        written.append(stream.write(now))
     assert 90 <= written.count(STOP) <= 101
 
 
 def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
-    stream: CommandStream,
+    stream: Stream,
 ) -> None:
     """At the command rate once it has arrived."""
     stream.command(Climbing(4), 1.0, expires_at=1.5)
@@ -176,20 +206,20 @@ def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
     assert [at for at, _ in written] == pytest.approx([1.0, 1.018, 1.036, 1.054])
 
 
-def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: CommandStream) -> None:
+def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream) -> None:
     """Stop at once, and what is commanded now one control tick later."""
     order(stream, GO, 1.0)
-    stream.due(1.0)
+    stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
     assert run(stream, 1.001, 1.03) == [(1.001, STOP), (pytest.approx(1.011), TURN)]
 
 
 def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
-    stream: CommandStream,
+    stream: Stream,
 ) -> None:
     """Also where the one in the middle was never written."""
     order(stream, GO, 1.0)
-    stream.due(1.0)
+    stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
     order(stream, b"there", 1.002, Authority.POSE)
     assert run(stream, 1.002, 1.03) == [(1.002, STOP), (pytest.approx(1.012), b"there")]
@@ -199,7 +229,7 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 
 
 def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
-    stream: CommandStream,
+    stream: Stream,
 ) -> None:
     """It has been stopped already."""
     order(stream, GO, 1.0)
@@ -209,94 +239,94 @@ def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
 
 
 def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
-    stream: CommandStream,
+    stream: Stream,
 ) -> None:
     """A second one would only be late."""
     order(stream, GO, 1.0)
-    stream.due(1.0)
+    stream.write(1.0)
     order(stream, STOP, 1.001)
-    stream.due(1.001)
+    stream.write(1.001)
     order(stream, TURN, 1.002, Authority.WHEELS)
     assert run(stream, 1.002, 1.03) == [(pytest.approx(1.011), TURN)]
 
 
-def test_what_is_discarded_leaves_the_line_quiet(stream: CommandStream) -> None:
+def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
     """A Stop that was to go out at once, and the second of them, included."""
     order(stream, GO, 1.0)
     stream.halt(1.0)
-    stream.discard()
-    assert stream.due(1.0) == b""
+    stream.discard(1.0)
+    assert stream.write(1.0) == b""
     assert stream.wake_at == math.inf
 
 
-def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: CommandStream) -> None:
+def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
     """Neither the Stop between them nor the newer one."""
     order(stream, GO, 1.0)
-    stream.due(1.0)
+    stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
-    stream.latch()
+    stream.latch(1.001)
     assert stream.current is None
     assert {frame for _, frame in run(stream, 1.001, 1.2)} == {2 * BOTH, BOTH}
 
 
-def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: CommandStream) -> None:
+def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
     """Stop with it: firmware that ignores mode 10 has to stand as well. At first both twice."""
     order(stream, GO, 1.0)
-    stream.due(1.0)
-    stream.latch()
-    assert stream.due(1.001) == 2 * BOTH
+    stream.write(1.0)
+    stream.latch(1.001)
+    assert stream.write(1.001) == 2 * BOTH
     written = run(stream, 1.001, 101.0)
     assert {frame for _, frame in written} == {BOTH}
     assert len(written) == pytest.approx(2000, abs=2)
 
 
 def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
-    stream: CommandStream,
+    stream: Stream,
 ) -> None:
     """Letters at 50 Hz, and the stop still goes out at 20 Hz."""
-    stream.latch()
+    stream.latch(1.0)
     written = 0
     for step in range(1000):
         now = 1.0 + step * 0.001
         if step % 20 == 7:
-            stream.wrote(b"S", now)
-        written += stream.due(now) in (BOTH, 2 * BOTH)
+            stream.actuator.wrote(packed(b"S"), now)
+        written += stream.write(now) in (BOTH, 2 * BOTH)
     assert written >= 20
 
 
-def test_a_flood_of_emergency_stops_keeps_the_pace(stream: CommandStream) -> None:
+def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
     """A button node may publish as fast as it likes; the line has to take other things too."""
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001
-        stream.latch()
-        written.append(stream.due(now))
+        stream.latch(now)
+        written.append(stream.write(now))
     assert written.count(2 * BOTH) == 1
     assert written.count(BOTH) == pytest.approx(19, abs=1)
 
 
-def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: CommandStream) -> None:
+def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: Stream) -> None:
     """The robot moves again only on a command that is newer than the release."""
     order(stream, GO, 1.0)
-    stream.due(1.0)
-    stream.latch()
-    stream.due(1.1)
+    stream.write(1.0)
+    stream.latch(1.1)
+    stream.write(1.1)
     stream.release(1.2)
     assert {frame for _, frame in run(stream, 1.2, 5.0)} == {STOP}
 
 
-def test_a_release_without_a_latch_does_nothing(stream: CommandStream) -> None:
+def test_a_release_without_a_latch_does_nothing(stream: Stream) -> None:
     """Releasing twice must not stop a robot that drives again."""
     order(stream, GO, 1.0)
     stream.release(1.0)
-    assert stream.due(1.0) == GO
+    assert stream.write(1.0) == GO
 
 
-def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: CommandStream) -> None:
+def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:
     """After the process stood still for long, what was commanded before is worth nothing."""
     order(stream, GO, 1.0)
-    stream.due(1.0)
-    assert stream.due(60.0) == STOP
+    stream.write(1.0)
+    assert stream.write(60.0) == STOP
 
 
 STEPS = st.lists(
@@ -325,15 +355,15 @@ def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
         elif step == "stop":
             order(stream, STOP, now)
         elif step == "latch":
-            stream.latch()
+            stream.latch(now)
         elif step == "release":
             stream.release(now)
         elif step == "discard":
-            stream.discard()
+            stream.discard(now)
             commanded_at, driven = -math.inf, b""
         end = now + pause
         while True:
-            frame = stream.due(now)
+            frame = stream.write(now)
             if frame in (GO, TURN):
                 assert driven in (b"", frame), "no stop between two authorities"
                 assert not stream.latched

@@ -1,0 +1,50 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How a board is made to carry out what is wanted: the seam between policy and bytes.
+
+The policy decides what is wanted and for how long. An actuator says it: as set-points that are
+repeated (`set_point_stream.py`), or as a conversation of the board's own. It tells the stop proof
+what went out. It reads no clock and never refuses what the policy wants.
+"""
+
+from typing import Protocol
+
+from omnibot_driver.core.commands.orders import EmergencyStop, Order, Stop
+from omnibot_driver.core.commands.set_points import Setpoint
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.packets import Packets
+
+Wanted = Setpoint | Stop | EmergencyStop | None
+"""What the robot is to do; None: the line is quiet."""
+
+
+class Actuator(Protocol):
+    """``rate_hz``: how often a set-point is repeated, where the board needs that."""
+
+    rate_hz: float
+
+    @property
+    def commanded(self) -> BodyTwist | None:
+        """The body velocity that was said last, in the board's axes, as rounded there.
+
+        None where any motion is possible.
+        """
+
+    @property
+    def wake_at(self) -> float:
+        """When ``due`` has to be asked again; infinity while nothing is due."""
+
+    def is_zero(self, order: Order) -> bool:
+        """Whether the board would stand still by it. Raises CommandRefused if it can't say it."""
+
+    def connect(self) -> None:
+        """The line is new, and the board has heard nothing of it. Nothing is wanted."""
+
+    def apply(self, wanted: Wanted, now: float) -> None:
+        """This is wanted from now on."""
+
+    def wrote(self, packets: Packets, now: float) -> None:
+        """A request to the board went out."""
+
+    def due(self, now: float) -> Packets:
+        """What to write now, possibly nothing. It counts as written."""

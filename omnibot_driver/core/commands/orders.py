@@ -1,0 +1,49 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a board is ordered to do, in SI units and the board's own axes; values only.
+
+An order has passed every check and limit. How a board says it, is its actuator's business.
+"""
+
+from typing import Final
+
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.values import value
+
+
+@value(frozen=True, slots=True)
+class Stop:
+    """Stand still."""
+
+
+@value(frozen=True, slots=True)
+class EmergencyStop:
+    """Stand still, by the board's emergency stop too where it has one."""
+
+
+@value(frozen=True, slots=True)
+class Drive:
+    """Move with this body velocity."""
+
+    twist: BodyTwist
+
+
+@value(frozen=True, slots=True)
+class TurnWheels:
+    """Turn the wheels at these rates in rad/s, in the order of ``Traits.wheels``."""
+
+    rates_radps: tuple[float, ...]
+
+
+@value(frozen=True, slots=True)
+class GoTo:
+    """Drive to this pose in the board's earth frame, and stay."""
+
+    place: Pose
+
+
+Order = Stop | EmergencyStop | Drive | TurnWheels | GoTo
+
+STOP: Final = Stop()
+EMERGENCY_STOP: Final = EmergencyStop()

@@ -1,0 +1,134 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is wanted of the robot: one authority at a time, expiry, the e-stop latch, proved stops.
+
+No board stops by itself. So when a command expires, Stop is wanted until the robot is seen to
+stand. How it is said is the actuator's business; time is an argument.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.commands.actuator import Actuator
+from omnibot_driver.core.commands.orders import EMERGENCY_STOP, STOP
+from omnibot_driver.core.commands.set_points import Setpoint
+from omnibot_driver.core.commands.stop_proof import StopProof
+from omnibot_driver.core.packets import Packets
+
+STOPPING_S: Final = 1.0
+"""Stop is wanted for at least so long..."""
+UNPROVED_S: Final = 5.0
+"""... and for so long at most while nothing shows that the robot stands."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandSettings:
+    """``timeout_s``: age at which a command expires; ``rate_hz``: how often it is repeated."""
+
+    timeout_s: float = 0.5
+    rate_hz: float = 20.0
+
+
+class CommandPolicy:
+    """``settings`` may be replaced at any time."""
+
+    def __init__(self, settings: CommandSettings, actuator: Actuator, proof: StopProof) -> None:
+        self.proof = proof
+        self._actuator = actuator
+        self.settings = settings
+        self.latched = False
+        self.current: Setpoint | None = None
+        """The command that is being carried out."""
+        self.commanded_at = -math.inf
+        self.quiet = False
+        """It has fallen silent, and nothing was commanded since."""
+        self.unconfirmed = False
+        """Stop was wanted for ``UNPROVED_S`` and a robot that was driven is not seen to stand."""
+        self._expires_at = -math.inf
+        self._stopping_since: float | None = None
+
+    @property
+    def settings(self) -> CommandSettings:
+        """Expiry and repetition."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: CommandSettings) -> None:
+        self._settings = settings
+        self._actuator.rate_hz = settings.rate_hz
+
+    def command(self, setpoint: Setpoint, now: float, *, expires_at: float) -> None:
+        """The newest command replaces the current one; a latched e-stop takes none."""
+        if self.latched:
+            return
+        self.current = setpoint
+        self.commanded_at, self._expires_at = now, expires_at
+        self._stopping_since = None
+        self._actuator.apply(setpoint, now)
+
+    def discard(self, now: float) -> None:
+        """No command is current and the line goes quiet; a latched e-stop stays."""
+        self.current = self._stopping_since = None
+        if not self.latched:
+            self._actuator.apply(None, now)
+
+    def connect(self, now: float) -> None:
+        """The line is new; a latched e-stop is said."""
+        self.current = self._stopping_since = None
+        self.proof.begin()
+        self._actuator.connect()
+        if self.latched:
+            self._actuator.apply(EMERGENCY_STOP, now)
+
+    def halt(self, now: float) -> None:
+        """Discard the command, stop at once, and go on until the robot is seen to stand."""
+        self.current = None
+        self.quiet = False
+        self._stopping_since = None if self.latched else now
+        self._actuator.apply(EMERGENCY_STOP if self.latched else STOP, now)
+
+    def fall_silent(self, now: float) -> None:
+        """Nothing goes out any more, and whether the last Stop arrived is to be seen anew."""
+        self.discard(now)
+        self.quiet = True
+        self.proof.begin()
+        self.proof.stopped(now)
+
+    def latch(self, now: float) -> None:
+        """Emergency stop until the release."""
+        if not self.latched:
+            self.current = self._stopping_since = None
+            self.latched = True
+            self._actuator.apply(EMERGENCY_STOP, now)
+
+    def release(self, now: float) -> None:
+        """End the e-stop; the robot stands until a new command comes."""
+        if self.latched:
+            self.latched = False
+            self.halt(now)
+
+    def due(self, now: float) -> Packets:
+        """What to write now, possibly nothing. It counts as written."""
+        if self.current is not None and now >= self._expires_at:
+            self.halt(now)
+        if self._stopping_since is not None and now >= self._stopped_at:
+            self._stopping_since = None
+            self.unconfirmed = self.proof.owed
+            self._actuator.apply(None, now)
+        return self._actuator.due(now)
+
+    @property
+    def wake_at(self) -> float:
+        """When ``due`` has to be asked again; infinity while the line is quiet."""
+        if self.current is not None:
+            return min(self._actuator.wake_at, self._expires_at)
+        if self._stopping_since is not None:
+            return min(self._actuator.wake_at, self._stopped_at)
+        return self._actuator.wake_at
+
+    @property
+    def _stopped_at(self) -> float:
+        """When Stop has been wanted for long enough."""
+        assert self._stopping_since is not None
+        return self._stopping_since + (STOPPING_S if self.proof.proved else UNPROVED_S)

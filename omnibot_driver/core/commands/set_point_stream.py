@@ -1,0 +1,134 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""An actuator for boards that obey set-points: which frame goes out when, paced and repeated.
+
+Nothing acknowledges a frame, so each is repeated. This module does not know what is in a frame;
+time is an argument.
+"""
+
+import math
+from typing import Final, Protocol
+
+from omnibot_driver.core.commands.actuator import Wanted
+from omnibot_driver.core.commands.orders import EMERGENCY_STOP, STOP, EmergencyStop, Order, Stop
+from omnibot_driver.core.commands.set_points import Setpoint
+from omnibot_driver.core.commands.stop_proof import StopProof
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.packets import NO_PACKETS, Packets
+
+PACE_S: Final = 0.01
+"""Frames closer together than this would only fill a board's buffer."""
+MOTION_PACE_S: Final = 0.018
+"""Between two set-points. More of them would raise the share of time that a lost byte can take
+(docs/integrity.md); commands at 50 Hz are not slowed."""
+STOP_RATE_HZ: Final = 20.0
+"""Stop and the emergency stop are repeated at least so often."""
+
+
+class Encoder(Protocol):
+    """A board's frames."""
+
+    def encode(self, order: Order) -> Packets:
+        """The frames that say it. Raises CommandRefused where none can."""
+
+    def meaning(self, packets: Packets) -> BodyTwist:
+        """The body velocity that these frames command, in the board's axes, as rounded."""
+
+
+class SetpointStream:
+    """``proof`` hears of each stop and each motion that goes out."""
+
+    def __init__(self, encoder: Encoder, proof: StopProof, *, rate_hz: float = 20.0) -> None:
+        self.rate_hz = rate_hz
+        self.commanded: BodyTwist | None = None
+        self._encoder, self._proof = encoder, proof
+        self._stop, self._estop = encoder.encode(STOP), encoder.encode(EMERGENCY_STOP)
+        self.connect()
+
+    def is_zero(self, order: Order) -> bool:
+        """By its frames, which may round to Stop."""
+        return self._encoder.encode(order) == self._stop
+
+    def connect(self) -> None:
+        """Nothing has been said."""
+        self._motion: Setpoint | None = None
+        self._standing: Stop | EmergencyStop | None = None
+        self._fresh = self._urgent = self._switching = False
+        self._said_at = self._fresh_at = self._moved_at = self._stop_at = -math.inf
+
+    def apply(self, wanted: Wanted, now: float) -> None:
+        """The newest replaces what was wanted; another authority's set-point is stopped first."""
+        rested = now - self._stop_at >= PACE_S
+        if wanted is None or isinstance(wanted, Stop | EmergencyStop):
+            begins = wanted is not self._standing
+            self._motion, self._standing = None, wanted
+            self._fresh = self._switching = False
+            self._urgent = wanted is not None and (rested or (begins and wanted is EMERGENCY_STOP))
+            return
+        before, self._motion, self._standing = self._motion, wanted, None
+        self._fresh = True
+        self._switching |= before is not None and before.authority is not wanted.authority
+        self._urgent = self._switching or wanted.is_zero
+        if self._urgent and not rested:
+            self._switching = self._urgent = False
+            self._fresh_at = self._stop_at
+
+    def wrote(self, packets: Packets, now: float) -> None:
+        """Some begin with Stop. What others left of a motion frame is completed: say it again."""
+        (channel, stop), *_ = self._stop
+        first, data = packets[0]
+        if first == channel and data.startswith(stop):
+            self._note_stop(now)
+            if self._standing is not EMERGENCY_STOP:
+                self._urgent = False
+        elif self._motion is not None:
+            self._said_at = -math.inf
+
+    def due(self, now: float) -> Packets:
+        """The frames to write now."""
+        if now < self.wake_at:
+            return NO_PACKETS
+        motion = self._motion
+        new = self._fresh or self._urgent or not (motion is None or motion.settled)
+        packets = self._next(now)
+        self._said_at = now
+        if new:
+            self._fresh_at = now
+            moves = motion is not None and not motion.is_zero and not self._switching
+            self._moved_at = now if moves else -math.inf
+        self._fresh, self._urgent, self._switching = self._switching, False, False
+        self.commanded = self._encoder.meaning(packets)
+        return packets
+
+    @property
+    def wake_at(self) -> float:
+        """When the next frame is due."""
+        motion = self._motion
+        if self._urgent:
+            return -math.inf
+        if motion is not None and self._fresh:
+            return max(self._fresh_at + PACE_S, self._moved_at + MOTION_PACE_S)
+        if self._standing is not None or (motion is not None and motion.is_zero):
+            return self._said_at + 1.0 / max(self.rate_hz, STOP_RATE_HZ)
+        if motion is None:
+            return math.inf
+        return self._said_at + (1.0 / self.rate_hz if motion.settled else MOTION_PACE_S)
+
+    def _next(self, now: float) -> Packets:
+        motion = self._motion
+        if self._standing is EMERGENCY_STOP:
+            self._note_stop(now)
+            return (self._estop + self._stop) * (2 if self._urgent else 1)
+        if motion is not None and not self._switching:
+            if motion.is_zero:
+                self._note_stop(now)
+            else:
+                self._proof.moved()
+                self._stop_at = -math.inf
+            return self._encoder.encode(motion.order(now))
+        self._note_stop(now)
+        return self._stop
+
+    def _note_stop(self, now: float) -> None:
+        self._stop_at = now
+        self._proof.stopped(now)

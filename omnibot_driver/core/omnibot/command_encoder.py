@@ -1,0 +1,119 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Orders as the board's frames. It knows no modes, and not when anything is sent.
+
+Velocity and wheel commands are in the firmware's own unit, which ``linear_scale`` and
+``angular_scale`` translate (70 and 500 are the vendor's, found by hand). Commanded poses are taken
+to have the unit of those that are sent, mm and mrad; nobody has verified it.
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+from omnibot_driver.core.commands.limits import MAX_WORD, slow, to_nearest
+from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Order, TurnWheels
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.omni import OmniKinematics
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.omnibot import frames
+from omnibot_driver.core.omnibot.outbound import (
+    begins_with_a_letter,
+    harmless,
+    motion,
+    transmission,
+)
+from omnibot_driver.core.omnibot.settings import OmniBotSettings
+from omnibot_driver.core.packets import Packets, packed
+from omnibot_driver.core.readings import Vector3
+
+STOP: Final = transmission(frames.encode(frames.STOP))
+EMERGENCY_STOP: Final = transmission(frames.encode(frames.EMERGENCY_STOP))
+
+
+class CommandEncoder:
+    """``settings`` may be replaced at any time; ``saturated`` counts commands that did not fit."""
+
+    def __init__(self, settings: OmniBotSettings) -> None:
+        self.saturated = 0
+        self.settings = settings
+
+    @property
+    def settings(self) -> OmniBotSettings:
+        """The scales."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: OmniBotSettings) -> None:
+        self._settings = settings
+        self._last: tuple[Order, Packets] | None = None
+
+    def encode(self, order: Order) -> Packets:
+        """The frame for an order that is within the limits. Raises CommandRefused."""
+        if self._last is not None and self._last[0] is order:
+            return self._last[1]
+        packets = packed(self._bytes(order))
+        self._last = order, packets
+        return packets
+
+    def _bytes(self, order: Order) -> bytes:
+        if isinstance(order, Drive):
+            return self.velocity(order.twist)
+        if isinstance(order, TurnWheels):
+            return self.wheels(order.rates_radps)
+        if isinstance(order, GoTo):
+            return self.drive_to(order.place)
+        return EMERGENCY_STOP if isinstance(order, EmergencyStop) else STOP
+
+    def velocity(self, twist: BodyTwist) -> bytes:
+        """Base vector control; Stop when it rounds to nothing."""
+        settings = self._settings
+        linear, angular = settings.linear_scale, settings.angular_scale
+        counts = (twist.vx_mps * linear, twist.vy_mps * linear, twist.yaw_rate_radps * angular)
+        return self._drive(frames.VELOCITY_MODE, counts)
+
+    def wheels(self, rates_radps: Sequence[float]) -> bytes:
+        """Independent wheel drive in rad/s: the unit on the wire is that of a rim speed."""
+        unit = self._settings.linear_scale * self._settings.wheel_radius_m
+        a, b, c = rates_radps
+        return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
+
+    def meaning(self, packets: Packets) -> BodyTwist:
+        """By the mode and the words of the last command frame."""
+        settings = self._settings
+        mode, a, b, c = frames.last_command(packets[-1][1])
+        linear = settings.linear_scale
+        if mode == frames.VELOCITY_MODE:
+            return BodyTwist(a / linear, b / linear, c / settings.angular_scale)
+        if mode == frames.WHEEL_MODE:
+            rims = OmniKinematics(wheel_radius_m=1.0, base_radius_m=settings.base_radius_m)
+            return rims.body_twist((a / linear, b / linear, c / linear))
+        return BodyTwist(0.0, 0.0, 0.0)
+
+    def drive_to(self, pose: Pose) -> bytes:
+        """Base vector control with the switch on position; the origin is a pose like any other."""
+        position, heading = self._settings.position_scale, self._settings.heading_scale
+        counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)
+        if not all(abs(count) < MAX_WORD + 0.5 for count in counts):
+            raise CommandRefused(
+                f"cmd_pose refused: in the board's own frame it is x {pose.x_m:.2f} m,"
+                f" y {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad, and no more than"
+                f" {MAX_WORD / position:.2f} m and {MAX_WORD / heading:.2f} rad can be said:"
+                " ~/reset begins a new frame where the robot stands"
+            )
+        if any(begins_with_a_letter(to_nearest(count)) for count in counts):
+            raise CommandRefused(
+                f"cmd_pose refused: in the board's own frame it is x {pose.x_m:.2f} m,"
+                f" y {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad, and a damaged line could turn"
+                " one of these numbers into a command to start, pause or reset the board: choose"
+                " another goal, or call ~/reset, which begins a new frame where the robot stands"
+            )
+        return motion(frames.command(frames.VELOCITY_MODE, *harmless(counts)))
+
+    def _drive(self, mode: int, counts: Vector3) -> bytes:
+        a, b, c = counts
+        if abs(a) > MAX_WORD or abs(b) > MAX_WORD or abs(c) > MAX_WORD:
+            self.saturated += 1
+            a, b, c = slow(counts, MAX_WORD)
+        words = harmless((a, b, c))
+        return motion(frames.command(mode, *words)) if any(words) else STOP

@@ -1,0 +1,91 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What boards measure, in SI units, with no trace of their bytes: values only."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from omnibot_driver.core.values import value
+
+Vector3 = tuple[float, float, float]
+
+
+@value(frozen=True, slots=True)
+class ImuReading:
+    """Specific force in m/s² and angular velocity in rad/s, in the sensor's own axes.
+
+    ``lost`` readings of this kind seem to be missing before it, by what was received of them.
+    """
+
+    specific_force: Vector3
+    angular_velocity: Vector3
+    lost: int = 0
+
+
+@value(frozen=True, slots=True)
+class DisplacementReading:
+    """Motion during the last ``duration_s``; ``lost`` frames of this kind are missing before it.
+
+    ``duration_s`` is None where nobody knows it: the first after a pause holds all motion since.
+    ``restarted``: the board's counters seem to begin anew here, and its earth frame with them.
+    """
+
+    dx_m: float
+    dy_m: float
+    dyaw_rad: float
+    frame: Literal["earth", "body"]
+    duration_s: float | None
+    lost: int
+    restarted: bool = False
+
+
+@value(frozen=True, slots=True)
+class PoseReading:
+    """The board's own dead reckoning, in the earth frame it has chosen for itself.
+
+    ``lost`` displacements that it includes are known to be missing before it; they are not counted
+    again by the next displacement. ``restarted``: its counter begins anew, and so did the
+    displacements' some time before.
+    """
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    lost: int = 0
+    restarted: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PausedReading:
+    """The board said that it is paused (or still initialising).
+
+    ``continues``: it has said so just before, so it has not restarted meanwhile.
+    """
+
+    continues: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ExtraReading:
+    """Anything else that a board tells: a value of a kind of its own, passed on as it is."""
+
+    content: object
+
+
+Reading = ImuReading | DisplacementReading | PoseReading | PausedReading | ExtraReading
+
+
+@value(frozen=True, slots=True)
+class SampleBoundary:
+    """Where a read ended among the samples.
+
+    The beginning of one tells when it was taken better than an end that is delivered late, and what
+    was not there yet tells too. ``ahead``: how many samples after the last ImuReading were in hand
+    (0, 1), the last of them whole or ``cut``. It was to be whole ``latest_s`` after the read, or
+    before; the next one, or the one that was cut, not before ``earliest_s`` after it.
+    """
+
+    ahead: int
+    latest_s: float
+    earliest_s: float
+    cut: bool = False

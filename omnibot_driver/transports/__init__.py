@@ -1,0 +1,50 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What carries packets to a board and back: serial ports, datagrams, several lines at once.
+
+Knows descriptors and bytes; no threads and no board. Every failure is a LinkError whose sentence
+says what to do.
+"""
+
+from typing import Final, Protocol
+
+from omnibot_driver.core.packets import Packet, Packets
+
+READ_TIMEOUT_S: Final = 0.2
+"""How soon a transport that cannot be interrupted returns to look whether it is still wanted."""
+WRITE_TIMEOUT_S: Final = 0.2
+
+
+class Transport(Protocol):
+    """Open from its construction, which raises LinkError, until ``close``."""
+
+    descriptors: tuple[int, ...] | None
+    """By channel: what another process may inherit to write the same bytes; None where it can't."""
+
+    ends_with_us: bool
+    """Nothing outside this process hears what is written."""
+
+    @property
+    def overruns(self) -> int | None:
+        """How often the kernel lost bytes since this is open; None: it does not count."""
+
+    def read(self) -> Packet:
+        """What has come in, waiting for it; no bytes after a while without any.
+
+        Raises LinkError when a line is lost.
+        """
+
+    def write(self, packets: Packets) -> None:
+        """All of them, or LinkError; then nothing that was written and is still here is sent.
+
+        Where one of several lines is lost, the others are written to all the same.
+        """
+
+    def write_if_room(self, packets: Packets) -> None:
+        """As much as is taken at once, be it nothing."""
+
+    def interrupt(self) -> None:
+        """End a ``read`` that waits in another thread, where it can be ended."""
+
+    def close(self) -> None:
+        """Give the lines back; harmless to repeat."""

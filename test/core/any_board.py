@@ -1,0 +1,143 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A session with any board's other half, in simulated time: what the motion rules are tested on."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from toys import line_board, request_board
+from toys.robots import LineRobot, RequestRobot
+
+from omnibot_driver.core.board import Board
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.policy import CommandSettings
+from omnibot_driver.core.events import Event, Notice
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.packets import Packet
+from omnibot_driver.core.session import Session, SessionSettings
+from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+
+TICK_S = 0.01
+
+
+class Robot(Protocol):
+    """The other half. ``way_m``: the length of its true way ahead."""
+
+    @property
+    def stands(self) -> bool: ...
+
+    @property
+    def way_m(self) -> float: ...
+
+    def receive(self, data: bytes, now: float, channel: int) -> None: ...
+
+    def step(self) -> list[Packet]: ...
+
+
+class OmniBotRobot:
+    """The simulated OmniBot, as the toys' robots are."""
+
+    def __init__(self) -> None:
+        self.board = SimulatedBoard(BoardSettings(running=True))
+
+    @property
+    def stands(self) -> bool:
+        truth = self.board.truth
+        return max(abs(truth.vx_mps), abs(truth.vy_mps), abs(truth.yaw_rate)) < 0.01
+
+    @property
+    def way_m(self) -> float:
+        return self.board.truth.x_m
+
+    def receive(self, data: bytes, now: float, channel: int) -> None:
+        self.board.receive(data)
+
+    def step(self) -> list[Packet]:
+        data = self.board.step()
+        return [(0, data)] if data else []
+
+
+BOARDS: dict[str, Callable[[], tuple[Board, Any]]] = {
+    "omnibot": lambda: (OmniBot(OmniBotSettings()), OmniBotRobot()),
+    "two lines": lambda: (line_board.make({}), LineRobot()),
+    "requests": lambda: (request_board.make({}), RequestRobot()),
+}
+"""A new board of each kind, and its robot."""
+
+
+class AnyBench:
+    """``hears`` and ``speaks`` cut every line in one direction: to the robot, and from it."""
+
+    def __init__(self, board: Board, robot: Robot) -> None:
+        self.robot = robot
+        settings = SessionSettings(
+            limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
+        )
+        self.session = Session(board, settings, run=True)
+        self.now = 1000.0
+        self.hears = self.speaks = True
+        self.events: list[Event] = []
+        self.written: list[Packet] = []
+
+    def open(self) -> None:
+        self.session.opened(self.now)
+        self.settle()
+
+    def close(self) -> None:
+        self.session.closed(self.now)
+        self.settle()
+
+    def settle(self) -> None:
+        for channel, data in self.session.take_output(self.now):
+            self.written.append((channel, data))
+            if self.hears:
+                self.robot.receive(data, self.now, channel)
+        self.events += self.session.take_events()
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / TICK_S)):
+            self.now += TICK_S
+            for channel, data in self.robot.step():
+                if self.speaks:
+                    self.session.receive(data, self.now, channel)
+            if self.now >= self.session.wake_at:
+                self.session.tick(self.now)
+            self.settle()
+
+    def run_until(self, predicate: Callable[[], bool], limit_s: float = 12.0) -> None:
+        end = self.now + limit_s
+        while not predicate():
+            assert self.now < end, self.session.state
+            self.run(TICK_S)
+
+    def drive(self, vx: float = 0.3) -> None:
+        self.session.command_twist(BodyTwist(vx, 0.0, 0.0), self.now)
+        self.settle()
+
+    def drive_on(self, vx: float = 0.3, seconds: float = 1.0) -> None:
+        for _ in range(round(seconds / 0.1)):
+            self.drive(vx)
+            self.run(0.1)
+
+    def estop(self, active: bool) -> None:
+        self.session.estop(active, self.now)
+        self.settle()
+
+    @property
+    def notices(self) -> list[str]:
+        return [event.text for event in self.events if isinstance(event, Notice)]
+
+    @property
+    def odometry(self) -> list[OdometryEstimate]:
+        return [event for event in self.events if isinstance(event, OdometryEstimate)]
+
+
+def nominal(name: str) -> AnyBench:
+    """A board that stands, and obeys."""
+    bench = AnyBench(*BOARDS[name]())
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(1.5)
+    return bench

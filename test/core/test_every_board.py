@@ -1,0 +1,160 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The motion rules, on every kind of board: the robot moves on nothing but a fresh command."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+from any_board import BOARDS, AnyBench, nominal
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.twist import BodyTwist
+
+ENDS_S = 1.0
+"""Within it a robot comes to a stand that heard that it has to."""
+
+
+@pytest.fixture(params=BOARDS)
+def bench(request: pytest.FixtureRequest) -> AnyBench:
+    return nominal(request.param)
+
+
+def assert_stands_for_good(bench: AnyBench) -> None:
+    bench.run(ENDS_S)
+    assert bench.robot.stands
+    before = bench.robot.way_m
+    bench.run(5.0)
+    assert bench.robot.way_m == before
+
+
+def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
+    """0.3 m/s for four seconds."""
+    bench.drive_on(0.3, 4.0)
+    bench.run(3.0)
+    assert bench.robot.stands
+    assert bench.robot.way_m == pytest.approx(1.2, rel=0.2)
+    assert bench.odometry[-1].pose.x_m == pytest.approx(bench.robot.way_m, abs=0.02)
+
+
+def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) -> None:
+    """None of a hundred is refused."""
+    for _ in range(100):
+        bench.drive(0.2)
+        bench.run(0.05)
+    assert not bench.robot.stands
+
+
+def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: AnyBench) -> None:
+    """No motion comes back by itself."""
+    bench.drive_on()
+    assert not bench.robot.stands
+    bench.run(0.6)
+    assert_stands_for_good(bench)
+    assert bench.session.stands
+
+
+def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
+    """It is a command like any other, and never waits."""
+    bench.drive_on()
+    for _ in range(10):
+        bench.drive(0.0)
+        bench.run(0.1)
+    assert bench.robot.stands
+
+
+def test_an_estop_stops_the_robot_and_nothing_moves_it_until_a_newer_command(
+    bench: AnyBench,
+) -> None:
+    """The release does not."""
+    bench.drive_on()
+    bench.estop(True)
+    with pytest.raises(CommandRefused, match="e-stop"):
+        bench.drive()
+    assert_stands_for_good(bench)
+    bench.estop(False)
+    assert_stands_for_good(bench)
+    bench.drive_on()
+    assert not bench.robot.stands
+
+
+def reconnect(bench: AnyBench) -> None:
+    bench.close()
+    bench.open()
+
+
+EVENTS: dict[str, Callable[[AnyBench], object]] = {
+    "reconnect": reconnect,
+    "stall of the driver": lambda bench: bench.session.stood_still(3.0, bench.now),
+    "e-stop and release": lambda bench: (bench.estop(True), bench.estop(False)),
+}
+
+
+@pytest.mark.parametrize("event", EVENTS.values(), ids=EVENTS)
+def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
+    bench: AnyBench, event: Callable[[AnyBench], object]
+) -> None:
+    """Whatever was commanded before."""
+    bench.drive_on()
+    event(bench)
+    bench.settle()
+    assert_stands_for_good(bench)
+    bench.drive_on()
+    assert not bench.robot.stands
+
+
+def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None:
+    """It still hears us, so it is stopped, and what comes is refused."""
+    bench.drive_on()
+    bench.speaks = False
+    with pytest.raises(CommandRefused, match=r"nothing was heard|connecting"):
+        bench.drive_on(seconds=5.0)
+    assert_stands_for_good(bench)
+    assert bench.session.state == "connecting"
+    bench.speaks = True
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.drive_on()
+    assert not bench.robot.stands
+
+
+def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard_again(
+    bench: AnyBench,
+) -> None:
+    """It may have driven on with its last command."""
+    bench.drive_on()
+    bench.speaks = bench.hears = False
+    bench.run(5.0)
+    bench.speaks = bench.hears = True
+    bench.run(2.0)
+    assert bench.robot.stands
+
+
+def test_what_is_no_number_is_refused_and_stops_nothing(bench: AnyBench) -> None:
+    """The command before it holds."""
+    bench.drive_on()
+    with pytest.raises(CommandRefused, match="not finite"):
+        bench.session.command_twist(BodyTwist(math.nan, 0.0, 0.0), bench.now)
+    bench.run(0.2)
+    assert not bench.robot.stands
+
+
+def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
+    """0.5 m/s, and what the wheels need to get there."""
+    bench.drive_on(100.0, 2.0)
+    before = bench.robot.way_m
+    bench.drive_on(100.0, 2.0)
+    assert bench.robot.way_m - before < 1.05
+
+
+def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
+    """As the link does it: Stop until it is seen to stand, then the last words."""
+    bench.drive_on()
+    bench.session.leave(bench.now)
+    bench.settle()
+    bench.run_until(lambda: bench.session.stands)
+    for channel, data in bench.session.shutdown_sequence("stop", bench.now):
+        bench.robot.receive(data, bench.now, channel)
+    bench.speaks = bench.hears = False
+    assert_stands_for_good(bench)
+    with pytest.raises(CommandRefused, match="shutting down"):
+        bench.drive()
