@@ -16,7 +16,7 @@ from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.packets import packed
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link
-from omnibot_driver.simulator import SimulatedBoard
+from omnibot_driver.simulator.omnibot import SimulatedBoard
 from omnibot_driver.transports.serial_port import SerialPort
 
 PATIENCE_S = 20.0

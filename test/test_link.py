@@ -21,7 +21,7 @@ from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.packets import joined
 from omnibot_driver.core.session import Session
 from omnibot_driver.keeper import BEAT_S, Keeper
-from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
 from omnibot_driver.transports.serial_port import SerialPort
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")

@@ -11,7 +11,7 @@ import pytest
 from listener import PATIENCE_S, STOP, Listener, kinds, link_to, session, wait_for_the_end_of
 
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 

@@ -30,7 +30,7 @@ from omnibot_driver.core.omnibot.modes import ModeTracker
 from omnibot_driver.core.session import Session
 from omnibot_driver.messages import MessageSettings
 from omnibot_driver.publishing import Publishing
-from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 VALUES = {**parameters.check_all({}), "publish_tf": False}
 

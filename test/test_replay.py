@@ -20,7 +20,7 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session
 from omnibot_driver.replay import Replay
-from omnibot_driver.simulator import BoardSettings, FaultyLine, LineFaults, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, FaultyLine, LineFaults, SimulatedBoard
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 

@@ -12,9 +12,9 @@ from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
-from omnibot_driver.simulator import SimulatedBoard
-from omnibot_driver.simulator.motors import TICK_S
-from omnibot_driver.simulator.running import UNREAD_LIMIT
+from omnibot_driver.simulator.common.running import UNREAD_LIMIT
+from omnibot_driver.simulator.omnibot import SimulatedBoard
+from omnibot_driver.simulator.omnibot.motors import TICK_S
 from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.urls.protocol_sim import InProcessBoard
 

@@ -25,7 +25,7 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.omnibot import FrameDecoder
 from omnibot_driver.core.session import Session
 from omnibot_driver.messages import MessageSettings, turned, unturned
-from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 DEFAULTS = parameters.check_all({})
 TICK_S = 0.01

@@ -1,22 +1,31 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The OmniBot board in software, written from its manual, to run the driver against.
+"""Motor boards in software, each written from its manual, to run the driver against.
 
-Shares no code with the driver: a misread manual must not cancel out. `SimulatedBoard` is pure,
-`PtyBoard` runs it in real time; `python -m omnibot_driver.simulator` does so from the command line.
+A package for each board, and ``common`` for what they share. Shares no code with the driver: a
+misread manual must not cancel out. ``python -m omnibot_driver.simulator`` runs one in real time.
+
+For one release the names of ``simulator.omnibot`` are found here too.
 """
 
-from omnibot_driver.simulator.faults import FaultyLine, LineFaults
-from omnibot_driver.simulator.firmware import (
-    BoardMode,
-    ReceivedCommand,
-    SentFrame,
-    SimulatedBoard,
-)
-from omnibot_driver.simulator.pty import PtyBoard
-from omnibot_driver.simulator.receivers import ReceiverKind
-from omnibot_driver.simulator.settings import BoardPose, BoardSettings
-from omnibot_driver.simulator.world import TruePose
+import warnings
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from omnibot_driver.simulator.omnibot import (
+        BoardMode,
+        BoardPose,
+        BoardSettings,
+        FaultyLine,
+        LineFaults,
+        PtyBoard,
+        ReceivedCommand,
+        ReceiverKind,
+        SentFrame,
+        SimulatedBoard,
+        TruePose,
+    )
 
 __all__ = [
     "BoardMode",
@@ -31,3 +40,16 @@ __all__ = [
     "SimulatedBoard",
     "TruePose",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn(
+        f"import {name} from {__name__}.omnibot; {__name__} will not have it in the next release",
+        DeprecationWarning,
+        stacklevel=2,
+    )
+    found: object = getattr(import_module(f"{__name__}.omnibot"), name)
+    globals()[name] = found
+    return found

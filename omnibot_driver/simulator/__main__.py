@@ -15,8 +15,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 
-from omnibot_driver.simulator.options import add_board_options, board_from
-from omnibot_driver.simulator.pty import PtyBoard
+from omnibot_driver.simulator.common.pty import PtyBoard
+from omnibot_driver.simulator.omnibot.options import add_board_options, board_from
 
 _CONSOLE_HELP = """\
 truth    one line of JSON: true pose and twist, the board's odometry, mode

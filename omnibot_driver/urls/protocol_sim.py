@@ -13,8 +13,8 @@ from typing import Any
 from serial.serialutil import PortNotOpenError, SerialBase
 
 from omnibot_driver.core.errors import LinkError
-from omnibot_driver.simulator.options import OptionError, board_from_url
-from omnibot_driver.simulator.running import UNREAD_LIMIT, RunningBoard
+from omnibot_driver.simulator.common.running import UNREAD_LIMIT, RunningBoard
+from omnibot_driver.simulator.omnibot.options import OptionError, board_from_url
 
 
 class InProcessBoard(RunningBoard):

@@ -21,7 +21,7 @@ from omnibot_driver.boards import omnibot
 from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, PoseFrame
 from omnibot_driver.core.omnibot.frames import Frame
 from omnibot_driver.core.session import Session
-from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 BYTES_PER_S = 1700.0
 CHUNKS = (1, 14, 64, 4096)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from session_bench import STOP, TICK_S, Bench
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.simulator import BoardPose, BoardSettings
+from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 
 Triple = tuple[float, float, float]
 PERIOD_S = 0.1

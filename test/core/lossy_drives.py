@@ -9,7 +9,7 @@ from lossy_odometry import Line, loses_nothing
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
 from omnibot_driver.core.readings import PoseReading
-from omnibot_driver.simulator import BoardPose, BoardSettings
+from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 
 PERIOD_S = 0.04
 ROUNDING_M = 1.5e-3

@@ -12,7 +12,7 @@ from omnibot_driver.core.omnibot import OmniBotSettings, decode
 from omnibot_driver.core.omnibot.frames import DeltaFrame, Frame, PausedFrame, PoseFrame
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.readings import DisplacementReading, PausedReading, PoseReading
-from omnibot_driver.simulator import BoardMode, BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardMode, BoardSettings, SimulatedBoard
 
 TICK_S = 0.01
 DELTA, POSE, TEXT = b"\xff\xfb", b"\xff\xfc", b"Pa"

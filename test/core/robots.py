@@ -4,7 +4,7 @@
 
 from session_bench import Bench
 
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def standing() -> Bench:

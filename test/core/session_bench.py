@@ -16,7 +16,7 @@ from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.packets import joined
 from omnibot_driver.core.requests import OnExit, Request, RequestDone
 from omnibot_driver.core.session import Session, SessionSettings
-from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 TICK_S = 0.01
 ZEROS = bytes(8)

@@ -9,7 +9,7 @@ from random import Random
 
 from omnibot_driver.core.omnibot import FrameDecoder, ImuFrame, decode, encode
 from omnibot_driver.core.omnibot.frames import CommandFrame, Frame
-from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 TICK_S = 0.01
 BYTE_S = 10 / 115200

@@ -13,7 +13,7 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.imu.scale import ImuScale
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
-from omnibot_driver.simulator import BoardPose, BoardSettings, FaultyLine, LineFaults
+from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, FaultyLine, LineFaults
 
 
 class Drive:

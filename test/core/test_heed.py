@@ -14,7 +14,7 @@ from omnibot_driver.core.omnibot import OmniBot
 from omnibot_driver.core.packets import joined
 from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.core.session import Session
-from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 TICK_S = 0.01
 

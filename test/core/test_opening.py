@@ -8,7 +8,7 @@ from session_bench import OPENING, START, Bench
 
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.requests import Request
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from session_bench import PAUSE, STOP, Bench
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.requests import Request, RequestDone
-from omnibot_driver.simulator import BoardMode
+from omnibot_driver.simulator.omnibot import BoardMode
 
 
 @pytest.fixture

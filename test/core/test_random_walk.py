@@ -14,7 +14,7 @@ from session_bench import EMERGENCY_STOP, PAUSE, STOP, TICK_S, ZEROS, Bench
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.packets import joined
 from omnibot_driver.core.requests import Request, RequestDone
-from omnibot_driver.simulator import BoardMode, BoardSettings
+from omnibot_driver.simulator.omnibot import BoardMode, BoardSettings
 
 RUNNING = ("nominal", "imu_only")
 TIMEOUT_S = 0.5

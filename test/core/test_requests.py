@@ -11,7 +11,7 @@ from session_bench import OPENING, RESET, START, STOP, Bench
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import StateChanged
 from omnibot_driver.core.requests import Request, RequestDone
-from omnibot_driver.simulator import BoardMode
+from omnibot_driver.simulator.omnibot import BoardMode
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from random import Random
 from typing import Final
 
-from omnibot_driver.simulator import BoardSettings, FaultyLine, LineFaults, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, FaultyLine, LineFaults, SimulatedBoard
 
 TICK_S: Final = 0.01
 BYTES_PER_TICK: Final = 115

@@ -16,8 +16,8 @@ from breakable_line import losing
 from rig import Rig
 from std_srvs.srv import SetBool
 
-from omnibot_driver.simulator import BoardSettings, ReceiverKind
-from omnibot_driver.simulator.receivers import FRAMINGS
+from omnibot_driver.simulator.omnibot import BoardSettings, ReceiverKind
+from omnibot_driver.simulator.omnibot.receivers import FRAMINGS
 
 GRACE_S: Final = 0.1
 """The rig's own, which it adds."""

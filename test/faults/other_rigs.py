@@ -10,7 +10,7 @@ from commander import Hand, Navigator
 from ports import Server
 from rig import Rig
 
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 class NetworkRig(Rig):

@@ -20,8 +20,8 @@ from typing import Any, Self
 
 from terminal import fill
 
-from omnibot_driver.simulator import PtyBoard
-from omnibot_driver.simulator.running import RunningBoard
+from omnibot_driver.simulator.common.running import RunningBoard
+from omnibot_driver.simulator.omnibot import PtyBoard
 
 SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27
 DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)

@@ -28,7 +28,7 @@ from published import imu_key, not_sent, odom_key, sent_imu_key, sent_odom_key, 
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, String
 
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 IDEAL: Final = BoardSettings()
 TIMEOUT_S: Final = 0.5

@@ -22,7 +22,7 @@ from disobedient_robots import (
 )
 from session_bench import STOP, TICK_S, Bench
 
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 PHASES = 8
 

@@ -14,8 +14,8 @@ from itertools import accumulate
 from outbound_drive import History, Scene, Shown, rehearse
 from outbound_words import parse
 
-from omnibot_driver.simulator.receivers import Command, CommandReceiver, ReceiverKind
-from omnibot_driver.simulator.wire import BYTE_S, ControlFrame
+from omnibot_driver.simulator.omnibot.receivers import Command, CommandReceiver, ReceiverKind
+from omnibot_driver.simulator.omnibot.wire import BYTE_S, ControlFrame
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from typing import Final
 
 from outbound_words import Items, is_motion
 
-from omnibot_driver.simulator.wire import BYTE_S, ControlFrame, ControlMode
+from omnibot_driver.simulator.omnibot.wire import BYTE_S, ControlFrame, ControlMode
 
 LONG_S: Final = 0.002
 EXAMPLES: Final = 3

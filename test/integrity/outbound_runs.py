@@ -17,7 +17,7 @@ from outbound_line import FAULTS, OTHERS, Fault
 from outbound_scenes import DRIVES, ENDED, SCENES
 from outbound_trial import BoardKind, Memo, Trial
 
-from omnibot_driver.simulator.receivers import FRAMINGS, ReceiverKind
+from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 
 SCRIPTS: Final = 6
 """Of each scene, with other commands each."""

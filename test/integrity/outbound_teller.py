@@ -10,7 +10,7 @@ it does something else is not shown, so the driver gets no help from noticing it
 import math
 from typing import NamedTuple
 
-from omnibot_driver.simulator.wire import (
+from omnibot_driver.simulator.omnibot.wire import (
     Triple,
     delta_frame,
     imu_frame,

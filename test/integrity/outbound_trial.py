@@ -21,12 +21,12 @@ from outbound_line import GOOD, Arrival, Line
 from outbound_teller import TICK_S, Shown
 from outbound_words import is_motion
 
-from omnibot_driver.simulator.receivers import (
+from omnibot_driver.simulator.omnibot.receivers import (
     IDLE_GAP_S,
     CommandReceiver,
     ReceiverKind,
 )
-from omnibot_driver.simulator.wire import BYTE_S, ControlFrame, ControlMode, StateLetter
+from omnibot_driver.simulator.omnibot.wire import BYTE_S, ControlFrame, ControlMode, StateLetter
 
 BOOT_S: Final = 0.3
 SHOWS_AFTER_S: Final = 0.01

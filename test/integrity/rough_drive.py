@@ -18,8 +18,8 @@ from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Notice
 from omnibot_driver.core.packets import joined
-from omnibot_driver.simulator import BoardSettings
-from omnibot_driver.simulator.motors import MotorConstants, WheelGains
+from omnibot_driver.simulator.omnibot import BoardSettings
+from omnibot_driver.simulator.omnibot.motors import MotorConstants, WheelGains
 
 SLIP: Final = 0.05
 STEEPEST_PWM: Final = 200.0

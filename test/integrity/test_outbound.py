@@ -16,8 +16,8 @@ from outbound_scenes import DRIVES, ENDED, FROM_S
 from outbound_trial import BoardKind, Trial
 from outbound_words import parse
 
-from omnibot_driver.simulator.receivers import ReceiverKind
-from omnibot_driver.simulator.wire import ControlFrame
+from omnibot_driver.simulator.omnibot.receivers import ReceiverKind
+from omnibot_driver.simulator.omnibot.wire import ControlFrame
 
 COUNTING = BoardKind(ReceiverKind())
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")

@@ -18,7 +18,7 @@ sys.path.append(str(Path(__file__).parents[1] / "tools"))
 from calibrate_rig import rig
 from seeing_user import User
 
-from omnibot_driver.simulator.motors import MotorConstants
+from omnibot_driver.simulator.omnibot.motors import MotorConstants
 
 MOTORS = (
     MotorConstants(),

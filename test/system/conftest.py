@@ -13,7 +13,7 @@ import rclpy
 from driver_process import Driver
 from probe import Probe
 
-from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
 
 
 @pytest.fixture(scope="session", autouse=True)

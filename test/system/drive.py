@@ -71,7 +71,7 @@ def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float 
     from probe import Probe
     from sensor_msgs.msg import Imu
 
-    from omnibot_driver.simulator import (
+    from omnibot_driver.simulator.omnibot import (
         BoardSettings,
         FaultyLine,
         LineFaults,

@@ -16,7 +16,7 @@ from rclpy.duration import Duration
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool, Float32MultiArray
 
-from omnibot_driver.simulator import BoardPose, PtyBoard, ReceivedCommand, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardPose, PtyBoard, ReceivedCommand, SimulatedBoard
 
 Start = Callable[..., Any]
 

@@ -19,7 +19,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 from terminal import fill
 
-from omnibot_driver.simulator import BoardMode, PtyBoard
+from omnibot_driver.simulator.omnibot import BoardMode, PtyBoard
 
 Start = Callable[..., Any]
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")

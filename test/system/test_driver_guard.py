@@ -16,7 +16,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 from probe import Probe
 from std_srvs.srv import SetBool
 
-from omnibot_driver.simulator import PtyBoard, SimulatedBoard
+from omnibot_driver.simulator.omnibot import PtyBoard, SimulatedBoard
 
 Start = Callable[..., Any]
 ZEROS = bytes(8)

@@ -22,7 +22,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float32MultiArray
 from std_srvs.srv import SetBool, Trigger
 
-from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
 
 PLANTED_DPS = (1.5, -2.0, 3.0)
 HAS_TF2 = importlib.util.find_spec("tf2_ros") is not None

@@ -15,7 +15,7 @@ from probe import Probe
 from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool
 
-from omnibot_driver.simulator import PtyBoard, SimulatedBoard
+from omnibot_driver.simulator.omnibot import PtyBoard, SimulatedBoard
 
 Start = Callable[..., Any]
 

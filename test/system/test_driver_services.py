@@ -14,7 +14,7 @@ from probe import Answer, Probe
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
-from omnibot_driver.simulator import BoardMode, PtyBoard, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardMode, PtyBoard, SimulatedBoard
 
 Start = Callable[..., Any]
 

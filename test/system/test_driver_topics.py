@@ -16,7 +16,7 @@ from probe import Probe
 from sensor_msgs.msg import Imu
 from std_msgs.msg import String
 
-from omnibot_driver.simulator import BoardPose, PtyBoard
+from omnibot_driver.simulator.omnibot import BoardPose, PtyBoard
 
 Start = Callable[..., Any]
 

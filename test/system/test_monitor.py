@@ -17,7 +17,7 @@ from nav_msgs.msg import Odometry
 from probe import Probe
 from pseudo_terminal import PseudoTerminal
 
-from omnibot_driver.simulator import PtyBoard, SimulatedBoard
+from omnibot_driver.simulator.omnibot import PtyBoard, SimulatedBoard
 from omnibot_driver.tools.monitor.__main__ import main
 from omnibot_driver.tools.monitor.teleop import ZEROS
 

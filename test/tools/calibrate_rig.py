@@ -14,7 +14,7 @@ import pytest
 import yaml
 from driver_process import Driver
 
-from omnibot_driver.simulator import BoardSettings, PtyBoard, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
 from omnibot_driver.tools.calibrate import listener
 from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.interruption import Interruption

@@ -2,7 +2,7 @@
 
 """A user beside a simulated robot, who sees its wheels and holds it as asked."""
 
-from omnibot_driver.simulator import PtyBoard
+from omnibot_driver.simulator.omnibot import PtyBoard
 
 LOOKED_AT = 150
 """Control ticks before an answer: the end of a jog and the halt after it."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.simulator import SimulatedBoard
+from omnibot_driver.simulator.omnibot import SimulatedBoard
 
 
 class Surveyor:

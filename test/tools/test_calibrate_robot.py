@@ -16,7 +16,7 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Bool, Float32MultiArray
 
-from omnibot_driver.simulator import SimulatedBoard
+from omnibot_driver.simulator.omnibot import SimulatedBoard
 from omnibot_driver.tools.calibrate import listener
 from omnibot_driver.tools.calibrate import robot as robot_module
 from omnibot_driver.tools.calibrate.interruption import Interrupted

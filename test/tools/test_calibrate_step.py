@@ -10,7 +10,7 @@ from calibrate_rig import rig, row
 
 from omnibot_driver import calibration
 from omnibot_driver.parameters import PARAMETERS
-from omnibot_driver.simulator.motors import MotorConstants
+from omnibot_driver.simulator.omnibot.motors import MotorConstants
 from omnibot_driver.tools.calibrate import step
 from omnibot_driver.tools.calibrate.arguments import command_line
 from omnibot_driver.tools.calibrate.console import Console

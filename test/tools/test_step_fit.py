@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from wheel_bench import LEVELS, steps_to_and_fro
 
-from omnibot_driver.simulator.motors import MotorConstants, WheelGains
+from omnibot_driver.simulator.omnibot.motors import MotorConstants, WheelGains
 from omnibot_driver.tools.calibrate.step_fit import Step, aligned, fit, fit_wheel, steps_of
 from omnibot_driver.tools.calibrate.step_models import FIRST_ORDER, SECOND_ORDER, Model, motor_model
 from omnibot_driver.tools.calibrate.step_result import UNEXPLAINED, result_of

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from omnibot_driver.simulator import motors as simulated
+from omnibot_driver.simulator.omnibot import motors as simulated
 from omnibot_driver.tools.calibrate.step_models import (
     SPAN_S,
     first_order,

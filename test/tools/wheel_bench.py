@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from omnibot_driver.simulator import BoardSettings, SimulatedBoard
-from omnibot_driver.simulator.motors import TICK_S, MotorConstants, WheelGains
+from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot.motors import TICK_S, MotorConstants, WheelGains
 from omnibot_driver.tools.calibrate.log import Commands, Wheels
 
 LSB_PER_RADPS = 70.0 * 0.029

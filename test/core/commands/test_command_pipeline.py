@@ -10,7 +10,7 @@ from session_bench import STOP, Bench, bare
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.set_point_stream import PACE_S
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 GENTLE = SpeedLimits(linear_mps2=1.0, angular_radps2=2.0)
 

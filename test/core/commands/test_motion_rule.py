@@ -11,7 +11,7 @@ from session_bench import OPENING, STOP, Bench, bare
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.requests import Request
-from omnibot_driver.simulator import BoardMode
+from omnibot_driver.simulator.omnibot import BoardMode
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from robots import driving
 from session_bench import STOP, Bench, bare
 
 from omnibot_driver.core.commands.limits import SpeedLimits
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 RAMP = SpeedLimits(linear_mps2=0.5)
 

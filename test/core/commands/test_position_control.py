@@ -11,7 +11,7 @@ from session_bench import EMERGENCY_STOP, STOP, Bench, bare
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.requests import Request
-from omnibot_driver.simulator import BoardPose, BoardSettings
+from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 
 ORIGIN = BoardPose()
 

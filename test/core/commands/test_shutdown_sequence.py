@@ -7,7 +7,7 @@ from robots import driving, paused, standing
 from session_bench import EMERGENCY_STOP, PAUSE, RESET, STOP, TICK_S, Bench
 
 from omnibot_driver.core.requests import OnExit, Request
-from omnibot_driver.simulator import BoardMode
+from omnibot_driver.simulator.omnibot import BoardMode
 
 
 @pytest.fixture

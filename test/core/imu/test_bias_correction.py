@@ -12,7 +12,7 @@ from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuCorrection, ImuEstimate
 from omnibot_driver.core.requests import Request, RequestDone
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 PLANTED_DPS = (1.5, -2.0, 3.0)
 PLANTED = tuple(map(math.radians, PLANTED_DPS))

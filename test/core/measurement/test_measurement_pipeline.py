@@ -11,7 +11,7 @@ from session_bench import Bench, bare
 
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.requests import Request
-from omnibot_driver.simulator import BoardPose, BoardSettings
+from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 
 
 @pytest.fixture

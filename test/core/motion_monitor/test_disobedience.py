@@ -18,8 +18,8 @@ from session_bench import STOP, TICK_S, Bench
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.requests import Request
-from omnibot_driver.simulator import BoardPose, BoardSettings, SimulatedBoard
-from omnibot_driver.simulator.motors import WheelGains
+from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot.motors import WheelGains
 
 WITHIN_S = 0.3
 

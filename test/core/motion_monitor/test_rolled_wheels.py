@@ -17,7 +17,7 @@ from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, O
 from omnibot_driver.core.omnibot import DeltaFrame, OmniBotSettings
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 PERIOD_S = 0.04
 WHEELS = OmniKinematics(wheel_radius_m=0.029, base_radius_m=0.143)

@@ -24,7 +24,7 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def minors(c: Covariance) -> Triple:

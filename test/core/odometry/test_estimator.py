@@ -26,7 +26,7 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
-from omnibot_driver.simulator import BoardPose, BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, SimulatedBoard
 
 # Ways
 

@@ -11,7 +11,7 @@ from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.session import SessionSettings
-from omnibot_driver.simulator import BoardPose, BoardSettings
+from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 
 WHEELS, BASE = 1.04, 0.97
 TRUE = OdometrySettings(linear_scale=WHEELS, angular_scale=WHEELS / BASE)

@@ -20,7 +20,7 @@ from omnibot_driver.core.omnibot.modes import ModeTracker
 from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, Schedule
 from omnibot_driver.core.omnibot.sequence import Sequence
 from omnibot_driver.core.requests import Request
-from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 TEN_HZ_S = 0.1
 EVERY_PERIOD = pytest.mark.parametrize("period_s", DELTA_PERIODS_S)

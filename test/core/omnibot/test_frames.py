@@ -41,8 +41,8 @@ from omnibot_driver.core.omnibot.frames import (
     Frame,
     measure,
 )
-from omnibot_driver.simulator import wire
-from omnibot_driver.simulator.receivers import CommandReceiver
+from omnibot_driver.simulator.omnibot import wire
+from omnibot_driver.simulator.omnibot.receivers import CommandReceiver
 
 APPENDIX = {
     "Stop": ("FF FE 02 00 00 00 00 00 00", CommandFrame(0x02, (0, 0, 0))),

@@ -12,7 +12,7 @@ from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings, PoseFrame
 from omnibot_driver.core.omnibot.misconfiguration import MOST_DELTAS, MisconfigurationChecks
 from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S
 from omnibot_driver.core.readings import PoseReading
-from omnibot_driver.simulator import (
+from omnibot_driver.simulator.omnibot import (
     BoardPose,
     BoardSettings,
     FaultyLine,

@@ -5,7 +5,7 @@
 import pytest
 from session_bench import STOP, TICK_S, Bench
 
-from omnibot_driver.simulator import BoardSettings
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 @pytest.mark.parametrize("run", [True, False])

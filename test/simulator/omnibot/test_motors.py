@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from omnibot_driver.simulator.motors import DEAD_ZONE_PWM, PWM_LIMIT, Motor, WheelController
+from omnibot_driver.simulator.omnibot.motors import DEAD_ZONE_PWM, PWM_LIMIT, Motor, WheelController
 
 
 class Wheel:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from math import pi
 from typing import Literal
 
-from omnibot_driver.simulator.motors import MANUAL, USUAL, MotorConstants, WheelGains
-from omnibot_driver.simulator.receivers import COUNTING, ReceiverKind
-from omnibot_driver.simulator.wire import ByteOrder, Triple
+from omnibot_driver.simulator.omnibot.motors import MANUAL, USUAL, MotorConstants, WheelGains
+from omnibot_driver.simulator.omnibot.receivers import COUNTING, ReceiverKind
+from omnibot_driver.simulator.omnibot.wire import ByteOrder, Triple
 
 DeltaFrameMeaning = Literal["earth", "body", "wheel_counts"]
 ControlMethod = Literal["velocity", "position"]

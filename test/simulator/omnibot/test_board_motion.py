@@ -7,7 +7,7 @@ from math import hypot
 import pytest
 from board_talk import ESTOP, RUNNING, STOP, WAKE_UP, run, velocity, wheels
 
-from omnibot_driver.simulator import (
+from omnibot_driver.simulator.omnibot import (
     BoardPose,
     BoardSettings,
     ReceivedCommand,

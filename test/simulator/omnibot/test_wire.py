@@ -4,7 +4,7 @@
 
 import pytest
 
-from omnibot_driver.simulator.wire import (
+from omnibot_driver.simulator.omnibot.wire import (
     ControlFrame,
     control_frame,
     delta_frame,

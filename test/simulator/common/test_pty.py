@@ -11,8 +11,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from omnibot_driver.simulator import BoardMode, BoardSettings, PtyBoard, SimulatedBoard
-from omnibot_driver.simulator.running import UNREAD_LIMIT
+from omnibot_driver.simulator.common.running import UNREAD_LIMIT
+from omnibot_driver.simulator.omnibot import BoardMode, BoardSettings, PtyBoard, SimulatedBoard
 
 PATIENCE_S = 20.0
 RUNNING = BoardSettings(running=True)
@@ -99,9 +99,9 @@ class Clock:
         self.now_s = 0.0
         self.at_ticks: list[float] = []
         time_of_clock = SimpleNamespace(monotonic=lambda: self.now_s)
-        monkeypatch.setattr("omnibot_driver.simulator.running.time", time_of_clock)
+        monkeypatch.setattr("omnibot_driver.simulator.common.running.time", time_of_clock)
         monkeypatch.setattr(
-            "omnibot_driver.simulator.pty.select", SimpleNamespace(select=self.wait)
+            "omnibot_driver.simulator.common.pty.select", SimpleNamespace(select=self.wait)
         )
 
     def wait(

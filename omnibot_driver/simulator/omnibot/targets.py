@@ -5,10 +5,10 @@
 Knows scales, signs and the kinematics. Must not know modes, nor when a wheel is told.
 """
 
-from omnibot_driver.simulator.chassis import Wheels, rims_from_body
-from omnibot_driver.simulator.motors import TICK_S
-from omnibot_driver.simulator.settings import BoardSettings
-from omnibot_driver.simulator.wire import Triple
+from omnibot_driver.simulator.omnibot.chassis import Wheels, rims_from_body
+from omnibot_driver.simulator.omnibot.motors import TICK_S
+from omnibot_driver.simulator.omnibot.settings import BoardSettings
+from omnibot_driver.simulator.omnibot.wire import Triple
 
 
 def from_wheel_words(values: Triple, settings: BoardSettings) -> Wheels:

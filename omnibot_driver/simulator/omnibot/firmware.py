@@ -22,15 +22,15 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Literal
 
-from omnibot_driver.simulator import targets
-from omnibot_driver.simulator.chassis import PlanarPose, Wheels
-from omnibot_driver.simulator.imu import Mpu6050
-from omnibot_driver.simulator.motors import TICK_S, WheelController
-from omnibot_driver.simulator.odometry import Odometry
-from omnibot_driver.simulator.position import approach, commanded_pose
-from omnibot_driver.simulator.receivers import CommandReceiver
-from omnibot_driver.simulator.settings import BoardPose, BoardSettings
-from omnibot_driver.simulator.wire import (
+from omnibot_driver.simulator.omnibot import targets
+from omnibot_driver.simulator.omnibot.chassis import PlanarPose, Wheels
+from omnibot_driver.simulator.omnibot.imu import Mpu6050
+from omnibot_driver.simulator.omnibot.motors import TICK_S, WheelController
+from omnibot_driver.simulator.omnibot.odometry import Odometry
+from omnibot_driver.simulator.omnibot.position import approach, commanded_pose
+from omnibot_driver.simulator.omnibot.receivers import CommandReceiver
+from omnibot_driver.simulator.omnibot.settings import BoardPose, BoardSettings
+from omnibot_driver.simulator.omnibot.wire import (
     BYTE_S,
     ControlFrame,
     ControlMode,
@@ -41,7 +41,7 @@ from omnibot_driver.simulator.wire import (
     paused_text,
     pose_frame,
 )
-from omnibot_driver.simulator.world import Force, Held, TruePose, Twist, World
+from omnibot_driver.simulator.omnibot.world import Force, Held, TruePose, Twist, World
 
 TICKS_PER_POSE = 20
 TICKS_PER_TEXT = 100

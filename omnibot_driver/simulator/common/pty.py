@@ -13,11 +13,13 @@ import termios
 import tty
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
-from omnibot_driver.simulator.faults import FaultyLine
-from omnibot_driver.simulator.firmware import SimulatedBoard
-from omnibot_driver.simulator.running import UNREAD_LIMIT, RunningBoard
+from omnibot_driver.simulator.common.faults import FaultyLine
+from omnibot_driver.simulator.common.running import UNREAD_LIMIT, RunningBoard
+
+if TYPE_CHECKING:
+    from omnibot_driver.simulator.omnibot.firmware import SimulatedBoard
 
 
 class PtyBoard(RunningBoard):
@@ -32,7 +34,7 @@ class PtyBoard(RunningBoard):
     """
 
     def __init__(
-        self, board: SimulatedBoard, link: str | None = None, line: FaultyLine | None = None
+        self, board: "SimulatedBoard", link: str | None = None, line: FaultyLine | None = None
     ) -> None:
         super().__init__(board, line)
         self.path = ""

@@ -12,9 +12,14 @@ from math import copysign, cos, exp, sin, sqrt
 from random import Random
 from typing import NamedTuple
 
-from omnibot_driver.simulator.chassis import PlanarPose, Wheels, body_from_rims, rims_from_body
-from omnibot_driver.simulator.motors import TICK_S, Motor
-from omnibot_driver.simulator.settings import BoardSettings
+from omnibot_driver.simulator.omnibot.chassis import (
+    PlanarPose,
+    Wheels,
+    body_from_rims,
+    rims_from_body,
+)
+from omnibot_driver.simulator.omnibot.motors import TICK_S, Motor
+from omnibot_driver.simulator.omnibot.settings import BoardSettings
 
 SLIP_CORRELATION_M = 0.1
 """Rim motion after which a wheel has forgotten how much it was slipping."""

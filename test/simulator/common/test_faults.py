@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.simulator import FaultyLine, LineFaults
 from omnibot_driver.simulator.__main__ import main
+from omnibot_driver.simulator.omnibot import FaultyLine, LineFaults
 
 SENT = bytes(range(256)) * 400
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.simulator import BoardSettings
-from omnibot_driver.simulator.chassis import PlanarPose, body_from_rims, rims_from_body
-from omnibot_driver.simulator.world import Force, Twist, World
+from omnibot_driver.simulator.omnibot import BoardSettings
+from omnibot_driver.simulator.omnibot.chassis import PlanarPose, body_from_rims, rims_from_body
+from omnibot_driver.simulator.omnibot.world import Force, Twist, World
 
 ordinary = st.floats(-10, 10)
 L = 0.143

@@ -15,7 +15,7 @@ from board_talk import (
     wheels,
 )
 
-from omnibot_driver.simulator import (
+from omnibot_driver.simulator.omnibot import (
     BoardSettings,
     SimulatedBoard,
 )

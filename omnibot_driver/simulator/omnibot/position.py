@@ -7,9 +7,9 @@ Knows the units of a commanded pose and how fast the robot drives to one. Must n
 
 from math import cos, hypot, sin
 
-from omnibot_driver.simulator.chassis import PlanarPose
-from omnibot_driver.simulator.settings import BoardSettings
-from omnibot_driver.simulator.wire import Triple
+from omnibot_driver.simulator.omnibot.chassis import PlanarPose
+from omnibot_driver.simulator.omnibot.settings import BoardSettings
+from omnibot_driver.simulator.omnibot.wire import Triple
 
 SPEED_PER_WAY = 2.0
 """In 1/s: speed towards the pose per distance from it, up to the fastest."""

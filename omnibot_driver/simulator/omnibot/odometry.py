@@ -9,9 +9,9 @@ A 25 Hz difference is that of the unrounded positions at two transmissions, roun
 itself: rounding errors add up, as they do for anybody who sums what a board of this kind sends.
 """
 
-from omnibot_driver.simulator.chassis import PlanarPose, body_from_rims
-from omnibot_driver.simulator.settings import BoardPose, BoardSettings
-from omnibot_driver.simulator.wire import Triple
+from omnibot_driver.simulator.omnibot.chassis import PlanarPose, body_from_rims
+from omnibot_driver.simulator.omnibot.settings import BoardPose, BoardSettings
+from omnibot_driver.simulator.omnibot.wire import Triple
 
 
 class Odometry:

@@ -4,7 +4,7 @@
 
 import struct
 
-from omnibot_driver.simulator import BoardMode, BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardMode, BoardSettings, SimulatedBoard
 
 WAKE_UP = bytes(8)
 STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from omnibot_driver.simulator.wire import (
+from omnibot_driver.simulator.omnibot.wire import (
     COMMAND_HEADER,
     COMMAND_LENGTH,
     LETTERS,

@@ -9,10 +9,10 @@ sensor and the body's origin is ignored (at 0.5 rad/s it would add less than 0.0
 from math import cos, degrees, sin, sqrt
 from random import Random
 
-from omnibot_driver.simulator.motors import TICK_S
-from omnibot_driver.simulator.settings import BoardSettings
-from omnibot_driver.simulator.wire import Triple
-from omnibot_driver.simulator.world import World
+from omnibot_driver.simulator.omnibot.motors import TICK_S
+from omnibot_driver.simulator.omnibot.settings import BoardSettings
+from omnibot_driver.simulator.omnibot.wire import Triple
+from omnibot_driver.simulator.omnibot.world import World
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 COUNTS_PER_G = 16384.0

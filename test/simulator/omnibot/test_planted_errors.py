@@ -7,8 +7,13 @@ from math import pi, radians
 
 import pytest
 
-from omnibot_driver.simulator import BoardSettings, SimulatedBoard
-from omnibot_driver.simulator.motors import Motor, MotorConstants, WheelController, WheelGains
+from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot.motors import (
+    Motor,
+    MotorConstants,
+    WheelController,
+    WheelGains,
+)
 
 IMU, DELTA, POSE = b"\xff\xfa", b"\xff\xfb", b"\xff\xfc"
 FORWARD = bytes.fromhex("FF FE 01 00 08 00 00 00 00")

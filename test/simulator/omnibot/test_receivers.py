@@ -7,14 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_wire import APPENDIX
 
-from omnibot_driver.simulator.receivers import (
+from omnibot_driver.simulator.omnibot.receivers import (
     COUNTING,
     FRAMINGS,
     Command,
     CommandReceiver,
     ReceiverKind,
 )
-from omnibot_driver.simulator.wire import BYTE_S, ControlFrame, StateLetter
+from omnibot_driver.simulator.omnibot.wire import BYTE_S, ControlFrame, StateLetter
 
 NAIVE = ReceiverKind(framing="naive")
 IDLE_GAP = ReceiverKind(framing="idle_gap")

@@ -10,10 +10,14 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
-from omnibot_driver.simulator.faults import FaultyLine, LineFaults
-from omnibot_driver.simulator.firmware import SimulatedBoard
-from omnibot_driver.simulator.motors import TICK_S
+from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
+
+if TYPE_CHECKING:
+    from omnibot_driver.simulator.omnibot.firmware import SimulatedBoard
+
+TICK_S = 0.01
 
 UNREAD_LIMIT = 4095
 """Bytes that a Linux terminal holds for a reader who does not read; later ones are lost."""
@@ -31,7 +35,7 @@ class RunningBoard(ABC):
     only. `stop`, `check` and `wait_for` raise RuntimeError when the board's thread died.
     """
 
-    def __init__(self, board: SimulatedBoard, line: FaultyLine | None = None) -> None:
+    def __init__(self, board: "SimulatedBoard", line: FaultyLine | None = None) -> None:
         self.board = board
         self.line = line or FaultyLine(LineFaults())
         self.dropped = 0
@@ -66,7 +70,7 @@ class RunningBoard(ABC):
         if self._error is not None:
             raise RuntimeError("the simulated board's thread died") from self._error
 
-    def wait_for(self, predicate: Callable[[SimulatedBoard], bool], timeout_s: float) -> bool:
+    def wait_for(self, predicate: Callable[["SimulatedBoard"], bool], timeout_s: float) -> bool:
         """Ask the predicate under the lock after each tick; return whether it came to hold."""
         with self._ticked:
             held = self._ticked.wait_for(

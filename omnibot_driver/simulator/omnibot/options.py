@@ -9,11 +9,11 @@ import argparse
 from typing import NoReturn, get_args
 from urllib.parse import parse_qsl, urlsplit
 
-from omnibot_driver.simulator.faults import FaultyLine, LineFaults
-from omnibot_driver.simulator.firmware import SimulatedBoard
-from omnibot_driver.simulator.motors import TICK_S
-from omnibot_driver.simulator.receivers import FramingName, LetterPlace, ReceiverKind
-from omnibot_driver.simulator.settings import BoardSettings
+from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
+from omnibot_driver.simulator.omnibot.firmware import SimulatedBoard
+from omnibot_driver.simulator.omnibot.motors import TICK_S
+from omnibot_driver.simulator.omnibot.receivers import FramingName, LetterPlace, ReceiverKind
+from omnibot_driver.simulator.omnibot.settings import BoardSettings
 
 
 class OptionError(ValueError):

@@ -4,8 +4,8 @@
 
 import pytest
 
-from omnibot_driver.simulator import BoardSettings, FaultyLine, LineFaults, ReceiverKind
-from omnibot_driver.simulator.options import OptionError, board_from_url
+from omnibot_driver.simulator.omnibot import BoardSettings, FaultyLine, LineFaults, ReceiverKind
+from omnibot_driver.simulator.omnibot.options import OptionError, board_from_url
 
 SENT = bytes(range(256)) * 4
 

@@ -23,7 +23,13 @@ from board_talk import (
     wheels,
 )
 
-from omnibot_driver.simulator import BoardMode, BoardPose, BoardSettings, SimulatedBoard, TruePose
+from omnibot_driver.simulator.omnibot import (
+    BoardMode,
+    BoardPose,
+    BoardSettings,
+    SimulatedBoard,
+    TruePose,
+)
 
 
 def test_a_nominal_board_sends_at_100_25_and_5_hz() -> None:

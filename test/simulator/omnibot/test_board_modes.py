@@ -20,7 +20,7 @@ from board_talk import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from omnibot_driver.simulator import (
+from omnibot_driver.simulator.omnibot import (
     BoardMode,
     BoardPose,
     BoardSettings,

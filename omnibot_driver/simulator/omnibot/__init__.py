@@ -1,0 +1,33 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The OmniBot board in software, written from its manual, to run the driver against.
+
+Shares no code with the driver: a misread manual must not cancel out. `SimulatedBoard` is pure,
+`PtyBoard` runs it in real time; `python -m omnibot_driver.simulator` does so from the command line.
+"""
+
+from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
+from omnibot_driver.simulator.common.pty import PtyBoard
+from omnibot_driver.simulator.omnibot.firmware import (
+    BoardMode,
+    ReceivedCommand,
+    SentFrame,
+    SimulatedBoard,
+)
+from omnibot_driver.simulator.omnibot.receivers import ReceiverKind
+from omnibot_driver.simulator.omnibot.settings import BoardPose, BoardSettings
+from omnibot_driver.simulator.omnibot.world import TruePose
+
+__all__ = [
+    "BoardMode",
+    "BoardPose",
+    "BoardSettings",
+    "FaultyLine",
+    "LineFaults",
+    "PtyBoard",
+    "ReceivedCommand",
+    "ReceiverKind",
+    "SentFrame",
+    "SimulatedBoard",
+    "TruePose",
+]
