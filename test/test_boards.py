@@ -9,6 +9,8 @@ import pytest
 
 from omnibot_driver import boards, parameters
 from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.simulator.__main__ import boards as simulated_boards
+from omnibot_driver.simulator.common import options
 
 PACKAGE = Path(boards.__file__).parent.parent
 KNOW_BOARDS = ("boards", "simulator", "urls", "tools", "demo", "parameters", *boards.PROFILES)
@@ -51,6 +53,16 @@ def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
     board = profile.make(values)
     assert board.settings == profile.settings(values)
     assert len(profile.kinematics(values).joints) == len(board.traits.wheels)
+
+
+@pytest.mark.parametrize("name", boards.PROFILES)
+def test_every_profile_names_its_simulated_board(name: str) -> None:
+    """It is the one that ``simulator --board`` runs by the same name."""
+    module = boards.load(name).SIMULATOR
+    assert module == f"omnibot_driver.simulator.{name}"
+    assert name in simulated_boards()
+    board, _ = options.from_words([], options.load(module))
+    assert board.facts.keys() >= {"x_m", "y_m", "yaw_rad"}
 
 
 def test_a_board_that_is_not_built_is_refused_by_name() -> None:

@@ -2,21 +2,13 @@
 
 """``sim://``: a simulated board in the driver's own process, without ROS."""
 
-import threading
-
 import pytest
-import serial
-from listener import PATIENCE_S, Listener, link_to, session
+from listener import Listener, link_to, session
 
-from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
-from omnibot_driver.simulator.common.running import UNREAD_LIMIT
 from omnibot_driver.simulator.omnibot import SimulatedBoard
-from omnibot_driver.simulator.omnibot.motors import TICK_S
-from omnibot_driver.transports.serial_port import SerialPort
-from omnibot_driver.urls.protocol_sim import InProcessBoard
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
@@ -58,47 +50,6 @@ def test_options_come_after_a_question_mark() -> None:
     link.start()
     listener.wait_for(lambda: ours.state == "imu_only")
     link.close("stop")
-
-
-@pytest.mark.parametrize(
-    ("url", "why"),
-    [
-        ("sim://?wheels=4", "there is no option 'wheels=4'"),
-        ("sim://?imu", "there is no option 'imu'"),
-        ("sim://?lose=2", "'2' is no probability: give a number from 0 to 1"),
-        ("sim://?seed=first", "invalid int value: 'first'"),
-        ("sim://?imu_only=maybe", "--imu-only: ignored explicit argument 'maybe'"),
-        ("sim://imu_only", "'imu_only' must come after a question mark"),
-    ],
-)
-def test_options_that_it_does_not_know_are_refused(url: str, why: str) -> None:
-    """By a sentence that names the option, the whole list and an example."""
-    with pytest.raises(LinkError) as refusal:
-        SerialPort(url, 115200)
-    assert why in str(refusal.value)
-    assert "simulator --help" in str(refusal.value)
-
-
-def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """It keeps what a terminal would, and the oldest of it."""
-    board = InProcessBoard("sim://?running")
-    sent = b""
-    while not board.dropped:
-        data = board.board.step()
-        sent += data
-        board.dropped += len(data) - board._send(data)
-    assert board.unread == UNREAD_LIMIT
-    assert board.read(UNREAD_LIMIT, 0) == sent[:UNREAD_LIMIT]
-
-
-def test_a_read_that_waits_can_be_cancelled() -> None:
-    """Closing a driver does not wait for the next notice of a paused board, a second away."""
-    with serial.serial_for_url("sim://", timeout=PATIENCE_S) as port:
-        assert port.read(11) == b"Paused: 0 \n"
-        canceller = threading.Timer(2 * TICK_S, port.cancel_read)
-        canceller.start()
-        assert port.read() == b""
-        canceller.join()
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,9 @@ from omnibot_driver.core.imu.scale import ImuScale
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.transports.serial_port import SerialPort
 
+SIMULATOR = "omnibot_driver.simulator.omnibot"
+"""The package of its simulated board."""
+
 
 def make(values: Mapping[str, Any]) -> OmniBot:
     """The board, nothing of which is heard yet."""

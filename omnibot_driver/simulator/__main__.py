@@ -1,25 +1,27 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Command line of the simulated board: real time, a pseudo-terminal, a small console on stdin.
+"""Command line of the simulated boards: real time, ports for programs, a small console on stdin.
 
-Knows arguments, signals and the console. Must not know the wire or the board's insides.
+Knows arguments, signals and the console. Must not know the wire or any board's insides.
 """
 
 import argparse
 import json
 import os
+import pkgutil
 import select
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
 
-from omnibot_driver.simulator.common.pty import PtyBoard
-from omnibot_driver.simulator.omnibot.options import add_board_options, board_from
+from omnibot_driver import simulator
+from omnibot_driver.simulator.common import options
+from omnibot_driver.simulator.common.board import SimulatedBoard, SimulatorModule
+from omnibot_driver.simulator.common.serving import ServedBoard
 
 _CONSOLE_HELP = """\
-truth    one line of JSON: true pose and twist, the board's odometry, mode
+truth    one line of JSON: the true pose, and what else is known of the robot and its board
 reboot   power-cycle the board; the robot stays where it is
 help     this list
 quit     end (so do ctrl-C and SIGTERM; the end of the input does not)"""
@@ -27,38 +29,97 @@ quit     end (so do ctrl-C and SIGTERM; the end of the input does not)"""
 _HEALTH_CHECK_S = 0.5
 
 
-def main(argv: list[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run a simulated board until told to end; return the exit code."""
-    arguments = _parser().parse_args(argv)
-    board, line = board_from(arguments)
+    chooser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    _add_board(chooser)
+    name = chooser.parse_known_args(argv)[0].board
+    if name not in boards():
+        known = ", ".join(boards())
+        print(f"simulator: there is no simulated board {name!r}: choose {known}", file=sys.stderr)
+        return 2
+    return run(options.load(f"{simulator.__name__}.{name}"), name, argv)
+
+
+def boards() -> list[str]:
+    """The boards that are simulated: the packages beside ``common``."""
+    return [
+        module.name
+        for module in pkgutil.iter_modules(simulator.__path__)
+        if module.ispkg and module.name != "common"
+    ]
+
+
+def run(module: SimulatorModule, name: str, argv: Sequence[str] | None) -> int:
+    """The same with the board that was chosen."""
+    arguments = _parser(module).parse_args(argv)
+    board, lines = options.from_arguments(arguments, module)
+    links = getattr(arguments, "link", None) or []
     try:
-        with _signals_as_readable() as signalled, PtyBoard(board, arguments.link, line) as port:
-            print(port.path, flush=True)
-            print(
-                f"A simulated OmniBot board listens on {arguments.link or port.path}. In another "
-                "terminal:\n"
-                "  ros2 run omnibot_driver driver --ros-args "
-                f"-p port:={arguments.link or port.path}\n"
-                "Type help for the commands here; ctrl-C ends it.",
-                file=sys.stderr,
-            )
-            _serve(port, signalled)
+        with (
+            _signals_as_readable() as signalled,
+            ServedBoard(
+                board, lines, links=links, udp_port=getattr(arguments, "udp_port", 0)
+            ) as served,
+        ):
+            print(*served.addresses, sep="\n", flush=True)
+            print(_hints(module, name, served), file=sys.stderr)
+            _serve(served, signalled)
     except OSError as error:
         print(f"simulator: {error}", file=sys.stderr)
         return 1
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
+def _add_board(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--board",
+        default=options.DEFAULT_BOARD,
+        metavar="NAME",
+        help=f"the board to simulate: {', '.join(boards())} (default {options.DEFAULT_BOARD});"
+        " --board NAME --help has its options",
+    )
+
+
+def _parser(module: SimulatorModule) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="simulator",
-        description="A simulated OmniBot board on a pseudo-terminal; prints the terminal's path.",
+        description=f"A simulated {module.TITLE}. Prints where it listens, a line for each of its"
+        " ports: the path of a pseudo-terminal, or udp://127.0.0.1:PORT.",
         epilog="Commands on standard input:\n" + _CONSOLE_HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--link", metavar="PATH", help="make a symbolic link to the terminal")
-    add_board_options(parser)
+    _add_board(parser)
+    if any(not channel.datagrams for channel in module.CHANNELS):
+        parser.add_argument(
+            "--link",
+            metavar="PATH",
+            action="append",
+            help="make a symbolic link to the pseudo-terminal; of several: repeat it, or have a"
+            " hyphen and the port's name appended",
+        )
+    if any(channel.datagrams for channel in module.CHANNELS):
+        parser.add_argument(
+            "--udp-port",
+            type=int,
+            default=0,
+            metavar="NUMBER",
+            help="the first UDP port, others follow it (default: any that are free)",
+        )
+    options.add_options(parser, module)
     return parser
+
+
+def _hints(module: SimulatorModule, name: str, served: ServedBoard[SimulatedBoard]) -> str:
+    places = list(zip(module.CHANNELS, served.names, strict=True))
+    board = "" if name == options.DEFAULT_BOARD else f"-p board:={name} "
+    ports = " ".join(f"-p {c.parameter}:={place}" for c, place in places if c.parameter)
+    return (
+        f"A simulated {module.TITLE} listens on {', '.join(place for _, place in places)}. "
+        "In another terminal:\n"
+        f"  ros2 run omnibot_driver driver --ros-args {board}{ports}\n"
+        "Type help for the commands here; ctrl-C ends it."
+    )
 
 
 @contextmanager
@@ -79,14 +140,14 @@ def _signals_as_readable() -> Iterator[int]:
         os.close(writer)
 
 
-def _serve(port: PtyBoard, signalled: int) -> None:
+def _serve(served: ServedBoard[SimulatedBoard], signalled: int) -> None:
     """Answer the console until a signal or `quit`."""
     console = sys.stdin.fileno() if sys.stdin else None
     held = b""
     while True:
         watched = [signalled] if console is None else [signalled, console]
         readable, _, _ = select.select(watched, [], [], _HEALTH_CHECK_S)
-        port.check()
+        served.check()
         if signalled in readable:
             return
         if console in readable:
@@ -95,17 +156,19 @@ def _serve(port: PtyBoard, signalled: int) -> None:
                 console = None
             *lines, held = (held + data).split(b"\n")
             for line in lines:
-                if not _answer(line.decode(errors="replace").strip(), port):
+                if not _answer(line.decode(errors="replace").strip(), served):
                     return
 
 
-def _answer(command: str, port: PtyBoard) -> bool:
+def _answer(command: str, served: ServedBoard[SimulatedBoard]) -> bool:
     """Do one console command; False ends the program."""
     if command == "truth":
-        print(json.dumps(_truth(port)), flush=True)
+        with served.lock:
+            facts = served.facts
+        print(json.dumps(facts), flush=True)
     elif command == "reboot":
-        with port.lock:
-            port.board.reboot()
+        with served.lock:
+            served.board.reboot()
     elif command == "help":
         print(_CONSOLE_HELP, file=sys.stderr)
     elif command == "quit":
@@ -113,21 +176,6 @@ def _answer(command: str, port: PtyBoard) -> bool:
     elif command:
         print(f"simulator: no command {command!r}; help lists them", file=sys.stderr)
     return True
-
-
-def _truth(port: PtyBoard) -> dict[str, object]:
-    with port.lock:
-        board = port.board
-        return {
-            **asdict(board.truth),
-            "mode": board.mode.value,
-            "estopped": board.estopped,
-            "odometry": asdict(board.odometry),
-            "tick": board.tick,
-            "dropped": port.dropped,
-            "lost": port.line.lost,
-            "flipped": port.line.flipped,
-        }
 
 
 if __name__ == "__main__":

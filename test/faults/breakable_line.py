@@ -9,6 +9,7 @@ from collections.abc import Callable
 from random import Random
 from typing import Final
 
+from omnibot_driver.simulator.common.board import Packet
 from omnibot_driver.simulator.omnibot import BoardSettings, FaultyLine, LineFaults, SimulatedBoard
 
 TICK_S: Final = 0.01
@@ -77,6 +78,8 @@ class BreakableLine:
     tick in which its motors were told to turn.
     """
 
+    channels, tick_s = SimulatedBoard.channels, SimulatedBoard.tick_s
+
     def __init__(self, settings: BoardSettings) -> None:
         self.board = SimulatedBoard(settings)
         self.to_board = self.from_board = whole
@@ -90,8 +93,8 @@ class BreakableLine:
     def heal(self) -> None:
         self.to_board = self.from_board = whole
 
-    def receive(self, data: bytes, at_s: float | None = None) -> None:
-        self.board.receive(self.to_board(data), at_s)
+    def receive(self, data: bytes, at_s: float | None = None, channel: int = 0) -> None:
+        self.board.receive(self.to_board(data), at_s, channel)
 
     def step(self) -> bytes:
         data = self.board.step()
@@ -104,3 +107,7 @@ class BreakableLine:
         if self.board.driven:
             self.driven_at = self.board.tick
         return self.from_board(data)
+
+    def advance(self) -> list[Packet]:
+        data = self.step()
+        return [(0, data)] if data else []

@@ -30,12 +30,12 @@ REACH: Final = 200
 class PiecesTerminal(Terminal):
     """A few bytes at a time, at the pace of the line."""
 
-    def _send(self, data: bytes) -> int:
+    def _send(self, channel: int, data: bytes) -> int:
         sent = 0
         for at in range(0, len(data), PIECE):
             piece = data[at : at + PIECE]
             time.sleep(len(piece) * BYTE_S)
-            sent += super()._send(piece)
+            sent += super()._send(channel, piece)
         return sent
 
 

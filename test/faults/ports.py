@@ -13,13 +13,14 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
 from terminal import fill
 
+from omnibot_driver.simulator.common.board import Packet
 from omnibot_driver.simulator.common.running import RunningBoard
 from omnibot_driver.simulator.omnibot import PtyBoard
 
@@ -33,10 +34,10 @@ class Terminal(PtyBoard):
 
     deaf = False
 
-    def _receive(self, timeout_s: float) -> bytes:
+    def _receive(self, timeout_s: float) -> Iterable[Packet]:
         if self.deaf:
             time.sleep(timeout_s)  # in its place: the pause of a board's tick
-            return b""
+            return []
         return super()._receive(timeout_s)
 
     @contextmanager
@@ -122,7 +123,7 @@ class Server(RunningBoard):
         self._listener.setsockopt(socket.SOL_SOCKET, SO_DETACH_FILTER, 0)
         self.deaf = self.mute = False
 
-    def _receive(self, timeout_s: float) -> bytes:
+    def _receive(self, timeout_s: float) -> Iterable[Packet]:
         heard = [] if self.deaf else list(self._peers)
         readable = select.select([self._listener, *heard], [], [], timeout_s)[0]
         with self.lock:
@@ -131,7 +132,7 @@ class Server(RunningBoard):
                 peer.setblocking(False)
                 self._peers.append(peer)
                 self.accepted_at.append(self.board.tick)
-            return b"".join(self._hear(peer) for peer in heard if peer in readable)
+            return [(0, self._hear(peer)) for peer in heard if peer in readable]
 
     def _hear(self, peer: socket.socket) -> bytes:
         data = b""
@@ -142,7 +143,7 @@ class Server(RunningBoard):
             peer.close()
         return data
 
-    def _send(self, data: bytes) -> int:
+    def _send(self, channel: int, data: bytes) -> int:
         if not self._peers or self.mute:
             return 0
         try:

@@ -4,6 +4,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,7 +16,8 @@ from typing import IO
 import pytest
 
 import omnibot_driver
-from omnibot_driver.simulator.__main__ import main
+from omnibot_driver import simulator as simulators
+from omnibot_driver.simulator.__main__ import boards, main
 
 PATIENCE_S = 30.0
 ROOT = Path(omnibot_driver.__file__).parents[1]
@@ -132,6 +134,72 @@ def test_the_options_reach_the_board() -> None:
         say(process, "quit")
         process.communicate(timeout=PATIENCE_S)
     assert truth["mode"] == "imu_only"
+
+
+def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """It names the board and those that there are."""
+    assert main(["--board", "zeppelin", "--wings", "2"]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    known = ", ".join(boards())
+    assert printed.err == f"simulator: there is no simulated board 'zeppelin': choose {known}\n"
+
+
+def test_the_boards_are_the_packages_beside_what_they_share() -> None:
+    """Nothing lists them a second time."""
+    folder = Path(simulators.__file__).parent
+    packages = {path.parent.name for path in folder.glob("*/__init__.py")}
+    assert {*boards(), "common"} == packages
+
+
+@contextmanager
+def toy(name: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """The simulator of a board that is not in the package."""
+    program = (
+        "import sys, importlib; from omnibot_driver.simulator.__main__ import run;"
+        "name = sys.argv[1]; sys.exit(run(importlib.import_module(name), name, sys.argv[2:]))"
+    )
+    path = os.pathsep.join((str(ROOT), str(Path(__file__).parent)))
+    with subprocess.Popen(
+        [sys.executable, "-c", program, name, *arguments],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": path},
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path) -> None:
+    """The link that is given is one for each; the hint has all parameters of the driver."""
+    with toy("toy_lines", "--link", str(tmp_path / "toy"), "--angle", "30") as process:
+        printed = [line(process), line(process)]
+        links = [tmp_path / "toy-drive", tmp_path / "toy-front"]
+        assert [os.readlink(link) for link in links] == printed
+        say(process, "truth")
+        assert json.loads(line(process)).keys() >= {"x_m", "y_m", "yaw_rad", "flipped"}
+        _, err = process.communicate("quit\n", timeout=PATIENCE_S)
+    assert f"-p board:=toy_lines -p port:={links[0]} -p front_port:={links[1]}\n" in err
+
+
+def test_a_board_on_the_network_prints_its_address() -> None:
+    """It has no --link, and faults of a network."""
+    with toy("toy_udp", "--lose", "0.1", "--duplicate", "0.1", "--delay", "0.2") as process:
+        address = line(process)
+        assert re.fullmatch(r"udp://127\.0\.0\.1:\d+", address)
+        _, err = process.communicate("quit\n", timeout=PATIENCE_S)
+    assert f"-p board:=toy_udp -p port:={address}\n" in err
+    for foreign in ("--link", "--flip"):
+        with toy("toy_udp", foreign, "0") as process:
+            _, err = process.communicate(timeout=PATIENCE_S)
+        assert f"unrecognized arguments: {foreign}" in err
+        assert process.returncode == 2
 
 
 def test_a_link_that_cannot_be_made_is_one_sentence_and_code_1(

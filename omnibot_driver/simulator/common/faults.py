@@ -5,6 +5,7 @@
 Knows bytes and chances; not what they mean.
 """
 
+from collections import Counter
 from dataclasses import dataclass
 from random import Random
 
@@ -22,21 +23,29 @@ class LineFaults:
     flip: float = 0.0
 
 
+_GOOD = LineFaults()
+
+
 class FaultyLine:
     """The same bytes and seed meet the same fate, however they are cut.
 
     lost, flipped: bytes so far.
     """
 
-    def __init__(self, faults: LineFaults, seed: int = 0) -> None:
+    def __init__(self, faults: LineFaults = _GOOD, seed: int | str = 0) -> None:
         self.lost = self.flipped = 0
         self._faults = faults
         self._random = Random(f"line {seed}")
         self._burst_left = 0
 
+    @property
+    def counts(self) -> Counter[str]:
+        """Bytes that met a fault, by its name."""
+        return Counter(lost=self.lost, flipped=self.flipped)
+
     def carry(self, data: bytes) -> bytes:
         """What arrives of these bytes."""
-        if self._faults == LineFaults():
+        if self._faults == _GOOD:
             return data
         arrived = bytearray()
         for byte in data:

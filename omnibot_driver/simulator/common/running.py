@@ -1,23 +1,22 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated board in real time: the thread that lets a tick pass every 10 ms.
+"""A simulated board in real time: the thread that lets its ticks pass.
 
-Knows the clock and the board's `receive` and `step`. Must not know what carries the bytes, nor
+Knows the clock and the board's `receive` and `advance`. Must not know what carries the packets, nor
 what they mean.
 """
 
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from itertools import groupby
+from operator import itemgetter
+from typing import Generic
 
-from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
-
-if TYPE_CHECKING:
-    from omnibot_driver.simulator.omnibot.firmware import SimulatedBoard
-
-TICK_S = 0.01
+from omnibot_driver.simulator.common.board import Packet
+from omnibot_driver.simulator.common.wired import B, Line, WiredBoard
 
 UNREAD_LIMIT = 4095
 """Bytes that a Linux terminal holds for a reader who does not read; later ones are lost."""
@@ -28,16 +27,16 @@ LONGEST_CATCH_UP_S = 1.0
 _JOIN_S = 5.0
 
 
-class RunningBoard(ABC):
-    """Runs a board at 100 Hz between `start` and `stop`; `line` is what its bytes go through first.
+class RunningBoard(ABC, Generic[B]):
+    """Runs a board between `start` and `stop`; `lines` are what its packets go through.
 
     `dropped` counts bytes that nobody read in time. From other threads touch `board` under `lock`
     only. `stop`, `check` and `wait_for` raise RuntimeError when the board's thread died.
     """
 
-    def __init__(self, board: "SimulatedBoard", line: FaultyLine | None = None) -> None:
+    def __init__(self, board: B, lines: Sequence[Line] = ()) -> None:
         self.board = board
-        self.line = line or FaultyLine(LineFaults())
+        self._wired = WiredBoard(board, lines)
         self.dropped = 0
         self.lock = threading.RLock()
         self._ticked = threading.Condition(self.lock)
@@ -46,12 +45,23 @@ class RunningBoard(ABC):
         self._thread = threading.Thread(target=self._run, name="simulated board")
 
     @abstractmethod
-    def _receive(self, timeout_s: float) -> bytes:
+    def _receive(self, timeout_s: float) -> Iterable[Packet]:
         """What the driver has sent; waits for it so long at the most."""
 
     @abstractmethod
-    def _send(self, data: bytes) -> int:
-        """Give bytes to the driver; returns how many found room."""
+    def _send(self, channel: int, data: bytes) -> int:
+        """Give bytes, or one datagram, to the driver; returns how many bytes found room."""
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """The board's, and what became of bytes on its lines. Under `lock`."""
+        met = sum((line.counts for line in self._wired.lines), Counter())
+        names = dict.fromkeys(name for line in self._wired.lines for name in line.counts)
+        return {
+            **self.board.facts,
+            "dropped": self.dropped,
+            **{name: met[name] for name in names},
+        }
 
     def start(self) -> None:
         """Let time pass."""
@@ -70,7 +80,7 @@ class RunningBoard(ABC):
         if self._error is not None:
             raise RuntimeError("the simulated board's thread died") from self._error
 
-    def wait_for(self, predicate: Callable[["SimulatedBoard"], bool], timeout_s: float) -> bool:
+    def wait_for(self, predicate: Callable[[B], bool], timeout_s: float) -> bool:
         """Ask the predicate under the lock after each tick; return whether it came to hold."""
         with self._ticked:
             held = self._ticked.wait_for(
@@ -88,27 +98,33 @@ class RunningBoard(ABC):
                 self._ticked.notify_all()
 
     def _keep_time(self) -> None:
-        due_s = time.monotonic() + TICK_S
+        due_s = time.monotonic() + self.board.tick_s
         while not self._stopping.is_set():
             remaining_s = due_s - time.monotonic()
             if remaining_s < -LONGEST_CATCH_UP_S:
                 due_s -= remaining_s
-            if data := self._receive(max(0.0, remaining_s)):
+            for channel, data in self._receive(max(0.0, remaining_s)):
                 with self.lock:
-                    self.board.receive(data, time.monotonic())
+                    self._wired.receive(data, time.monotonic(), channel)
             ticks, due_s = self._due(due_s)
             if ticks:
                 with self._ticked:
-                    data = b"".join(self.line.carry(self.board.step()) for _ in range(ticks))
-                    self.dropped += len(data) - self._send(data)
+                    self._let_pass(ticks)
                     self._ticked.notify_all()
 
-    @staticmethod
-    def _due(due_s: float) -> tuple[int, float]:
+    def _due(self, due_s: float) -> tuple[int, float]:
         """Ticks to be made up for, and when the next is due.
 
         What is late comes together, as it does over a line that runs on while a machine is busy.
         """
         late_s = time.monotonic() - due_s
-        ticks = 0 if late_s < 0 else 1 + int(late_s / TICK_S)
-        return ticks, due_s + ticks * TICK_S
+        ticks = 0 if late_s < 0 else 1 + int(late_s / self.board.tick_s)
+        return ticks, due_s + ticks * self.board.tick_s
+
+    def _let_pass(self, ticks: int) -> None:
+        packets = [packet for _ in range(ticks) for packet in self._wired.advance()]
+        for channel, of_channel in groupby(packets, itemgetter(0)):
+            parts = [data for _, data in of_channel]
+            datagrams = self.board.channels[channel].datagrams
+            for data in parts if datagrams else [b"".join(parts)]:
+                self.dropped += len(data) - self._send(channel, data)

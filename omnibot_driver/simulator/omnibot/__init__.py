@@ -7,18 +7,24 @@ Shares no code with the driver: a misread manual must not cancel out. `Simulated
 """
 
 from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
-from omnibot_driver.simulator.common.pty import PtyBoard
+from omnibot_driver.simulator.common.serving import PtyBoard
 from omnibot_driver.simulator.omnibot.firmware import (
+    CHANNELS,
     BoardMode,
     ReceivedCommand,
     SentFrame,
     SimulatedBoard,
 )
+from omnibot_driver.simulator.omnibot.options import add_options, from_arguments
 from omnibot_driver.simulator.omnibot.receivers import ReceiverKind
 from omnibot_driver.simulator.omnibot.settings import BoardPose, BoardSettings
 from omnibot_driver.simulator.omnibot.world import TruePose
 
+TITLE = "OmniBot board"
+
 __all__ = [
+    "CHANNELS",
+    "TITLE",
     "BoardMode",
     "BoardPose",
     "BoardSettings",
@@ -30,4 +36,6 @@ __all__ = [
     "SentFrame",
     "SimulatedBoard",
     "TruePose",
+    "add_options",
+    "from_arguments",
 ]

@@ -18,10 +18,12 @@ Where the manual is silent:
 """
 
 from collections import deque
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from enum import Enum
 from typing import Literal
 
+from omnibot_driver.simulator.common.board import Channel, Packet
 from omnibot_driver.simulator.omnibot import targets
 from omnibot_driver.simulator.omnibot.chassis import PlanarPose, Wheels
 from omnibot_driver.simulator.omnibot.imu import Mpu6050
@@ -45,6 +47,9 @@ from omnibot_driver.simulator.omnibot.world import Force, Held, TruePose, Twist,
 
 TICKS_PER_POSE = 20
 TICKS_PER_TEXT = 100
+
+CHANNELS = (Channel(),)
+"""One serial line."""
 
 COMMAND_LOG = 100_000
 SENT_LOG = 10_000
@@ -106,6 +111,9 @@ class SimulatedBoard:
     received: everything that reached its serial port, also while it was dead; the older half is
         forgotten beyond a million bytes.
     """
+
+    channels = CHANNELS
+    tick_s = TICK_S
 
     _goal: PlanarPose | None
     _targets: Wheels
@@ -177,12 +185,24 @@ class SimulatedBoard:
         """Whether the motors have been told to turn, and not to stop since."""
         return self._goal is not None or self._targets != _ALL_ZERO
 
-    def receive(self, data: bytes, at_s: float | None = None) -> None:
+    @property
+    def facts(self) -> Mapping[str, object]:
+        """What the simulator's console tells."""
+        return {
+            **asdict(self.truth),
+            "mode": self.mode.value,
+            "estopped": self.estopped,
+            "odometry": asdict(self.odometry),
+            "tick": self.tick,
+        }
+
+    def receive(self, data: bytes, at_s: float | None = None, channel: int = 0) -> None:
         """Take bytes off the line, in any chunking; each command acts at once.
 
         at_s: when the first of them arrived, in seconds by any steady clock; the last tick by
             default. The others follow without a pause. Only a receiver that looks for idle gaps
             cares.
+        channel: there is one.
         """
         self.received += data
         if len(self.received) > RECEIVED_LOG_BYTES:
@@ -216,6 +236,11 @@ class SimulatedBoard:
         sent = self._paused_output() if self.mode is BoardMode.PAUSED else self._running_output()
         self.sent.extend(SentFrame(self.tick, data) for data in sent)
         return b"".join(sent)
+
+    def advance(self) -> list[Packet]:
+        """As `step`; a packet, unless nothing is sent."""
+        data = self.step()
+        return [(0, data)] if data else []
 
     # Commands
 

@@ -1,33 +1,21 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user may choose about a simulated board: one table for the command line and for sim://.
+"""What a user may choose about a simulated OmniBot, besides its seed and the faults of its line.
 
 Knows words and their meaning. Must not know what runs the board.
 """
 
 import argparse
-from typing import NoReturn, get_args
-from urllib.parse import parse_qsl, urlsplit
+from typing import get_args
 
-from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
 from omnibot_driver.simulator.omnibot.firmware import SimulatedBoard
 from omnibot_driver.simulator.omnibot.motors import TICK_S
 from omnibot_driver.simulator.omnibot.receivers import FramingName, LetterPlace, ReceiverKind
 from omnibot_driver.simulator.omnibot.settings import BoardSettings
 
 
-class OptionError(ValueError):
-    """An option that is unknown or has a value that it cannot have; the text says which."""
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise OptionError(message)
-
-
-def add_board_options(parser: argparse.ArgumentParser) -> None:
+def add_options(parser: argparse.ArgumentParser) -> None:
     """Let the parser know them all."""
-    parser.add_argument("--seed", type=int, default=0, help="of all random numbers (default 0)")
     parser.add_argument("--imu-only", action="store_true", help="run in IMU only mode")
     parser.add_argument(
         "--frame",
@@ -78,23 +66,11 @@ def add_board_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--running", action="store_true", help="start in the running mode instead of booting"
     )
-    for fault, effect in (
-        ("lose", "is lost"),
-        ("burst", "begins a burst of up to 200 lost bytes"),
-        ("flip", "arrives with one bit changed"),
-    ):
-        parser.add_argument(
-            f"--{fault}",
-            type=_chance,
-            default=0.0,
-            metavar="RATE",
-            help=f"chance that a byte the board sends {effect} (default 0)",
-        )
 
 
-def board_from(arguments: argparse.Namespace) -> tuple[SimulatedBoard, FaultyLine]:
-    """The board that was chosen, and the line that its bytes go through."""
-    board = SimulatedBoard(
+def from_arguments(arguments: argparse.Namespace) -> SimulatedBoard:
+    """The board that was chosen."""
+    return SimulatedBoard(
         BoardSettings(
             seed=arguments.seed,
             frame=arguments.frame,
@@ -111,25 +87,6 @@ def board_from(arguments: argparse.Namespace) -> tuple[SimulatedBoard, FaultyLin
             running=arguments.running,
         )
     )
-    faults = LineFaults(lose=arguments.lose, burst=arguments.burst, flip=arguments.flip)
-    return board, FaultyLine(faults, arguments.seed)
-
-
-def board_from_url(url: str) -> tuple[SimulatedBoard, FaultyLine]:
-    """The board of ``sim://?seed=1&imu_only``. Raises OptionError."""
-    parts = urlsplit(url)
-    if place := parts.netloc + parts.path:
-        raise OptionError(f"'{place}' must come after a question mark")
-    words = [
-        f"--{name.replace('_', '-')}" + (f"={value}" if value else "")
-        for name, value in parse_qsl(parts.query, keep_blank_values=True)
-    ]
-    parser = _Parser(add_help=False, allow_abbrev=False)
-    add_board_options(parser)
-    arguments, unknown = parser.parse_known_args(words)
-    if unknown:
-        raise OptionError(f"there is no option '{unknown[0].lstrip('-')}'")
-    return board_from(arguments)
 
 
 def _ticks(text: str) -> float:
@@ -143,13 +100,3 @@ def _ticks(text: str) -> float:
             f"{text!r} is no period of the board: give a multiple of {TICK_S:g} up to 10"
         )
     return seconds
-
-
-def _chance(text: str) -> float:
-    try:
-        chance = float(text)
-    except ValueError:
-        chance = -1.0
-    if not 0.0 <= chance <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no probability: give a number from 0 to 1")
-    return chance

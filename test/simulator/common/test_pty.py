@@ -101,7 +101,7 @@ class Clock:
         time_of_clock = SimpleNamespace(monotonic=lambda: self.now_s)
         monkeypatch.setattr("omnibot_driver.simulator.common.running.time", time_of_clock)
         monkeypatch.setattr(
-            "omnibot_driver.simulator.common.pty.select", SimpleNamespace(select=self.wait)
+            "omnibot_driver.simulator.common.serving.select", SimpleNamespace(select=self.wait)
         )
 
     def wait(

@@ -1,13 +1,27 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What may be chosen about a simulated board, in words."""
+"""What may be chosen about a simulated OmniBot, in words."""
 
 import pytest
 
-from omnibot_driver.simulator.omnibot import BoardSettings, FaultyLine, LineFaults, ReceiverKind
-from omnibot_driver.simulator.omnibot.options import OptionError, board_from_url
+from omnibot_driver.simulator import omnibot
+from omnibot_driver.simulator.common.options import OptionError, from_url
+from omnibot_driver.simulator.common.wired import Line
+from omnibot_driver.simulator.omnibot import (
+    BoardSettings,
+    FaultyLine,
+    LineFaults,
+    ReceiverKind,
+    SimulatedBoard,
+)
 
 SENT = bytes(range(256)) * 4
+
+
+def board_from_url(url: str) -> tuple[SimulatedBoard, Line]:
+    """The board that the URL describes, and its one line."""
+    board, (line,) = from_url(url, omnibot)
+    return board, line
 
 
 def test_every_option_reaches_the_board_and_its_line() -> None:

@@ -1,0 +1,138 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a user may choose about any simulated board, on the command line and in a sim:// URL.
+
+Each option is declared once, for both. Knows words and their meaning. Must not know what runs the
+board, nor any board: its own options come from its package.
+"""
+
+import argparse
+from collections.abc import Sequence
+from importlib import import_module
+from typing import NoReturn, cast
+from urllib.parse import parse_qsl, urlsplit
+
+from omnibot_driver.simulator.common.board import Channel, SimulatedBoard, SimulatorModule
+from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
+from omnibot_driver.simulator.common.network import FaultyNetwork, NetworkFaults
+from omnibot_driver.simulator.common.wired import Line
+
+DEFAULT_BOARD = "omnibot"
+"""Of the driver and of the simulator alike."""
+
+
+class OptionError(ValueError):
+    """An option that is unknown or has a value that it cannot have; the text says which."""
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise OptionError(message)
+
+
+def load(module: str) -> SimulatorModule:
+    """The package of a simulated board, by its full name."""
+    return cast(SimulatorModule, import_module(module))
+
+
+def command(module: str) -> str:
+    """How this package is run from a command line; ``--help`` after it has its options."""
+    board = module.rpartition(".")[2]
+    return "simulator" if board == DEFAULT_BOARD else f"simulator --board {board}"
+
+
+def add_options(parser: argparse.ArgumentParser, simulator: SimulatorModule) -> None:
+    """Let the parser know all options of this board and of its lines."""
+    parser.add_argument("--seed", type=int, default=0, help="of all random numbers (default 0)")
+    simulator.add_options(parser)
+    serial = any(not channel.datagrams for channel in simulator.CHANNELS)
+    datagrams = any(channel.datagrams for channel in simulator.CHANNELS)
+    lost = ["a byte the board sends"] * serial + ["a datagram, either way,"] * datagrams
+    _add_rate(parser, "lose", f"chance that {' or '.join(lost)} is lost")
+    if serial:
+        burst = "begins a burst of up to 200 lost bytes"
+        _add_rate(parser, "burst", f"chance that a byte the board sends {burst}")
+        _add_rate(parser, "flip", "chance that a byte the board sends arrives with one bit changed")
+    if datagrams:
+        _add_rate(parser, "duplicate", "chance that a datagram, either way, comes twice")
+        parser.add_argument(
+            "--delay",
+            type=_delay,
+            default=0.0,
+            metavar="SECONDS",
+            help="a datagram, either way, is late by up to this; later ones may overtake it"
+            " (default 0)",
+        )
+
+
+def from_arguments(
+    arguments: argparse.Namespace, simulator: SimulatorModule
+) -> tuple[SimulatedBoard, list[Line]]:
+    """The board that was chosen, and its lines."""
+    return simulator.from_arguments(arguments), [
+        _line(arguments, channel, number) for number, channel in enumerate(simulator.CHANNELS)
+    ]
+
+
+def from_url(url: str, simulator: SimulatorModule) -> tuple[SimulatedBoard, list[Line]]:
+    """The same of ``sim://?seed=1&imu_only``. Raises OptionError."""
+    parts = urlsplit(url)
+    if place := parts.netloc + parts.path:
+        raise OptionError(f"'{place}' must come after a question mark")
+    words = [
+        f"--{name.replace('_', '-')}" + (f"={value}" if value else "")
+        for name, value in parse_qsl(parts.query, keep_blank_values=True)
+    ]
+    return from_words(words, simulator)
+
+
+def from_words(
+    words: Sequence[str], simulator: SimulatorModule
+) -> tuple[SimulatedBoard, list[Line]]:
+    """The same of a command line. Raises OptionError."""
+    parser = _Parser(add_help=False, allow_abbrev=False)
+    add_options(parser, simulator)
+    arguments, unknown = parser.parse_known_args(words)
+    if unknown:
+        raise OptionError(f"there is no option '{unknown[0].lstrip('-')}'")
+    return from_arguments(arguments, simulator)
+
+
+def _line(arguments: argparse.Namespace, channel: Channel, number: int) -> Line:
+    seed = f"{arguments.seed} {number}" if number else str(arguments.seed)
+    if channel.datagrams:
+        return FaultyNetwork(
+            NetworkFaults(
+                lose=arguments.lose, duplicate=arguments.duplicate, delay_s=arguments.delay
+            ),
+            seed,
+        )
+    faults = LineFaults(lose=arguments.lose, burst=arguments.burst, flip=arguments.flip)
+    return FaultyLine(faults, seed)
+
+
+def _add_rate(parser: argparse.ArgumentParser, name: str, effect: str) -> None:
+    parser.add_argument(
+        f"--{name}", type=_chance, default=0.0, metavar="RATE", help=f"{effect} (default 0)"
+    )
+
+
+def _chance(text: str) -> float:
+    chance = _number(text)
+    if not 0.0 <= chance <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no probability: give a number from 0 to 1")
+    return chance
+
+
+def _delay(text: str) -> float:
+    delay_s = _number(text)
+    if not 0.0 <= delay_s <= 60.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no delay: give seconds from 0 to 60")
+    return delay_s
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return -1.0

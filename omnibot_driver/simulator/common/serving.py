@@ -1,0 +1,155 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A simulated board in real time, for programs outside: each channel has a port of its own.
+
+Knows what carries a channel, and waits for all of them at once. Must not know what packets mean.
+"""
+
+import os
+import select
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol, Self
+
+from omnibot_driver.simulator.common.board import Channel, Packet
+from omnibot_driver.simulator.common.running import RunningBoard
+from omnibot_driver.simulator.common.terminal import Terminal
+from omnibot_driver.simulator.common.udp import open_sockets
+from omnibot_driver.simulator.common.wired import B, Line
+
+
+class Carrier(Protocol):
+    """One open port."""
+
+    address: str
+    """What the driver's parameter is set to."""
+    name: str
+    """The same, or the link that leads there."""
+    descriptor: int
+    """Readable when something has come."""
+
+    def receive(self) -> list[bytes]:
+        """What has come, in order."""
+
+    def send(self, data: bytes) -> int:
+        """Give it to the driver; how many bytes found room."""
+
+    def close(self) -> None:
+        """Give the port back."""
+
+
+class ServedBoard(RunningBoard[B]):
+    """Context manager that runs a board behind pseudo-terminals and UDP ports, at ``addresses``.
+
+    A pseudo-terminal for each serial channel; ``links`` name symbolic links to them: one for each,
+    or one that gets a hyphen and the channel's name appended where there are several. For channels
+    of datagrams a UDP port each, the first at ``udp_port`` or any, the others after it.
+
+    Raises OSError, on entering, with a sentence where a link or a port cannot be had.
+    """
+
+    def __init__(
+        self,
+        board: B,
+        lines: Sequence[Line] = (),
+        *,
+        links: Sequence[str | Path] = (),
+        udp_port: int = 0,
+    ) -> None:
+        super().__init__(board, lines)
+        self._links = links
+        self._udp_port = udp_port
+        self._carriers: list[Carrier] = []
+
+    @property
+    def addresses(self) -> list[str]:
+        """By channel, what the driver's parameter is set to: a path, or udp://127.0.0.1:PORT."""
+        return [carrier.address for carrier in self._carriers]
+
+    @property
+    def names(self) -> list[str]:
+        """The same, but by its link what has one."""
+        return [carrier.name for carrier in self._carriers]
+
+    def __enter__(self) -> Self:
+        self._carriers = open_carriers(self.board.channels, self._links, self._udp_port)
+        self._by_descriptor = {
+            carrier.descriptor: (channel, carrier) for channel, carrier in enumerate(self._carriers)
+        }
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        try:
+            self.stop()
+        finally:
+            if not self._thread.is_alive():
+                for carrier in self._carriers:
+                    carrier.close()
+
+    def _receive(self, timeout_s: float) -> Iterator[Packet]:
+        readable, _, _ = select.select(list(self._by_descriptor), [], [], timeout_s)
+        for descriptor in readable:
+            channel, carrier = self._by_descriptor[descriptor]
+            for data in carrier.receive():
+                yield channel, data
+
+    def _send(self, channel: int, data: bytes) -> int:
+        return self._carriers[channel].send(data)
+
+
+class PtyBoard(ServedBoard[B]):
+    """A board of one serial channel, on a pseudo-terminal that is found at ``path``."""
+
+    def __init__(self, board: B, link: str | Path | None = None, line: Line | None = None) -> None:
+        super().__init__(
+            board, [] if line is None else [line], links=[] if link is None else [link]
+        )
+
+    @property
+    def path(self) -> str:
+        """Of the pseudo-terminal; empty until it is opened."""
+        return self.addresses[0] if self._carriers else ""
+
+
+def open_carriers(
+    channels: Sequence[Channel], links: Sequence[str | Path] = (), udp_port: int = 0
+) -> list[Carrier]:
+    """One for each channel. Raises OSError."""
+    names = iter(_one_for_each([c.name for c in channels if not c.datagrams], links))
+    with ExitStack() as opened:
+        sockets = open_sockets(sum(channel.datagrams for channel in channels), udp_port)
+        for one in sockets:
+            opened.callback(one.close)
+        unused = iter(sockets)
+        carriers: list[Carrier] = []
+        for channel in channels:
+            if channel.datagrams:
+                carriers.append(next(unused))
+            else:
+                carriers.append(terminal := Terminal(next(names)))
+                opened.callback(terminal.close)
+        opened.pop_all()
+    return carriers
+
+
+def _one_for_each(names: Sequence[str], links: Sequence[str | Path]) -> Sequence[str | Path | None]:
+    if not links:
+        return [None] * len(names)
+    if len(links) == len(names):
+        return links
+    if len(links) == 1 and names:
+        return [f"{os.fspath(links[0])}-{name}" for name in names]
+    if not names:
+        raise OSError("this board has no serial port that a link could lead to")
+    raise OSError(
+        f"{len(links)} links do not fit a board with {len(names)} serial ports:"
+        " give one --link, or one for each port"
+    )

@@ -1,0 +1,91 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A pseudo-terminal that carries a serial channel of a simulated board.
+
+Knows descriptors. Must not know what bytes mean.
+"""
+
+import array
+import fcntl
+import os
+import termios
+import tty
+from pathlib import Path
+
+from omnibot_driver.simulator.common.running import UNREAD_LIMIT
+
+
+class Terminal:
+    """A new pseudo-terminal; the driver's end is at ``address``, ours is ``descriptor``.
+
+    It outlives the programs that open it. Bytes that nobody reads are lost like those of a UART
+    once the kernel's buffer is full. ``link`` names a symbolic link to be made for the terminal and
+    removed on closing.
+
+    Raises FileExistsError when ``link`` is taken by anything but a dead link or a link to a
+    pseudo-terminal.
+    """
+
+    def __init__(self, link: str | Path | None = None) -> None:
+        self._link = None if link is None else Path(link)
+        self.descriptor, self._near = os.openpty()
+        try:
+            tty.setraw(self._near)
+            os.set_blocking(self.descriptor, False)
+            self.address = os.ttyname(self._near)
+            self.name = self.address if self._link is None else str(self._link)
+            if self._link is not None:
+                _make_link(self._link, self.address)
+        except BaseException:
+            self._close_descriptors()
+            raise
+
+    def receive(self) -> list[bytes]:
+        """What has come, once ``descriptor`` is readable."""
+        return [os.read(self.descriptor, 4096)]
+
+    def send(self, data: bytes) -> int:
+        """Give bytes to the driver; how many found room."""
+        unread = array.array("i", [0])
+        fcntl.ioctl(self._near, termios.FIONREAD, unread)
+        room = max(0, UNREAD_LIMIT - unread[0])
+        try:
+            return os.write(self.descriptor, data[:room]) if room and data else 0
+        except BlockingIOError:
+            return 0
+
+    def close(self) -> None:
+        """Take the link away, if it still leads here, and the terminal."""
+        if self._link is not None and _leads_to(self._link, self.address):
+            self._link.unlink()
+        self._close_descriptors()
+
+    def _close_descriptors(self) -> None:
+        os.close(self.descriptor)
+        os.close(self._near)
+
+
+def _make_link(link: Path, target: str) -> None:
+    if link.is_symlink():
+        if link.exists() and not os.path.realpath(link).startswith("/dev/pts/"):
+            raise FileExistsError(
+                f"{link} already leads to {os.path.realpath(link)}, which is no pseudo-terminal; "
+                "choose another name for the simulator's link or remove it first"
+            )
+        link.unlink()
+    elif link.exists():
+        raise FileExistsError(
+            f"{link} exists and is no symbolic link; choose another name for the simulator's link "
+            "or remove it first"
+        )
+    try:
+        link.symlink_to(target)
+    except OSError as error:
+        raise type(error)(
+            f"cannot make the link {link} ({error.strerror}): "
+            "choose a folder that exists and is yours"
+        ) from error
+
+
+def _leads_to(link: Path, target: str) -> bool:
+    return link.is_symlink() and os.readlink(link) == target

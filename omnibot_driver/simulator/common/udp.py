@@ -1,0 +1,80 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""UDP sockets that carry the channels of a simulated board whose packets are datagrams.
+
+Knows sockets. Must not know what datagrams mean.
+"""
+
+import contextlib
+import errno
+import socket
+
+HOST = "127.0.0.1"
+"""Nobody on the network drives a simulated robot."""
+
+LARGEST = 65_535
+_TRIES = 100
+
+
+class UdpSocket:
+    """Bound at ``address``; answers go to the sender of the last datagram."""
+
+    def __init__(self, bound: socket.socket) -> None:
+        bound.setblocking(False)
+        self._socket = bound
+        self._peer: tuple[str, int] | None = None
+        self.descriptor = bound.fileno()
+        self.address = self.name = f"udp://{HOST}:{bound.getsockname()[1]}"
+
+    def receive(self) -> list[bytes]:
+        """All datagrams that have come; one may be empty."""
+        datagrams = []
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                datagram, self._peer = self._socket.recvfrom(LARGEST)
+                datagrams.append(datagram)
+        return datagrams
+
+    def send(self, data: bytes) -> int:
+        """Give a datagram to the driver; 0 where there is none, or no room."""
+        if self._peer is None:
+            return 0
+        try:
+            return self._socket.sendto(data, self._peer)
+        except OSError:
+            return 0
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._socket.close()
+
+
+def open_sockets(count: int, port: int = 0) -> list[UdpSocket]:
+    """Sockets on this port and those that follow it; on free ones if it is 0. Raises OSError."""
+    if not 0 <= port <= LARGEST - count + 1:
+        raise OSError(
+            f"--udp-port {port}: there is no such port; choose 1 to {LARGEST - count + 1}"
+        )
+    for _ in range(1 if port else _TRIES):
+        try:
+            return _in_a_row(count, port)
+        except OSError as error:
+            if error.errno not in (errno.EADDRINUSE, errno.EACCES):
+                raise
+            refused = error
+    what = f"port {port}" if count == 1 else f"ports {port} to {port + count - 1}"
+    raise OSError(
+        f"cannot listen on UDP {what} ({refused.strerror}); choose others by --udp-port"
+    ) from refused
+
+
+def _in_a_row(count: int, port: int) -> list[UdpSocket]:
+    with contextlib.ExitStack() as opened:
+        sockets = []
+        for _ in range(count):
+            one = opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            one.bind((HOST, port))
+            sockets.append(one)
+            port = one.getsockname()[1] + 1
+        opened.pop_all()
+    return [UdpSocket(one) for one in sockets]

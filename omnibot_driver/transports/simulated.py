@@ -1,0 +1,154 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""``sim://``: a simulated board inside this process, as a transport.
+
+Options come after a question mark: ``sim://?seed=1&lose=0.001``. The board begins when the
+transport is opened, and ends with it. Knows the package of the simulated board by its name, and no
+bytes.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from queue import Empty, SimpleQueue
+from typing import Final
+
+from omnibot_driver.core.errors import LinkError
+from omnibot_driver.simulator.common import options
+from omnibot_driver.simulator.common.board import Packet, SimulatedBoard
+from omnibot_driver.simulator.common.running import UNREAD_LIMIT, RunningBoard
+from omnibot_driver.simulator.common.wired import Line
+
+READ_TIMEOUT_S: Final = 0.2
+UNREAD_DATAGRAMS: Final = 256
+"""About what a socket of Linux holds of small ones."""
+
+
+class SimulatedTransport:
+    """A board in real time at the end of channels that are memory.
+
+    ``simulator``: full name of the package of the simulated board. Raises LinkError where the URL
+    is wrong. ``read`` and ``close`` raise RuntimeError when the board's thread has died: a defect.
+    """
+
+    overruns: int | None = None
+    """Memory does not overrun."""
+    ends_with_us: bool = True
+    """Nothing outside this process hears what is written."""
+    descriptors: tuple[int, ...] | None = None
+    """Another process could not inherit it."""
+
+    def __init__(self, url: str, simulator: str) -> None:
+        self._url = url
+        try:
+            self._board: InProcessBoard | None = InProcessBoard(
+                *options.from_url(url, options.load(simulator))
+            )
+        except options.OptionError as error:
+            raise LinkError(
+                f"port '{url}' is not understood: {error}; the options are those of"
+                f" `ros2 run omnibot_driver {options.command(simulator)} --help`,"
+                " as in sim://?seed=1&lose=0.001"
+            ) from error
+        self._board.start()
+
+    def read(self) -> Packet:
+        """What has come on one channel, waiting for it; ``(0, b"")`` after a while without.
+
+        Raises LinkError after ``close``.
+        """
+        if self._board is None:
+            raise LinkError(f"lost {self._url} while reading: it is closed")
+        return self._board.read(READ_TIMEOUT_S)
+
+    def write(self, packets: Iterable[Packet]) -> None:
+        """All of them, at once. Raises LinkError after ``close``."""
+        if self._board is None:
+            raise LinkError(f"lost {self._url} while writing: it is closed")
+        for packet in packets:
+            self._board.write(packet)
+
+    def write_if_room(self, packets: Iterable[Packet]) -> None:
+        """The same: there is always room."""
+        self.write(packets)
+
+    def interrupt(self) -> None:
+        """End a ``read`` that waits in another thread, or else the next one."""
+        if (board := self._board) is not None:
+            board.cancel()
+
+    def close(self) -> None:
+        """Power the board off; harmless to repeat."""
+        board, self._board = self._board, None
+        if board is not None:
+            board.cancel()
+            board.stop()
+
+
+class InProcessBoard(RunningBoard[SimulatedBoard]):
+    """A board whose channels are memory."""
+
+    def __init__(self, board: SimulatedBoard, lines: Sequence[Line] = ()) -> None:
+        super().__init__(board, lines)
+        self._inbox: SimpleQueue[Packet] = SimpleQueue()
+        self._outbox: deque[tuple[int, bytearray]] = deque()
+        self._came = threading.Condition()
+        self._cancelled = False
+
+    def unread(self, channel: int = 0) -> int:
+        """How many bytes of a serial channel, or datagrams, wait to be read."""
+        waiting = [data for number, data in self._outbox if number == channel]
+        return len(waiting) if self._has_datagrams(channel) else sum(map(len, waiting))
+
+    def write(self, packet: Packet) -> None:
+        """A packet for the board; it finds it with its next tick at the latest."""
+        self._inbox.put(packet)
+
+    def read(self, timeout_s: float | None) -> Packet:
+        """The oldest that was not read: a datagram, or bytes that nothing came between.
+
+        ``(0, b"")`` when the time is over, or after ``cancel``.
+        """
+        with self._came:
+            self._came.wait_for(lambda: self._outbox or self._cancelled or self._error, timeout_s)
+            self.check()
+            self._cancelled = False
+            if not self._outbox:
+                return 0, b""
+            channel, data = self._outbox.popleft()
+            return channel, bytes(data)
+
+    def cancel(self) -> None:
+        """Have the ``read`` that waits, or else the next one, return at once."""
+        with self._came:
+            self._cancelled = True
+            self._came.notify_all()
+
+    def _receive(self, timeout_s: float) -> Iterator[Packet]:
+        try:
+            yield self._inbox.get(timeout=timeout_s)
+        except Empty:
+            return
+
+    def _send(self, channel: int, data: bytes) -> int:
+        with self._came:
+            taken = data[: self._room(channel, data)]
+            if taken or (not data and self._has_datagrams(channel)):
+                self._put(channel, taken)
+                self._came.notify_all()
+        return len(taken)
+
+    def _room(self, channel: int, data: bytes) -> int:
+        if self._has_datagrams(channel):
+            return len(data) if self.unread(channel) < UNREAD_DATAGRAMS else 0
+        return UNREAD_LIMIT - self.unread(channel)
+
+    def _put(self, channel: int, data: bytes) -> None:
+        last = self._outbox[-1] if self._outbox else None
+        if last is not None and last[0] == channel and not self._has_datagrams(channel):
+            last[1].extend(data)
+        else:
+            self._outbox.append((channel, bytearray(data)))
+
+    def _has_datagrams(self, channel: int) -> bool:
+        return self.board.channels[channel].datagrams

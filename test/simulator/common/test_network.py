@@ -1,0 +1,69 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The bad network of a simulated board, in board time."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.simulator.common.network import FaultyNetwork, NetworkFaults, NetworkPath
+
+SENT = [b"%d" % number for number in range(5000)]
+
+
+def through(path: NetworkPath, every_s: float = 0.01) -> list[bytes]:
+    """What arrives of one datagram every so often, looked at whenever one is sent, then later."""
+    arrived = []
+    for number, datagram in enumerate(SENT):
+        path.send(datagram, number * every_s)
+        arrived += path.arrived(number * every_s)
+    return arrived + path.arrived(len(SENT) * every_s + 60.0)
+
+
+def test_a_good_network_hands_over_at_once_and_in_order() -> None:
+    """Nothing is lost, doubled or counted."""
+    network = FaultyNetwork()
+    network.to_board.send(b"hello", 1.0)
+    assert network.to_board.arrived(1.0) == [b"hello"]
+    assert network.to_board.arrived(9.0) == []
+    assert through(network.from_board) == SENT
+    assert network.counts == {"lost": 0, "duplicated": 0}
+
+
+def test_datagrams_are_lost_at_the_given_rate() -> None:
+    """Whole, and each way by itself."""
+    network = FaultyNetwork(NetworkFaults(lose=0.1))
+    there, back = through(network.to_board), through(network.from_board)
+    assert set(there) <= set(SENT)
+    assert there != back
+    assert len(SENT) - len(there) == network.to_board.lost == pytest.approx(500, rel=0.2)
+    assert network.counts["lost"] == 2 * len(SENT) - len(there) - len(back)
+
+
+def test_datagrams_come_twice_at_the_given_rate() -> None:
+    """Without delay the copy comes right behind."""
+    path = NetworkPath(NetworkFaults(duplicate=0.1), "seed")
+    arrived = through(path)
+    assert len(arrived) - len(SENT) == path.duplicated == pytest.approx(500, rel=0.2)
+    assert arrived == sorted(arrived, key=int)
+
+
+def test_a_delay_is_never_longer_than_given_and_lets_others_overtake() -> None:
+    """It ends at the first look after it."""
+    path = NetworkPath(NetworkFaults(delay_s=0.05), "seed")
+    for number in range(200):
+        now_s = number * 0.01
+        path.send(b"%d" % number, now_s)
+        assert all(now_s - int(datagram) * 0.01 < 0.06 for datagram in path.arrived(now_s))
+    arrived = through(NetworkPath(NetworkFaults(delay_s=0.05), "seed"))
+    assert sorted(arrived, key=int) == SENT
+    assert arrived != SENT
+
+
+@given(st.integers(0, 5))
+def test_equal_seeds_meet_equal_fates(seed: int) -> None:
+    """Different ones do not."""
+    faults = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.1)
+    first = through(FaultyNetwork(faults, seed).to_board)
+    assert first == through(FaultyNetwork(faults, seed).to_board)
+    assert first != through(FaultyNetwork(faults, seed + 1).to_board)

@@ -1,0 +1,149 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Boards of several channels and of datagrams in real time, behind real terminals and sockets."""
+
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import ExitStack, closing
+from pathlib import Path
+
+import pytest
+from toy_lines import DRIVE, FRONT, ToyLines
+from toy_udp import ToyServer
+
+from omnibot_driver.simulator.common.board import Channel
+from omnibot_driver.simulator.common.serving import ServedBoard, open_carriers
+from omnibot_driver.simulator.common.udp import open_sockets
+
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
+
+PATIENCE_S = 20.0
+TWO_PORTS = (Channel("command", datagrams=True), Channel("stop", "", datagrams=True))
+
+
+@pytest.fixture
+def client() -> Iterator[socket.socket]:
+    """A program on the same computer."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
+        client.settimeout(PATIENCE_S)
+        yield client
+
+
+def place(address: str) -> tuple[str, int]:
+    """Host and port of an address as it is printed."""
+    scheme, host, port = address.split(":")
+    assert scheme == "udp"
+    return host.removeprefix("//"), int(port)
+
+
+def test_each_serial_channel_has_a_terminal_of_its_own() -> None:
+    """What is written to one is done, and what the board says on it is read there."""
+    with ServedBoard(ToyLines()) as served, ExitStack() as stack:
+        ports = [os.open(path, os.O_RDWR | os.O_NOCTTY) for path in served.addresses]
+        for port in ports:
+            stack.callback(os.close, port)
+        os.write(ports[FRONT], b"angle 30\n")
+        os.write(ports[DRIVE], b"go 0.5 0\n")
+        assert served.wait_for(lambda board: board.angle_deg == 30.0, PATIENCE_S)
+        assert served.wait_for(lambda board: board.pose[0] > 0.1, PATIENCE_S)
+        assert os.read(ports[FRONT], 4).startswith(b"fwl ")
+        assert os.read(ports[DRIVE], 4).startswith(b"odo ")
+
+
+def test_one_link_leads_to_several_terminals_by_their_names(tmp_path: Path) -> None:
+    """A hyphen and the channel's name are appended; all go with the board."""
+    with ServedBoard(ToyLines(), links=[tmp_path / "board"]) as served:
+        assert served.names == [str(tmp_path / "board-drive"), str(tmp_path / "board-front")]
+        assert [os.readlink(name) for name in served.names] == served.addresses
+    assert os.listdir(tmp_path) == []
+
+
+def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
+    """In the order of the channels."""
+    links = [tmp_path / "a", tmp_path / "b"]
+    with ServedBoard(ToyLines(), links=links) as served:
+        assert [os.readlink(link) for link in links] == served.addresses
+
+
+def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path) -> None:
+    """Too many, or one that is taken after another was made, or one for a socket."""
+    three = [tmp_path / name for name in "abc"]
+    with pytest.raises(OSError, match=r"3 links do not fit a board with 2 serial ports"):
+        open_carriers(ToyLines.channels, three)
+    three[1].write_text("data")
+    with pytest.raises(FileExistsError, match="choose another name"):
+        open_carriers(ToyLines.channels, three[:2])
+    with pytest.raises(OSError, match="no serial port that a link could lead to"):
+        open_carriers(ToyServer.channels, three[:1])
+    assert os.listdir(tmp_path) == ["b"]
+
+
+def test_a_datagram_is_answered_to_its_sender(client: socket.socket) -> None:
+    """Each as one datagram; a second program is answered once it asks."""
+    with ServedBoard(ToyServer()) as served:
+        client.sendto(b"odo", place(served.addresses[0]))
+        assert client.recv(100) == b"ok 0.000"
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+            other.settimeout(PATIENCE_S)
+            other.sendto(b"move 0.01", place(served.addresses[0]))
+            assert other.recv(100) == b"ok 0.010"
+
+
+def test_empty_datagrams_and_several_at_once_come_apart(client: socket.socket) -> None:
+    """Nothing is joined, and nothing left out."""
+    with ServedBoard(ToyServer()) as served:
+        with served.lock:  # they wait in the socket
+            for data in (b"odo", b"", b"odo"):
+                client.sendto(data, place(served.addresses[0]))
+        assert [client.recv(100) for _ in range(3)] == [b"ok 0.000", b"fail", b"ok 0.000"]
+
+
+def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
+    """A board that speaks before anybody has."""
+
+    class Talking(ToyServer):
+        def advance(self) -> list[tuple[int, bytes]]:
+            return [(0, b"hello")]
+
+    with ServedBoard(Talking()) as served:
+        assert served.wait_for(lambda board: served.dropped >= 50, PATIENCE_S)
+
+
+def test_datagram_channels_stand_on_ports_in_a_row() -> None:
+    """On this computer alone; the first may be chosen."""
+    sockets = open_sockets(2)
+    first, second = (place(one.address) for one in sockets)
+    for one in sockets:
+        one.close()
+    assert first[0] == second[0] == "127.0.0.1"
+    assert second[1] == first[1] + 1
+    carriers = open_carriers(TWO_PORTS, udp_port=first[1])
+    for one in carriers:
+        one.close()
+    assert [place(one.address) for one in carriers] == [first, second]
+
+
+def test_a_port_that_is_taken_or_does_not_exist_is_one_sentence() -> None:
+    """It says which, and what to do."""
+    with closing(open_sockets(1)[0]) as taken:
+        number = place(taken.address)[1]
+        with pytest.raises(OSError, match=rf"UDP port {number} \(Address already in use\)"):
+            open_sockets(1, number)
+        with pytest.raises(OSError, match=rf"UDP ports {number - 1} to {number} "):
+            open_sockets(2, number - 1)
+    with pytest.raises(OSError, match="choose 1 to 65534"):
+        open_sockets(2, 65535)
+
+
+def test_the_facts_add_what_became_of_the_lines() -> None:
+    """Those of the board first."""
+    with ServedBoard(ToyServer()) as served, served.lock:
+        assert served.facts == {
+            "x_m": 0.0,
+            "y_m": 0.0,
+            "yaw_rad": 0.0,
+            "dropped": 0,
+            "lost": 0,
+            "duplicated": 0,
+        }

@@ -1,0 +1,81 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Boards of several channels and of datagrams behind their lines, in simulated time."""
+
+import pytest
+from toy_lines import DRIVE, FRONT, ToyLines
+from toy_udp import ToyServer
+
+from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
+from omnibot_driver.simulator.common.network import FaultyNetwork, NetworkFaults
+from omnibot_driver.simulator.common.wired import WiredBoard
+
+
+def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
+    """A line that is cut between two calls is whole; another channel does not break it."""
+    wired = WiredBoard(ToyLines())
+    wired.receive(b"go 0.", 0.0, DRIVE)
+    wired.receive(b"angle 30\n", 0.0, FRONT)
+    wired.receive(b"5 0\n", 0.0, DRIVE)
+    packets = [packet for _ in range(20) for packet in wired.advance()]
+    assert packets == [(FRONT, b"fwl 30\n")] * 20 + [(DRIVE, b"odo 0.200 0.000 0.000\n")]
+
+
+def test_each_channel_has_its_own_faults() -> None:
+    """One line is cut, the other whole."""
+    cut = FaultyLine(LineFaults(lose=1.0))
+    wired = WiredBoard(ToyLines(), [FaultyLine(), cut])
+    packets = [packet for _ in range(20) for packet in wired.advance()]
+    assert packets == [(DRIVE, b"odo 0.000 0.000 0.000\n")]
+    assert cut.counts == {"lost": 20 * len(b"fwl 0\n"), "flipped": 0}
+
+
+def test_a_request_is_answered_when_its_move_is_done() -> None:
+    """Other requests are answered meanwhile, and another move is refused."""
+    wired = WiredBoard(ToyServer())
+    wired.receive(b"move 0.02", 5.0)
+    wired.receive(b"odo", 5.0)
+    wired.receive(b"move 1", 5.0)
+    assert [wired.advance() for _ in range(4)] == [
+        [(0, b"ok 0.000"), (0, b"fail")],
+        [],
+        [],
+        [(0, b"ok 0.020")],
+    ]
+
+
+def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
+    """Nothing waits for real time: ten seconds of it pass at once."""
+    network = FaultyNetwork(NetworkFaults(delay_s=10.0, duplicate=0.5, lose=0.2))
+    board = ToyServer()
+    wired = WiredBoard(board, [network])
+    for number in range(100):
+        wired.receive(b"odo %d" % number, 7.0)
+    assert len(board.requests) < 10
+    answers = [packet for _ in range(2000) for packet in wired.advance()]
+    assert len(board.requests) == 100 - network.to_board.lost + network.to_board.duplicated
+    assert board.requests != sorted(board.requests, key=lambda data: int(data.split()[1]))
+    lost, doubled = network.from_board.lost, network.from_board.duplicated
+    assert len(answers) == len(board.requests) - lost + doubled
+
+
+def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
+    """The time that a board is told goes on from what it was told last."""
+    at: list[float] = []
+
+    class Watch(ToyServer):
+        def receive(self, data: bytes, now: float, channel: int) -> None:
+            at.append(now)
+
+    wired = WiredBoard(Watch(), [FaultyNetwork(NetworkFaults(delay_s=1.0))])
+    wired.receive(b"odo", 1000.0)
+    for _ in range(101):
+        wired.advance()
+    assert 1000.0 < at[0] <= 1001.01
+
+
+def test_lines_that_do_not_match_the_channels_are_a_defect() -> None:
+    """Too few, or of the wrong kind."""
+    for lines in ([FaultyLine()], [FaultyLine(), FaultyNetwork()]):
+        with pytest.raises(ValueError, match="do not match"):
+            WiredBoard(ToyLines(), lines)

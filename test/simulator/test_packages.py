@@ -1,0 +1,32 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Which package of the simulator may import which."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from omnibot_driver import simulator
+from omnibot_driver.simulator.__main__ import boards
+
+FOLDER = Path(simulator.__file__).parent
+PACKAGE = simulator.__name__
+
+
+def imported(folder: Path) -> set[str]:
+    """The modules that those in this folder import."""
+    return {
+        node.module
+        for path in folder.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom) and node.module
+    }
+
+
+@pytest.mark.parametrize("name", ["common", *boards()])
+def test_a_package_imports_itself_and_what_all_share(name: str) -> None:
+    """So each board can be taken away, and none is built of another."""
+    allowed = (f"{PACKAGE}.common", f"{PACKAGE}.{name}")
+    ours = {module for module in imported(FOLDER / name) if module.startswith(PACKAGE)}
+    assert not {module for module in ours if not module.startswith(allowed)}
