@@ -9,6 +9,9 @@ HAS_WHEELS := import re, sys, sysconfig; \
 PYTHON ?= $(shell for python in python3.12 python3.13 python3.11 python3; do \
   $$python -c '$(HAS_WHEELS)' 2>/dev/null && break; done; echo $$python)
 
+# Whose demo: a name of `python -m omnibot_driver.simulator --help`.
+BOARD ?= omnibot
+
 SITE_PACKAGES := import sysconfig; print(sysconfig.get_path("purelib"))
 
 NO_WHEELS = There are no ROS 2 Jazzy wheels for this machine's Python (PyPI has them for CPython \
@@ -32,8 +35,8 @@ help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1: /p' Makefile | while IFS= read -r line; do \
 	  printf '  make %-9s %s\n' "$${line%%: *}" "$${line#*: }"; done
 
-demo: $(VENV)/.runtime  ## drive a square on a simulated board, until ctrl-C or for DEMO_SECONDS
-	@$(PY) -m omnibot_driver.demo
+demo: $(VENV)/.runtime  ## drive a square on a simulated BOARD, until ctrl-C or for DEMO_SECONDS
+	@$(PY) -m omnibot_driver.demo --board $(BOARD)
 
 test: lint $(VENV)/.docs  ## run every check and test
 	$(PY) -m pytest -n 2 --dist loadfile  # two files at a time: most tests wait for real time

@@ -19,7 +19,10 @@ PROFILES: Final = {"omnibot": "omnibot_driver.boards.omnibot"}
 
 
 class Profile(Protocol):
-    """What the shell needs of a kind of board, as the functions of a module."""
+    """What the shell needs of a kind of board, as the names of a module."""
+
+    SIMULATOR: str
+    """The package of its simulated board, to be imported where it is used."""
 
     def make(self, values: Mapping[str, Any]) -> Board:
         """A board with these checked parameter values."""

@@ -14,10 +14,14 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from typing import Final
 
+from omnibot_driver import boards
+from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.demo import capability as capabilities
 from omnibot_driver.demo.dashboard import Dashboard
 from omnibot_driver.demo.display import HEADING, Drive, introduce, report
 from omnibot_driver.demo.program import PATIENCE_S, DemoFailed, Program
+from omnibot_driver.simulator.common.options import DEFAULT_BOARD
 
 ENVIRONMENT: Final = {"ROS_DOMAIN_ID": "97", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 """Unless the user says otherwise: away from domain 0, where somebody's robot may be."""
@@ -25,23 +29,29 @@ STOPPING_S: Final = 3.0
 ROW_EVERY_S: Final = 1.0
 
 
-def run(seconds: float, asked_to_end: Callable[[], bool]) -> None:
-    """Drive for so long, or until asked to end. Raises DemoFailed, and ImportError without ROS."""
+def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
+    """Drive for so long, or until asked to end.
+
+    Raises ParameterError where there is no such board, DemoFailed, and ImportError without ROS.
+    """
+    capability = capabilities.of(board)
     namespace = f"/demo_{os.getpid()}"
     show_at_s = 0.0
     with ExitStack() as stack:
-        board = Program("simulator", console=True)
-        stack.callback(board.end)
-        port = board.ask("")
-        arguments = ("--ros-args", "-p", f"port:={port}", "-r", f"__ns:={namespace}")
-        driver = Program("driver", *arguments)
+        chosen = () if board == DEFAULT_BOARD else ("--board", board)
+        simulator = Program("simulator", *chosen, console=True)
+        stack.callback(simulator.end)
+        addresses = {port: simulator.ask() for port in capability.ports}
+        ports = capabilities.port_arguments(board, {p: at for p, at in addresses.items() if p})
+        driver = Program("driver", "--ros-args", *ports.split(), "-r", f"__ns:={namespace}")
         stack.callback(driver.end)
         from omnibot_driver.demo.robot import Robot
 
-        robot = Robot(namespace)
+        robot = Robot(namespace, imu=capability.imu, sideways=capability.sideways)
         stack.callback(robot.close)
         exports = " ".join(f"{name}={os.environ[name]}" for name in ENVIRONMENT)
-        introduce(port, namespace, exports, seconds)
+        programs = ("".join(f" {word}" for word in chosen), ports)
+        introduce(capability, programs, namespace, exports, seconds)
         dashboard = Dashboard(namespace)
         stack.callback(dashboard.close)
         if not dashboard.possible:
@@ -54,7 +64,7 @@ def run(seconds: float, asked_to_end: Callable[[], bool]) -> None:
             nonlocal show_at_s
             deadline_s = time.monotonic() + longest_s
             while not done() and (now_s := time.monotonic()) < deadline_s:
-                board.check()
+                simulator.check()
                 driver.check()
                 robot.spin_once()
                 if now_s >= show_at_s and not dashboard.possible:
@@ -71,42 +81,51 @@ def run(seconds: float, asked_to_end: Callable[[], bool]) -> None:
             dashboard.close()
             print("The demo was ended before the robot drove.")
             return
-        started_s, counts = time.monotonic(), (robot.imu.count, robot.odom.count)
+        started_s = time.monotonic()
+        rates = [rate for rate in (robot.odom, robot.imu) if rate is not None]
+        counts = [rate.count for rate in rates]
         robot.driving = True
         go_on_until(done_with, seconds)
         driven_s = time.monotonic() - started_s
-        rates_hz = [
-            (rate.count - before) / driven_s
-            for rate, before in zip((robot.imu, robot.odom), counts, strict=True)
-        ]
+        odom_hz, *imu_hz = (
+            (rate.count - before) / driven_s for rate, before in zip(rates, counts, strict=True)
+        )
         robot.driving = False
         go_on_until(robot.stands, STOPPING_S)
         dashboard.close()
         if not dashboard.possible:
             print(robot.row())
-        truth = json.loads(board.ask("truth\n"))
+        truth = json.loads(simulator.ask("truth\n"))
         report(
             Drive(
                 seconds=driven_s,
                 way_m=robot.driven_m,
                 laps=robot.leg / 4,
-                imu_hz=rates_hz[0],
-                odom_hz=rates_hz[1],
+                imu_hz=imu_hz[0] if imu_hz else None,
+                odom_hz=odom_hz,
                 pose=robot.pose,
                 true_pose=Pose(truth["x_m"], truth["y_m"], truth["yaw_rad"]),
                 points=robot.points,
+                real=capability.real,
             )
         )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Return 0 when the time is over or SIGINT or SIGTERM came, 1 on failure, 2 on wrong usage."""
-    argparse.ArgumentParser(
+    parser = argparse.ArgumentParser(
         prog="demo",
         description="Drives a square on a simulated board; no robot is needed.",
         epilog="The environment variable DEMO_SECONDS says for how long; without it, until ctrl-C."
         " Ends with 0, with 1 and a sentence on failure, with 2 on wrong usage.",
-    ).parse_args(arguments)
+    )
+    parser.add_argument(
+        "--board",
+        default=DEFAULT_BOARD,
+        metavar="NAME",
+        help=f"the board: {', '.join(boards.PROFILES)} (default {DEFAULT_BOARD})",
+    )
+    board = parser.parse_args(arguments).board
     given = os.environ.get("DEMO_SECONDS") or "inf"
     try:
         seconds = float(given)
@@ -123,10 +142,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name, default in ENVIRONMENT.items():
         os.environ[name] = os.environ.get(name) or default
     try:
-        run(seconds, lambda: bool(signals))
+        run(board, seconds, lambda: bool(signals))
     except ImportError as error:
         print(f"The demo needs ROS 2 Jazzy's Python packages: {error}", file=sys.stderr)
         return 1
+    except ParameterError as error:
+        print(f"demo: {error}", file=sys.stderr)
+        return 2
     except DemoFailed as error:
         print(f"\ndemo: {error}", file=sys.stderr)
         return 1

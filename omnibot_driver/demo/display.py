@@ -11,6 +11,7 @@ from typing import Final
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.demo.capability import Capability
 from omnibot_driver.tools.monitor.plot import draw_path
 
 HEADING: Final = """\
@@ -19,13 +20,14 @@ state        imu odom lap   x m   y m yaw° x m/s y m/s rad/s x m/s y m/s rad/s"
 
 CLOSING: Final = """
 With the real robot: wheels off the ground first (docs/commissioning.md), then
-  ros2 run omnibot_driver driver --ros-args -p port:=/dev/ttyUSB0"""
+  ros2 run omnibot_driver driver --ros-args """
 
 
 def status_row(
-    state: str, rates_hz: tuple[int, int], leg: int, pose: Pose, *velocities: BodyTwist
+    state: str, rates_hz: tuple[int | None, int], leg: int, pose: Pose, *velocities: BodyTwist
 ) -> str:
     """One row under HEADING; the velocities are the commanded and the measured one."""
+    imu_hz, odom_hz = rates_hz
     numbers = [(pose.x_m, 6, 2), (pose.y_m, 6, 2), (_degrees(pose.yaw_rad), 5, 0)]
     for twist in velocities:
         numbers += [(v, 6, 2) for v in (twist.vx_mps, twist.vy_mps, twist.yaw_rate_radps)]
@@ -33,27 +35,40 @@ def status_row(
     columns = [
         f"{round(value, places) + 0.0:{width}.{places}f}" for value, width, places in numbers
     ]
-    return f"{state:<12}{rates_hz[0]:4d}{rates_hz[1]:5d}{leg // 4 + 1:4d}" + "".join(columns)
+    imu = "-" if imu_hz is None else imu_hz
+    return f"{state:<12}{imu:>4}{odom_hz:5d}{leg // 4 + 1:4d}" + "".join(columns)
 
 
 def _degrees(angle_rad: float) -> float:
     return math.degrees(math.remainder(angle_rad, math.tau))
 
 
-def introduce(port: str, namespace: str, exports: str, seconds: float) -> None:
-    """Say what is going on, and what to do with it."""
+def introduce(
+    capability: Capability,
+    options: tuple[str, str],
+    namespace: str,
+    exports: str,
+    seconds: float,
+) -> None:
+    """Say what is going on, and what to do with it.
+
+    ``options``: of the simulator and of the driver.
+    """
+    imu = f"\n  ros2 topic hz {namespace}/imu/data_raw" * capability.imu
+    turning = (
+        "turning as only an omni robot can" if capability.sideways else "turning at its corners"
+    )
     ending = f"for {seconds:g} s" if math.isfinite(seconds) else "until ctrl-C"
     print(f"""\
-A simulated OmniBot drives a square of 1 m, turning as only an omni robot can.
+A simulated {capability.title} drives a square of 1 m, {turning}.
 
-  simulator  a board on {port}: python -m omnibot_driver.simulator
-  driver     python -m omnibot_driver.driver --ros-args -p port:={port}
+  simulator  python -m omnibot_driver.simulator{options[0]}
+  driver     python -m omnibot_driver.driver --ros-args {options[1]}
   demo       steers by odom over cmd_vel, {ending}
 
 Where ROS 2 Jazzy is installed, look on and interfere from another terminal:
 
-  export {exports}
-  ros2 topic hz {namespace}/imu/data_raw
+  export {exports}{imu}
   ros2 topic echo {namespace}/odom --field pose.pose
   ros2 service call {namespace}/omnibot_driver/estop \\
     std_srvs/srv/SetBool "data: true"    # then "data: false"
@@ -62,16 +77,20 @@ Where ROS 2 Jazzy is installed, look on and interfere from another terminal:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """What was driven and received, where the robot believes to be, and where it is."""
+    """What was driven and received, where the robot believes to be, and where it is.
+
+    ``imu_hz``: None without an IMU. ``real``: a driver's arguments for the real robot.
+    """
 
     seconds: float
     way_m: float
     laps: float
-    imu_hz: float
+    imu_hz: float | None
     odom_hz: float
     pose: Pose
     true_pose: Pose
     points: Iterable[tuple[float, float]]
+    real: str
 
 
 def report(drive: Drive) -> None:
@@ -79,10 +98,11 @@ def report(drive: Drive) -> None:
     pose, true_pose = drive.pose, drive.true_pose
     error_mm = 1000 * math.dist((pose.x_m, pose.y_m), (true_pose.x_m, true_pose.y_m))
     error_deg = abs(_degrees(pose.yaw_rad - true_pose.yaw_rad))
+    imu = "" if drive.imu_hz is None else f"imu {drive.imu_hz:.1f} Hz, "
     laps = f"{drive.laps:g} lap{'' if drive.laps == 1.0 else 's'}"
     text = [
         f"driven      {drive.way_m:.2f} m in {drive.seconds:.1f} s, {laps}",
-        f"received    imu {drive.imu_hz:.1f} Hz, odom {drive.odom_hz:.1f} Hz",
+        f"received    {imu}odom {drive.odom_hz:.1f} Hz",
         *(
             f"{name:<10}{p.x_m:8.3f} m {p.y_m:8.3f} m {_degrees(p.yaw_rad):7.1f}°"
             for name, p in (("odometry", pose), ("truth", true_pose))
@@ -93,4 +113,4 @@ def report(drive: Drive) -> None:
     if sys.stdout.isatty():
         rows = zip_longest(draw_path(drive.points, 24, 12).rows, ["", "", "", *text], fillvalue="")
         text = ["", *(f"{drawn:28}{line}".rstrip() for drawn, line in rows)]
-    print(*text, CLOSING, sep="\n")
+    print(*text, CLOSING + drive.real, sep="\n")

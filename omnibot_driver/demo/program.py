@@ -3,6 +3,7 @@
 """A module of ours as a process of its own. Knows processes; must not know what they do."""
 
 import ctypes
+import os
 import select
 import signal
 import subprocess
@@ -25,13 +26,13 @@ class Program:
 
     def __init__(self, name: str, *arguments: str, console: bool = False) -> None:
         self._name = name
+        self._heard = b""
         self._log = tempfile.TemporaryFile("a+")  # noqa: SIM115, it lives as long as we do
         self._process = subprocess.Popen(
             [sys.executable, "-m", f"omnibot_driver.{name}", *arguments],
             stdin=subprocess.PIPE if console else subprocess.DEVNULL,
             stdout=subprocess.PIPE if console else self._log,
             stderr=self._log,
-            text=True,
             start_new_session=True,
             preexec_fn=end_with_parent,
         )
@@ -56,18 +57,21 @@ class Program:
         if (code := self._process.poll()) is not None:
             raise self.failure(f"the {self._name} ended with code {code}")
 
-    def ask(self, question: str) -> str:
-        """The next line from its console. Raises DemoFailed when there is none."""
+    def ask(self, question: str = "") -> str:
+        """The next line from its console, after saying this. Raises DemoFailed without one."""
         stdin, stdout = self._process.stdin, self._process.stdout
         if stdin is None or stdout is None:
             raise ValueError(f"the {self._name} has no console")
         self.check()
-        stdin.write(question)
+        stdin.write(question.encode())
         stdin.flush()
-        readable, _, _ = select.select([stdout], [], [], PATIENCE_S)
-        if not readable or not (answer := stdout.readline()):
-            raise self.failure(f"the {self._name} does not answer")
-        return answer.strip()
+        while b"\n" not in self._heard:
+            readable, _, _ = select.select([stdout], [], [], PATIENCE_S)
+            if not readable or not (data := os.read(stdout.fileno(), 4096)):
+                raise self.failure(f"the {self._name} does not answer")
+            self._heard += data
+        answer, _, self._heard = self._heard.partition(b"\n")
+        return answer.decode().strip()
 
 
 def end_with_parent() -> None:

@@ -18,24 +18,29 @@ from std_msgs.msg import Bool, String
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.demo.display import status_row
-from omnibot_driver.demo.square import HALT, steer
+from omnibot_driver.demo.square import HALT, steer, steer_ahead
 from omnibot_driver.tools.monitor.rates import Rate
 
 REMEMBERED = 1000
 """Poses: some laps of them."""
+ENOUGH_IMU_HZ, ENOUGH_ODOM_HZ = 20, 8
+"""Less than any board sends, more than comes before a driver has settled."""
 
 
 class Robot:
     """The robot as a ROS program has it: topics in, ``cmd_vel`` out.
 
     Every other odometry message is answered with a command; unless ``driving``, with a halt.
+    ``imu``: it has one; ``sideways``: it can drive along its y axis.
     """
 
-    def __init__(self, namespace: str) -> None:
+    def __init__(self, namespace: str, *, imu: bool = True, sideways: bool = True) -> None:
+        self._steer = steer if sideways else steer_ahead
         self.driving = False
         self.leg, self.driven_m, self.pose = 0, 0.0, Pose()
         self.points: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
-        self.imu, self.odom = Rate(time.monotonic()), Rate(time.monotonic())
+        self.imu = Rate(time.monotonic()) if imu else None
+        self.odom = Rate(time.monotonic())
         self._state, self._estop = "starting", False
         self._commanded = self._measured = HALT
         self._stood_for = 0
@@ -46,7 +51,8 @@ class Robot:
         self.close = rclpy.try_shutdown
         self._node = node = rclpy.create_node("demo", namespace=namespace)
         self._cmd_vel = node.create_publisher(Twist, "cmd_vel", 1)
-        node.create_subscription(Imu, "imu/data_raw", self._on_imu, 50)
+        if imu:
+            node.create_subscription(Imu, "imu/data_raw", self._on_imu, 50)
         node.create_subscription(Odometry, "odom", self._on_odom, 50)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         node.create_subscription(String, "omnibot_driver/state", self._on_state, latched)
@@ -61,9 +67,12 @@ class Robot:
     def missing(self) -> list[str]:
         """What a robot that can drive has and this one has not."""
         now_s = time.monotonic()
-        now_hz = {"imu/data_raw": self.imu.hz(now_s), "odom": self.odom.hz(now_s)}
-        wanted_hz = {"imu/data_raw": 50, "odom": 12}
-        missing = [f"{name} ({hz:.0f} Hz)" for name, hz in now_hz.items() if hz < wanted_hz[name]]
+        topics = [("imu/data_raw", self.imu, ENOUGH_IMU_HZ), ("odom", self.odom, ENOUGH_ODOM_HZ)]
+        missing = [
+            f"{name} ({hz:.0f} Hz)"
+            for name, rate, enough_hz in topics
+            if rate is not None and (hz := rate.hz(now_s)) < enough_hz
+        ]
         return missing if self._state == "nominal" else [*missing, f"nominal state ({self._state})"]
 
     def watched(self) -> bool:
@@ -77,7 +86,8 @@ class Robot:
     def row(self) -> str:
         """The row that tells how it is."""
         now_s = time.monotonic()
-        rates_hz = (round(self.imu.hz(now_s)), round(self.odom.hz(now_s)))
+        imu_hz = None if self.imu is None else round(self.imu.hz(now_s))
+        rates_hz = (imu_hz, round(self.odom.hz(now_s)))
         state = "e-stop" if self._estop else self._state
         return status_row(state, rates_hz, self.leg, self.pose, self._commanded, self._measured)
 
@@ -88,7 +98,8 @@ class Robot:
         self._estop = message.data
 
     def _on_imu(self, _message: Imu) -> None:
-        self.imu.arrived(time.monotonic())
+        if self.imu is not None:
+            self.imu.arrived(time.monotonic())
 
     def _on_odom(self, message: Odometry) -> None:
         self.odom.arrived(time.monotonic())
@@ -106,7 +117,7 @@ class Robot:
     def _command(self) -> None:
         self._commanded = HALT
         if self.driving:
-            self.leg, self._commanded = steer(self.pose, self.leg)
+            self.leg, self._commanded = self._steer(self.pose, self.leg)
         message = Twist()
         message.linear.x, message.linear.y = self._commanded.vx_mps, self._commanded.vy_mps
         message.angular.z = self._commanded.yaw_rate_radps

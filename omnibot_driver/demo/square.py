@@ -18,6 +18,8 @@ CORNER_M: Final = 0.01
 """From this distance on, a corner counts as reached."""
 GAIN_PER_S: Final = 3.0
 """Speed per distance: to the corner ahead, and to where the robot should be."""
+ON_COURSE_RAD: Final = 0.3
+"""A robot that is turned further from where it is to go turns on the spot."""
 HALT: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
@@ -27,12 +29,9 @@ def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
     Legs are counted from 0 without end: +x, +y, -x, -y in the odometry frame. On every other leg
     the robot turns a quarter to the left, and back on the next, while it drives straight ahead.
     """
+    leg, along_m, aside_m = _progress(pose, leg)
     direction_rad = leg % 4 * QUARTER_RAD
-    from_centre = Pose(pose.x_m - SIDE_M / 2, pose.y_m - SIDE_M / 2).turned(-direction_rad)
-    along_m, aside_m = from_centre.x_m + SIDE_M / 2, from_centre.y_m + SIDE_M / 2
-    if SIDE_M - along_m <= CORNER_M:
-        return steer(pose, leg + 1)
-    ahead = min(SPEED_MPS, max(CREEP_MPS, GAIN_PER_S * (SIDE_M - along_m)))
+    ahead = _speed_mps(along_m)
     ahead, aside = shorten((ahead, -GAIN_PER_S * aside_m), SPEED_MPS)
     turned = max(0.0, along_m / SIDE_M)
     yaw_rad, sign = (QUARTER_RAD * turned, 1) if leg % 2 == 0 else (QUARTER_RAD * (1 - turned), -1)
@@ -41,3 +40,24 @@ def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
     velocity = Pose(ahead, aside).turned(direction_rad - pose.yaw_rad)
     yaw_rate = max(-YAW_RATE_RADPS, min(YAW_RATE_RADPS, yaw_rate))
     return leg, BodyTwist(velocity.x_m, velocity.y_m, yaw_rate)
+
+
+def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
+    """The same for a robot that cannot drive sideways: it turns on the spot at each corner."""
+    leg, along_m, aside_m = _progress(pose, leg)
+    course_rad = leg % 4 * QUARTER_RAD - math.atan2(GAIN_PER_S * aside_m, 2 * SPEED_MPS)
+    error_rad = math.remainder(course_rad - pose.yaw_rad, math.tau)
+    yaw_rate = max(-YAW_RATE_RADPS, min(YAW_RATE_RADPS, GAIN_PER_S * error_rad))
+    ahead = _speed_mps(along_m) if abs(error_rad) <= ON_COURSE_RAD else 0.0
+    return leg, BodyTwist(ahead, 0.0, yaw_rate)
+
+
+def _progress(pose: Pose, leg: int) -> tuple[int, float, float]:
+    """The leg to be on, how far it is driven, and how far to its left the robot is, in m."""
+    turned = Pose(pose.x_m - SIDE_M / 2, pose.y_m - SIDE_M / 2).turned(-(leg % 4) * QUARTER_RAD)
+    along_m, aside_m = turned.x_m + SIDE_M / 2, turned.y_m + SIDE_M / 2
+    return _progress(pose, leg + 1) if SIDE_M - along_m <= CORNER_M else (leg, along_m, aside_m)
+
+
+def _speed_mps(along_m: float) -> float:
+    return min(SPEED_MPS, max(CREEP_MPS, GAIN_PER_S * (SIDE_M - along_m)))

@@ -84,8 +84,8 @@ def _add_board(parser: argparse.ArgumentParser) -> None:
 def _parser(module: SimulatorModule) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="simulator",
-        description=f"A simulated {module.TITLE}. Prints where it listens, a line for each of its"
-        " ports: the path of a pseudo-terminal, or udp://127.0.0.1:PORT.",
+        description=f"A simulated {module.TITLE} board.\nPrints where it listens, a line for each"
+        " of its ports: the path of a\npseudo-terminal, or udp://127.0.0.1:PORT.",
         epilog="Commands on standard input:\n" + _CONSOLE_HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -115,7 +115,7 @@ def _hints(module: SimulatorModule, name: str, served: ServedBoard[SimulatedBoar
     board = "" if name == options.DEFAULT_BOARD else f"-p board:={name} "
     ports = " ".join(f"-p {c.parameter}:={place}" for c, place in places if c.parameter)
     return (
-        f"A simulated {module.TITLE} listens on {', '.join(place for _, place in places)}. "
+        f"A simulated {module.TITLE} board listens on {', '.join(place for _, place in places)}. "
         "In another terminal:\n"
         f"  ros2 run omnibot_driver driver --ros-args {board}{ports}\n"
         "Type help for the commands here; ctrl-C ends it."

@@ -13,6 +13,7 @@ import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -20,10 +21,13 @@ from hypothesis import strategies as st
 from pseudo_terminal import PseudoTerminal
 
 import omnibot_driver
+from omnibot_driver import boards
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.demo import display, square
 from omnibot_driver.demo.__main__ import main
+from omnibot_driver.demo.capability import Capability
+from omnibot_driver.demo.capability import of as capability_of
 
 PATIENCE_S = 60.0
 ROOT = Path(omnibot_driver.__file__).parents[1]
@@ -42,6 +46,16 @@ def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> 
     assert abs(twist.yaw_rate_radps) <= square.YAW_RATE_RADPS
 
 
+@given(poses, st.integers(0, 1000))
+def test_a_robot_that_cannot_drive_sideways_is_never_told_to(pose: Pose, leg: int) -> None:
+    """It drives ahead or turns, and is never stopped."""
+    _, twist = square.steer_ahead(pose, leg)
+    assert twist.vy_mps == 0.0
+    assert 0.0 <= twist.vx_mps <= square.SPEED_MPS
+    assert abs(twist.yaw_rate_radps) <= square.YAW_RATE_RADPS
+    assert twist.vx_mps > 0.0 or abs(twist.yaw_rate_radps) > 0.1
+
+
 @given(st.integers(0, 1000), st.floats(0.0, 0.009), st.floats(-math.pi, math.pi))
 def test_a_corner_turns_the_robot_to_the_next_side(leg: int, before_m: float, yaw: float) -> None:
     """Close to the corner that ends a leg, the velocity points along the next leg."""
@@ -54,15 +68,18 @@ def test_a_corner_turns_the_robot_to_the_next_side(leg: int, before_m: float, ya
     assert abs(math.remainder(heading - direction - math.pi / 2, math.tau)) < 0.15
 
 
+@pytest.mark.parametrize(("steer", "yaw_at_the_end"), [(square.steer, 0), (square.steer_ahead, 3)])
 @settings(max_examples=20)
 @given(st.floats(-0.02, 0.02), st.floats(-0.02, 0.02), st.floats(-0.1, 0.1))
-def test_the_square_closes(x_m: float, y_m: float, yaw_rad: float) -> None:
+def test_the_square_closes(
+    steer: Any, yaw_at_the_end: int, x_m: float, y_m: float, yaw_rad: float
+) -> None:
     """A robot that answers after 0.1 s passes all corners and ends a lap where it belongs."""
     pose, leg, step_s, lag_s = Pose(x_m, y_m, yaw_rad), 0, 0.08, 0.1
     moving = BodyTwist(0.0, 0.0, 0.0)
     nearest = [math.inf] * 4
-    for _ in range(round(30.0 / step_s)):
-        leg, wanted = square.steer(pose, leg)
+    for _ in range(round(40.0 / step_s)):
+        leg, wanted = steer(pose, leg)
         if leg == 4:
             break
         moving = BodyTwist(
@@ -83,7 +100,7 @@ def test_the_square_closes(x_m: float, y_m: float, yaw_rad: float) -> None:
         ]
     assert leg == 4
     assert max(nearest) < 0.02
-    assert abs(math.remainder(pose.yaw_rad, math.tau)) < 0.05
+    assert abs(math.remainder(pose.yaw_rad - yaw_at_the_end * math.pi / 2, math.tau)) < 0.05
 
 
 @given(poses, st.integers(0, 10_000), coordinates, st.sampled_from(["nominal", "disconnected"]))
@@ -94,6 +111,7 @@ def test_a_status_row_stands_under_its_heading(
     twist = BodyTwist(speed, -speed, speed / 10)
     row = display.status_row(state, (100, 25), leg, pose, twist, twist)
     assert len(row) == len(display.HEADING.splitlines()[-1]) < 80
+    assert len(display.status_row(state, (None, 25), leg, pose, twist, twist)) == len(row)
 
 
 @contextmanager
@@ -178,9 +196,56 @@ def test_laps_are_told_in_english(
             pose=Pose(),
             true_pose=Pose(),
             points=[],
+            real="-p port:=/dev/ttyUSB0",
         )
     )
     assert f" s, {told}\n" in capsys.readouterr().out
+
+
+def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Nothing is said of an IMU, and the real robot's driver is told which board it is."""
+    real = "-p board:=cart -p port:=/dev/ttyUSB0"
+    cart = Capability(title="cart", imu=False, sideways=False, ports=("port",), real=real)
+    display.introduce(cart, (" --board cart", "-p board:=cart -p port:=/dev/pts/1"), "/d", "X=1", 9)
+    display.report(
+        display.Drive(
+            seconds=20.0,
+            way_m=4.0,
+            laps=1.0,
+            imu_hz=None,
+            odom_hz=20.0,
+            pose=Pose(),
+            true_pose=Pose(),
+            points=[],
+            real=real,
+        )
+    )
+    told = capsys.readouterr().out
+    assert "A simulated cart drives a square of 1 m, turning at its corners." in told
+    assert "imu/" not in told
+    assert "imu " not in told
+    assert "received    odom 20.0 Hz\n" in told
+    assert told.endswith(f"--ros-args {real}\n")
+
+
+@pytest.mark.parametrize("name", boards.PROFILES)
+def test_every_board_has_a_demo(name: str) -> None:
+    """What it needs to know of the board can be asked."""
+    capability = capability_of(name)
+    assert any(capability.ports)
+    assert capability.title
+
+
+def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Before anything starts."""
+    assert main(["--board", "zeppelin"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("demo: parameter 'board' must be one of omnibot")
+    assert told.count("\n") == 1
 
 
 def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,7 +65,7 @@ class SimulatorModule(Protocol):
     """What the package of a simulated board offers by these names."""
 
     TITLE: str
-    """What it simulates, as in "A simulated ... listens on"."""
+    """What it simulates, as in "A simulated ... board listens on"."""
     CHANNELS: tuple[Channel, ...]
     """Those of its boards."""
 

@@ -20,7 +20,7 @@ from omnibot_driver.simulator.omnibot.receivers import ReceiverKind
 from omnibot_driver.simulator.omnibot.settings import BoardPose, BoardSettings
 from omnibot_driver.simulator.omnibot.world import TruePose
 
-TITLE = "OmniBot board"
+TITLE = "OmniBot"
 
 __all__ = [
     "CHANNELS",
