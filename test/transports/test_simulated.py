@@ -13,7 +13,6 @@ from toy_udp import ToyServer
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.simulator.common.running import UNREAD_LIMIT
-from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 from omnibot_driver.transports.simulated import (
     UNREAD_DATAGRAMS,
     InProcessBoard,
@@ -22,7 +21,7 @@ from omnibot_driver.transports.simulated import (
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
-OMNIBOT = "omnibot_driver.simulator.omnibot"
+TOY = "toy_lines"
 PATIENCE_S = 20.0
 
 
@@ -43,29 +42,21 @@ def read(transport: SimulatedTransport, wanted: int, channel: int = 0) -> bytes:
     return data
 
 
-def test_a_board_boots_and_obeys(stack: ExitStack) -> None:
-    """It says that it is paused, and sends data once it is woken and started."""
-    transport = stack.enter_context(closing(SimulatedTransport("sim://", OMNIBOT)))
-    assert read(transport, 11) == b"Paused: 0 \n"
-    transport.write([(0, bytes(8)), (0, b"S")])
-    assert read(transport, 2)[:2] == b"\xff\xfa"
-
-
 def test_it_needs_no_guard_and_no_kernel() -> None:
     """It ends with this process, has no descriptors, and counts no overruns."""
-    with closing(SimulatedTransport("sim://", OMNIBOT)) as transport:
+    with closing(SimulatedTransport("sim://", TOY)) as transport:
         assert transport.ends_with_us
         assert (transport.descriptors, transport.overruns) == (None, None)
 
 
 def test_a_read_ends_without_a_packet() -> None:
     """When its time is over."""
-    assert InProcessBoard(SimulatedBoard()).read(0.01) == (0, b"")
+    assert InProcessBoard(ToyServer()).read(0.01) == (0, b"")
 
 
 def test_a_read_that_waits_can_be_interrupted() -> None:
     """Closing a driver does not wait for the next notice of a paused board."""
-    board = InProcessBoard(SimulatedBoard())
+    board = InProcessBoard(ToyServer())
     canceller = threading.Timer(0.02, board.cancel)
     canceller.start()
     assert board.read(PATIENCE_S) == (0, b"")
@@ -76,7 +67,7 @@ def test_a_read_that_waits_can_be_interrupted() -> None:
 
 def test_after_closing_nothing_is_read_and_nothing_written() -> None:
     """As with a port that is gone; closing again is harmless."""
-    transport = SimulatedTransport("sim://", OMNIBOT)
+    transport = SimulatedTransport("sim://", TOY)
     transport.close()
     transport.close()
     transport.interrupt()
@@ -86,41 +77,15 @@ def test_after_closing_nothing_is_read_and_nothing_written() -> None:
         transport.write([(0, b"S")])
 
 
-@pytest.mark.parametrize(
-    ("url", "why"),
-    [
-        ("sim://?wheels=4", "there is no option 'wheels=4'"),
-        ("sim://?imu", "there is no option 'imu'"),
-        ("sim://?lose=2", "'2' is no probability: give a number from 0 to 1"),
-        ("sim://?seed=first", "invalid int value: 'first'"),
-        ("sim://?imu_only=maybe", "--imu-only: ignored explicit argument 'maybe'"),
-        ("sim://imu_only", "'imu_only' must come after a question mark"),
-    ],
-)
-def test_options_that_it_does_not_know_are_refused(url: str, why: str) -> None:
-    """By a sentence that names the option, the whole list and an example."""
-    with pytest.raises(LinkError) as refusal:
-        SimulatedTransport(url, OMNIBOT)
-    assert why in str(refusal.value)
-    assert "simulator --help" in str(refusal.value)
-
-
-def test_the_options_of_another_board_are_asked_of_that_board() -> None:
-    """The sentence names the command line that lists them."""
-    with pytest.raises(LinkError, match="simulator --board toy_lines --help"):
-        SimulatedTransport("sim://?imu_only", "toy_lines")
-
-
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """It keeps what a terminal would, and the oldest of it."""
-    served = InProcessBoard(SimulatedBoard(BoardSettings(running=True)))
-    sent = b""
-    while not served.dropped:
-        data = served.board.step()
-        sent += data
-        served.dropped += len(data) - served._send(0, data)
-    assert served.unread() == UNREAD_LIMIT
-    assert served.read(0) == (0, sent[:UNREAD_LIMIT])
+    """It keeps what a terminal would of each channel, and the oldest of it."""
+    served = InProcessBoard(toy_lines.ToyLines())
+    taken = [served._send(toy_lines.FRONT, bytes([number]) * 1000) for number in range(6)]
+    assert taken == [1000, 1000, 1000, 1000, UNREAD_LIMIT - 4000, 0]
+    assert served._send(toy_lines.DRIVE, b"odo") == 3
+    assert served.unread(toy_lines.FRONT) == UNREAD_LIMIT
+    channel, data = served.read(0)
+    assert (channel, len(data), data[-1]) == (toy_lines.FRONT, UNREAD_LIMIT, 4)
 
 
 def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
@@ -133,20 +98,39 @@ def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
 
 def test_channels_are_told_apart_in_the_order_of_the_board(stack: ExitStack) -> None:
     """What came on another channel in between is not joined."""
-    transport = stack.enter_context(closing(SimulatedTransport("sim://", "toy_lines")))
+    transport = stack.enter_context(closing(SimulatedTransport("sim://", TOY)))
     transport.write([(toy_lines.FRONT, b"angle 30\n"), (toy_lines.DRIVE, b"go 0.5 0\n")])
     assert b"30" in read(transport, 200, toy_lines.FRONT)
     assert b"odo" in read(transport, 10, toy_lines.DRIVE)
 
 
-def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is raised with its cause, and not taken for a lost cable."""
+@pytest.mark.parametrize(
+    ("url", "why"),
+    [
+        ("sim://?imu_only", "there is no option 'imu-only'"),
+        ("sim://?ang=30", "there is no option 'ang=30'"),
+        ("sim://?angle=wide", "invalid float value: 'wide'"),
+        ("sim://?lose=2", "'2' is no probability: give a number from 0 to 1"),
+        ("sim://angle", "'angle' must come after a question mark"),
+    ],
+)
+def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -> None:
+    """The sentence names the command line that lists them."""
+    with pytest.raises(LinkError) as refusal:
+        SimulatedTransport(url, TOY)
+    assert f"port '{url}' is not understood: " in str(refusal.value)
+    assert why in str(refusal.value)
+    assert "simulator --board toy_lines --help" in str(refusal.value)
 
-    def explode(_board: SimulatedBoard) -> bytes:
+
+def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is raised with its cause, and not taken for a lost cable; the board still closes."""
+
+    def explode(_board: toy_lines.ToyLines) -> list[tuple[int, bytes]]:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(SimulatedBoard, "step", explode)
-    transport = SimulatedTransport("sim://", OMNIBOT)
+    monkeypatch.setattr(toy_lines.ToyLines, "advance", explode)
+    transport = SimulatedTransport("sim://", TOY)
     with pytest.raises(RuntimeError, match="thread died") as defect:
         read(transport, 1)
     assert isinstance(defect.value.__cause__, ZeroDivisionError)

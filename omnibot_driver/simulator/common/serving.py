@@ -118,6 +118,11 @@ class PtyBoard(ServedBoard[B]):
         """Of the pseudo-terminal; empty until it is opened."""
         return self.addresses[0] if self._carriers else ""
 
+    @property
+    def line(self) -> Line:
+        """What the board's bytes go through."""
+        return self._wired.lines[0]
+
 
 def open_carriers(
     channels: Sequence[Channel], links: Sequence[str | Path] = (), udp_port: int = 0
@@ -150,6 +155,7 @@ def _one_for_each(names: Sequence[str], links: Sequence[str | Path]) -> Sequence
     if not names:
         raise OSError("this board has no serial port that a link could lead to")
     raise OSError(
-        f"{len(links)} links do not fit a board with {len(names)} serial ports:"
+        f"{len(links)} links do not fit a board with {len(names)} serial port"
+        f"{'s' if len(names) > 1 else ''}:"
         " give one --link, or one for each port"
     )

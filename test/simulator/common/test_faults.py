@@ -3,11 +3,13 @@
 """The bad line of the simulated board."""
 
 import pytest
+import toy_lines
+import toy_udp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.simulator.__main__ import main
-from omnibot_driver.simulator.omnibot import FaultyLine, LineFaults
+from omnibot_driver.simulator.common import options
+from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
 
 SENT = bytes(range(256)) * 400
 
@@ -61,8 +63,15 @@ def test_a_flip_changes_one_bit_and_no_length() -> None:
 
 
 @pytest.mark.parametrize("rate", ["-0.1", "1.1", "nan", "often"])
-def test_a_rate_that_is_no_chance_is_refused(rate: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_rate_that_is_no_chance_is_refused(rate: str) -> None:
     """With a sentence, before anything starts."""
-    with pytest.raises(SystemExit):
-        main(["--lose", rate])
-    assert "give a number from 0 to 1" in capsys.readouterr().err
+    for name, toy in (("lose", toy_lines), ("flip", toy_lines), ("duplicate", toy_udp)):
+        with pytest.raises(options.OptionError, match="give a number from 0 to 1"):
+            options.from_words([f"--{name}={rate}"], toy)
+
+
+@pytest.mark.parametrize("delay", ["-0.1", "61", "nan", "long"])
+def test_a_delay_that_nobody_waits_for_is_refused(delay: str) -> None:
+    """A minute is the longest."""
+    with pytest.raises(options.OptionError, match="give seconds from 0 to 60"):
+        options.from_words([f"--delay={delay}"], toy_udp)

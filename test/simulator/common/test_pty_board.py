@@ -1,89 +1,55 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board in real time behind a real pseudo-terminal."""
+"""Any board of one line in real time behind a real pseudo-terminal."""
 
 import os
-import select
-import time
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from omnibot_driver.simulator.common.board import Channel, Packet
 from omnibot_driver.simulator.common.running import UNREAD_LIMIT
-from omnibot_driver.simulator.omnibot import BoardMode, BoardSettings, PtyBoard, SimulatedBoard
+from omnibot_driver.simulator.common.serving import PtyBoard
 
 PATIENCE_S = 20.0
-RUNNING = BoardSettings(running=True)
 
 
-def read_until(descriptor: int, wanted: bytes) -> bytes:
-    """What comes out of a descriptor up to the first chunk that holds the wanted bytes."""
-    data = b""
-    deadline_s = time.monotonic() + PATIENCE_S
-    while wanted not in data:
-        ready, _, _ = select.select([descriptor], [], [], deadline_s - time.monotonic())
-        assert ready, f"{wanted!r} did not come, only {data[-100:]!r}"
-        data += os.read(descriptor, 4096)
-    return data
+class Ticker:
+    """Says its tick in every one, in 26 bytes; ``sent`` is all that it said."""
 
+    channels, tick_s = (Channel(),), 0.01
 
-def is_in(mode: BoardMode) -> Callable[[SimulatedBoard], bool]:
-    """A predicate: the board is in this mode."""
-    return lambda board: board.mode is mode
+    def __init__(self) -> None:
+        self.tick = 0
+        self.sent = bytearray()
 
+    def receive(self, data: bytes, now: float, channel: int) -> None:
+        """It does not listen."""
 
-def test_a_program_can_wake_start_and_stop_the_board_through_the_terminal() -> None:
-    """Bytes pass both ways unchanged, FF and line feeds included."""
-    with PtyBoard(SimulatedBoard()) as pty:
-        port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
-        try:
-            assert read_until(port, b"\n").startswith(b"Paused: 0 \n")
-            opening = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00") + b"S"
-            os.write(port, opening)
-            read_until(port, b"\xff\xfb")
-            assert pty.wait_for(is_in(BoardMode.NOMINAL), PATIENCE_S)
-            with pty.lock:
-                assert pty.board.received == opening
-        finally:
-            os.close(port)
+    def advance(self) -> list[Packet]:
+        self.tick += 1
+        said = b"%25d\n" % self.tick
+        self.sent += said
+        return [(0, said)]
 
+    def reboot(self) -> None:
+        """It never boots."""
 
-def test_the_stream_read_is_the_stream_sent() -> None:
-    """No byte is changed, added or lost while somebody reads."""
-    with PtyBoard(SimulatedBoard(RUNNING)) as pty:
-        port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
-        try:
-            data = b""
-            while len(data) < 1000:
-                data += os.read(port, 4096)
-        finally:
-            os.close(port)
-        with pty.lock:
-            sent = b"".join(frame.data for frame in pty.board.sent)
-            assert pty.dropped == 0
-    assert sent.startswith(data)
-
-
-def test_the_terminal_outlives_the_program_that_opened_it() -> None:
-    """A second program finds the board as the first one left it."""
-    with PtyBoard(SimulatedBoard(RUNNING)) as pty:
-        for letter, mode in ((b"P", BoardMode.PAUSED), (b"S", BoardMode.NOMINAL)):
-            port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
-            os.write(port, letter)
-            os.close(port)
-            assert pty.wait_for(is_in(mode), PATIENCE_S)
+    @property
+    def facts(self) -> dict[str, object]:
+        return {"tick": self.tick}
 
 
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
     """The board runs on; what is left unread is what a terminal holds, and it is the oldest."""
-    with PtyBoard(SimulatedBoard(RUNNING)) as pty:
+    with PtyBoard(Ticker()) as pty:
         assert pty.wait_for(lambda board: pty.dropped > 100, PATIENCE_S)
         port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
             with pty.lock:
-                sent = b"".join(frame.data for frame in pty.board.sent)
+                sent = bytes(pty.board.sent)
                 held = len(sent) - pty.dropped
                 data = os.read(port, 8192)
         finally:
@@ -111,18 +77,18 @@ class Clock:
         self.now_s += timeout_s
         return [], [], []
 
-    def board(self, cost_s: Callable[[int], float]) -> SimulatedBoard:
+    def board(self, cost_s: Callable[[int], float]) -> Ticker:
         """A board that takes this long to make its n-th tick."""
         clock = self
 
-        class SlowBoard(SimulatedBoard):
-            def step(self) -> bytes:
+        class SlowBoard(Ticker):
+            def advance(self) -> list[Packet]:
                 clock.at_ticks.append(clock.now_s)
-                data = super().step()
+                packets = super().advance()
                 clock.now_s += cost_s(self.tick)
-                return data
+                return packets
 
-        return SlowBoard(RUNNING)
+        return SlowBoard()
 
 
 def test_a_slow_machine_delays_ticks_but_does_not_make_the_time_drift(
@@ -146,15 +112,15 @@ def test_a_long_standstill_is_not_made_up_for(monkeypatch: pytest.MonkeyPatch) -
 
 def test_waiting_for_what_does_not_come_ends_with_false() -> None:
     """A predicate that never holds is given up."""
-    with PtyBoard(SimulatedBoard(RUNNING)) as pty:
+    with PtyBoard(Ticker()) as pty:
         assert not pty.wait_for(lambda board: False, 0.05)
 
 
 def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
     """An exception in the thread is not swallowed; it is the cause of what is raised."""
 
-    class BrokenBoard(SimulatedBoard):
-        def step(self) -> bytes:
+    class BrokenBoard(Ticker):
+        def advance(self) -> list[Packet]:
             raise ZeroDivisionError
 
     pty = PtyBoard(BrokenBoard())
@@ -170,31 +136,31 @@ def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
 @pytest.mark.usefixtures("nothing_left_behind")
 def test_no_thread_and_no_descriptor_is_left_behind() -> None:
     """After the exit the process holds what it held before."""
-    with PtyBoard(SimulatedBoard(RUNNING)) as pty:
+    with PtyBoard(Ticker()) as pty:
         assert pty.wait_for(lambda board: board.tick > 2, PATIENCE_S)
 
 
 def test_a_link_leads_to_the_terminal_and_goes_with_it(tmp_path: Path) -> None:
     """The symbolic link exists exactly as long as the board runs."""
-    link = tmp_path / "omnibot"
-    with PtyBoard(SimulatedBoard(RUNNING), str(link)) as pty:
+    link = tmp_path / "board"
+    with PtyBoard(Ticker(), str(link)) as pty:
         assert os.readlink(link) == pty.path
     assert not link.is_symlink()
 
 
 def test_a_dead_link_is_replaced(tmp_path: Path) -> None:
     """What a killed simulator left behind does not stand in the way."""
-    link = tmp_path / "omnibot"
+    link = tmp_path / "board"
     link.symlink_to("/dev/pts/no-such-terminal")
-    with PtyBoard(SimulatedBoard(RUNNING), str(link)) as pty:
+    with PtyBoard(Ticker(), str(link)) as pty:
         assert os.readlink(link) == pty.path
 
 
 def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
     """A second simulator on the same link keeps it when the first one ends."""
-    link = tmp_path / "omnibot"
-    with PtyBoard(SimulatedBoard(RUNNING), str(link)):
-        second = PtyBoard(SimulatedBoard(RUNNING), str(link))
+    link = tmp_path / "board"
+    with PtyBoard(Ticker(), str(link)):
+        second = PtyBoard(Ticker(), str(link))
         second.__enter__()
     try:
         assert os.readlink(link) == second.path
@@ -214,7 +180,7 @@ def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> N
     before = len(os.listdir("/proc/self/fd"))
     with (
         pytest.raises(FileExistsError, match="choose another name"),
-        PtyBoard(SimulatedBoard(RUNNING), str(link)),
+        PtyBoard(Ticker(), str(link)),
     ):
         pass
     assert precious.read_text() == "data"
@@ -225,6 +191,6 @@ def test_a_link_that_cannot_be_made_is_named_with_what_to_do(tmp_path: Path) -> 
     """Its folder does not exist."""
     with (
         pytest.raises(FileNotFoundError, match=r"nowhere/board .*choose a folder that exists"),
-        PtyBoard(SimulatedBoard(), tmp_path / "nowhere/board"),
+        PtyBoard(Ticker(), tmp_path / "nowhere/board"),
     ):
         pass

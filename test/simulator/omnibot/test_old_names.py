@@ -11,7 +11,7 @@ import pytest
 from omnibot_driver import simulator
 from omnibot_driver.simulator import omnibot
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.parametrize("name", simulator.__all__)
