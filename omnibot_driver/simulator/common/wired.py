@@ -35,6 +35,11 @@ class WiredBoard(Generic[B]):
         matching = [isinstance(line, FaultyNetwork) for line in self.lines]
         if matching != [channel.datagrams for channel in board.channels]:
             raise ValueError(f"{len(self.lines)} lines do not match {board.channels}")
+        self._networks = [
+            (channel, line)
+            for channel, line in enumerate(self.lines)
+            if isinstance(line, FaultyNetwork)
+        ]
         self._ticks = 0
         self._board_began_s = 0.0
 
@@ -51,9 +56,8 @@ class WiredBoard(Generic[B]):
     def advance(self) -> list[Packet]:
         """Let one tick pass; what arrives of what the board sends and has sent."""
         self._ticks += 1
-        for channel, line in enumerate(self.lines):
-            if isinstance(line, FaultyNetwork):
-                self._hand_over(channel, line)
+        for channel, network in self._networks:
+            self._hand_over(channel, network)
         arrived = []
         for channel, data in self.board.advance():
             line = self.lines[channel]
@@ -61,9 +65,8 @@ class WiredBoard(Generic[B]):
                 line.from_board.send(data, self._time_s)
             elif data := line.carry(data):
                 arrived.append((channel, data))
-        for channel, line in enumerate(self.lines):
-            if isinstance(line, FaultyNetwork):
-                arrived += [(channel, part) for part in line.from_board.arrived(self._time_s)]
+        for channel, network in self._networks:
+            arrived += [(channel, data) for data in network.from_board.arrived(self._time_s)]
         return arrived
 
     @property
