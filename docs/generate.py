@@ -7,21 +7,25 @@ Each text is a function of the code alone, so whoever changes the code sees what
 
 import textwrap
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 import mode_diagram
 
+from omnibot_driver import boards
 from omnibot_driver.core.board import Mode
 from omnibot_driver.core.omnibot.modes import TRANSITIONS
-from omnibot_driver.parameters import SECTIONS, Parameter, Value
+from omnibot_driver.parameters import Parameter, Value
 
 ROOT: Final = Path(__file__).resolve().parent.parent
 PARAMETERS_INTRODUCTION: Final = """\
 # Parameters
 
 Give them one by one (`--ros-args -p max_linear_speed:=0.3`) or in a file:
-[config/driver.yaml](../config/driver.yaml) has them all. *Dynamic* ones can be set while the driver
+`config/<board>.yaml` has all that a board has, [omnibot.yaml](../config/omnibot.yaml) for the
+OmniBot. `board` (default `omnibot`) is read first; a parameter that another board has and this one
+has not is refused with a sentence that says whose it is. *Dynamic* ones can be set while the driver
 runs (`ros2 param set /omnibot_driver max_linear_speed 0.3`) and count at once; *fixed* ones are
 given at the start. An unknown name, a wrong type or a value out of its range is refused with a
 sentence that says what would be right.
@@ -34,16 +38,16 @@ it over without a word.
 TYPES: Final = {bool: "bool", int: "int", float: "double", str: "string"}
 
 
-def driver_yaml() -> str:
-    """config/driver.yaml: every parameter with its default, and in a comment what it may be."""
+def parameter_file(board: str) -> str:
+    """config/<board>.yaml: every parameter with its default, and in a comment what it may be."""
     lines = [
-        "# Every parameter of the driver, with its default. Give the file with",
-        "#   ros2 run omnibot_driver driver --ros-args --params-file driver.yaml",
+        f"# Every parameter with the board {board}, and its default. Give the file with",
+        f"#   ros2 run omnibot_driver driver --ros-args --params-file {board}.yaml",
         "# or change a copy of it. (fixed) marks what cannot change while the driver runs.",
         "/**:",
         "  ros__parameters:",
     ]
-    for title, rows in SECTIONS.items():
+    for title, rows in boards.load(board).PARAMETERS.sections.items():
         lines += ["", f"    # --- {title} ---"]
         for row in rows:
             notes = "; ".join(filter(None, [row.allowed, "fixed" if row.fixed else ""]))
@@ -61,26 +65,29 @@ def driver_yaml() -> str:
 
 
 def parameters_page() -> str:
-    """docs/parameters.md: the same for readers."""
+    """docs/parameters.md: the same for readers, board by board."""
     lines = PARAMETERS_INTRODUCTION.splitlines()
-    for title, rows in SECTIONS.items():
-        lines += [
-            "",
-            f"## {title}",
-            "",
-            "| Name | Type | Default | Unit | Allowed | Set | Meaning |",
-            "|---|---|---|---|---|---|---|",
-            *map(_row, rows),
-        ]
+    for board in boards.PROFILES:
+        lines += ["", f"## The board `{board}`"]
+        for title, rows in boards.load(board).PARAMETERS.sections.items():
+            lines += [
+                "",
+                f"### {title}",
+                "",
+                "| Name | Type | Default | Unit | Allowed | Set | Meaning |",
+                "|---|---|---|---|---|---|---|",
+                *map(_row, rows),
+            ]
     return "\n".join(lines) + "\n"
 
 
 def _row(row: Parameter) -> str:
-    kind = row.default[0] if isinstance(row.default, list) else row.default
+    fewest, most = row.lengths if row.is_list else (0, 0)
+    size = f"{most}" if fewest == most else f"{fewest} to {most}"
     allowed = row.allowed.removesuffix(row.unit).strip() if row.low is not None else row.allowed
     cells = [
         f"`{row.name}`",
-        TYPES[type(kind)] + ("[3]" if isinstance(row.default, list) else ""),
+        TYPES[row.kind] + (f"[{size}]" if row.is_list else ""),
         f"`{_yaml(row.default)}`",
         row.unit,
         allowed,
@@ -109,7 +116,8 @@ def architecture() -> str:
 
 
 GENERATED: Final[dict[str, Callable[[], str]]] = {
-    "config/driver.yaml": driver_yaml,
+    **{f"config/{board}.yaml": partial(parameter_file, board) for board in boards.PROFILES},
+    "config/driver.yaml": partial(parameter_file, "omnibot"),  # for one release
     "docs/architecture.md": architecture,
     "docs/parameters.md": parameters_page,
     "docs/pictures/modes.svg": mode_diagram.svg,

@@ -22,14 +22,19 @@ def generate_launch_description() -> LaunchDescription:
             FindExecutable(name="xacro"),
             " ",
             PathJoinSubstitution(
-                [FindPackageShare("omnibot_driver"), "urdf", "omnibot.urdf.xacro"]
+                [FindPackageShare("omnibot_driver"), "urdf", LaunchConfiguration("board")]
             ),
-            " ",
+            ".urdf.xacro ",
             LaunchConfiguration("xacro_args"),
         ]
     )
     return LaunchDescription(
         [
+            DeclareLaunchArgument(
+                "board",
+                default_value="omnibot",
+                description="Motor board of the robot, whose description is shown.",
+            ),
             DeclareLaunchArgument(
                 "namespace",
                 default_value="",
@@ -70,9 +75,16 @@ def generate_launch_description() -> LaunchDescription:
                 namespace=LaunchConfiguration("namespace"),
                 arguments=[
                     "--display-config",
-                    PathJoinSubstitution(
-                        [FindPackageShare("omnibot_driver"), "rviz", "omnibot.rviz"]
-                    ),
+                    [
+                        PathJoinSubstitution(
+                            [
+                                FindPackageShare("omnibot_driver"),
+                                "rviz",
+                                LaunchConfiguration("board"),
+                            ]
+                        ),
+                        ".rviz",
+                    ],
                     "--fixed-frame",
                     [LaunchConfiguration("frame_prefix"), "odom"],
                 ],

@@ -10,14 +10,18 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 OVERRIDES = {
+    "board": (str, "Motor board of the robot"),
     "port": (str, "Serial device or pyserial URL of the board"),
     "publish_tf": (bool, "Whether the driver publishes odom to base_link on /tf"),
     "frame_prefix": (str, "Text put before every frame name, without adding a slash: robot1/"),
 }
+DEFAULT_BOARD = "omnibot"
 
 
 def driver_node(context: LaunchContext) -> list[Node]:
     """Return the driver; an empty argument leaves the choice to the parameter file."""
+    board = LaunchConfiguration("board").perform(context) or DEFAULT_BOARD
+    defaults = PathJoinSubstitution([FindPackageShare("omnibot_driver"), "config", f"{board}.yaml"])
     overrides = {
         name: ParameterValue(LaunchConfiguration(name), value_type=type_)
         for name, (type_, _) in OVERRIDES.items()
@@ -29,7 +33,7 @@ def driver_node(context: LaunchContext) -> list[Node]:
             executable="driver",
             name="omnibot_driver",
             namespace=LaunchConfiguration("namespace"),
-            parameters=[LaunchConfiguration("params_file"), overrides],
+            parameters=[LaunchConfiguration("params_file").perform(context) or defaults, overrides],
             output="screen",
         )
     ]
@@ -49,10 +53,9 @@ def generate_launch_description() -> LaunchDescription:
             ),
             DeclareLaunchArgument(
                 "params_file",
-                default_value=PathJoinSubstitution(
-                    [FindPackageShare("omnibot_driver"), "config", "driver.yaml"]
-                ),
-                description="YAML file with the driver's parameters.",
+                default_value="",
+                description="YAML file with the driver's parameters; empty: config/<board>.yaml of"
+                " this package, which has the defaults.",
             ),
             DeclareLaunchArgument(
                 "namespace",

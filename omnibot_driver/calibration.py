@@ -16,24 +16,8 @@ from typing import Any, Final
 import yaml
 
 from omnibot_driver.core.errors import ParameterError
-from omnibot_driver.parameters import BY_NAME, Value
+from omnibot_driver.parameters import Table, Value
 
-NAMES: Final = (
-    "gyro_bias",
-    "accel_bias",
-    "angular_velocity_stddev",
-    "linear_acceleration_stddev",
-    "linear_scale",
-    "angular_scale",
-    "wheel_radius",
-    "base_radius",
-    "odom_linear_scale",
-    "odom_angular_scale",
-    "axis_signs",
-    "delta_frame",
-    "control_method",
-)
-"""What is taken from the file; each is a parameter."""
 RECORDED: Final = ("imu_rpy", "step")
 """What the tool calibrate writes beside them, for people."""
 
@@ -49,14 +33,18 @@ def locate(file: str) -> Path:
         ) from error
 
 
-def load(path: Path) -> dict[str, Value]:
-    """The parameters in the file; none where there is no file yet.
+def load(path: Path, table: Table) -> dict[str, Value]:
+    """The parameters in the file that this board may have there; none where there is no file yet.
 
     Raises ParameterError with what to do about a file that makes no sense.
     """
     content = _read(path)
     try:
-        return {name: BY_NAME[name].check(content[name]) for name in NAMES if name in content}
+        return {
+            name: table.by_name[name].check(content[name])
+            for name in table.calibrated
+            if name in content
+        }
     except ParameterError as error:
         raise _bad(path, f"is wrong ({error})") from error
 
@@ -105,5 +93,5 @@ def _read(path: Path) -> dict[Any, Any]:
 
 def _bad(path: Path, what: str) -> ParameterError:
     return ParameterError(
-        f"the calibration_file {path} {what}: mend it, or remove it and call ~/calibrate_gyro"
+        f"the calibration_file {path} {what}: correct it, or remove it and calibrate again"
     )

@@ -54,7 +54,8 @@ class Serializer:
         linear, angular = settings.twist_linear_stddev**2, settings.twist_angular_stddev**2
         self._twist_noise = messages.planar(linear, 0.0, 0.0, linear, 0.0, angular)
 
-        names, name_values = zip(*map(_text, settings.wheels.joints), strict=True)
+        texts = [_text(name) for name in settings.wheels.joints]
+        names, name_values = [text[0] for text in texts], [text[1] for text in texts]
         no_frame, no_values = _text("")
         count = len(names)
         joints = f"@{STAMP}{no_frame}I{''.join(names)}I{count}d"
@@ -142,8 +143,8 @@ def difference(settings: MessageSettings) -> str:
     noise = Covariance(1.2, 2.3, 3.4, 4.5, 5.6, 6.7)
     tangent, twist = Pose(7.7, -8.8, 9.9), BodyTwist(0.1, -0.2, 0.3)
     estimates = [OdometryEstimate(0.0, tangent, known, noise) for known in (twist, None)]
-    angles = (10.1, -11.2, 12.3)
-    joints: list[Wheels] = [(tangent, angles, rates) for rates in (angles, ())]
+    angles = tuple(10.1 + number for number in range(len(settings.wheels.joints)))
+    joints: list[Wheels] = [(tangent, angles, rates) for rates in (angles, ()) if angles]
     stamp_ns = 1_234_567_890_987_654_321
     pairs = zip(
         *(

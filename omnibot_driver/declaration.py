@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The table of parameters, declared on a node: given at start, described, checked when set."""
+"""A board's parameters, declared on a node: given at start, described, checked when set."""
 
 import re
 from functools import partial
@@ -16,7 +16,7 @@ from rcl_interfaces.msg import (
 )
 from rclpy.node import Node
 
-from omnibot_driver import calibration, parameters
+from omnibot_driver import boards, calibration, parameters
 from omnibot_driver.core.errors import ParameterError
 
 NOT_OURS: Final = re.compile(
@@ -32,35 +32,35 @@ def declare(node: Node) -> dict[str, Any]:
         for name, override in node._parameter_overrides.items()
         if not NOT_OURS.fullmatch(name)
     }
-    values = parameters.check_all(given)
+    values, table = boards.check_all(given), boards.table_for(given)
     if file := values["calibration_file"]:
-        found = _calibration(node, calibration.locate(str(file)))
-        values = parameters.check_all({**given, **found})
-    for parameter in parameters.PARAMETERS:
+        found = _calibration(node, calibration.locate(str(file)), table)
+        values = boards.check_all({**given, **found})
+    for parameter in table.rows:
         node.declare_parameter(
             parameter.name, values[parameter.name], _descriptor(parameter), ignore_override=True
         )
-    node.add_on_set_parameters_callback(partial(_check, node))
+    node.add_on_set_parameters_callback(partial(_check, node, table))
     return values
 
 
-def ours(changed: list[rclpy.Parameter]) -> dict[str, Any]:
+def ours(changed: list[rclpy.Parameter], table: parameters.Table) -> dict[str, Any]:
     """The values among these that are the driver's own."""
-    return {item.name: item.value for item in changed if item.name in parameters.BY_NAME}
+    return {item.name: item.value for item in changed if item.name in table.by_name}
 
 
-def _calibration(node: Node, path: Path) -> dict[str, parameters.Value]:
+def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, parameters.Value]:
     """What the file gives, and a word on it: a file that is not the one meant looks like none."""
-    found, names = calibration.load(path), calibration.names(path)
-    unread = [name for name in names if name not in calibration.NAMES + calibration.RECORDED]
+    found, names = calibration.load(path, table), calibration.names(path)
+    unread = [name for name in names if name not in table.calibrated + calibration.RECORDED]
     if not names:
         node.get_logger().warning(
-            f"there is no calibration_file {path} yet: nothing of it is applied; check the path,"
-            " or call ~/calibrate_gyro, which writes it"
+            f"there is no calibration_file {path} yet: nothing of it is applied; check the path;"
+            " a calibration writes it"
         )
     if unread:
         nearest = [
-            f"{name} (the nearest that is: {parameters.nearest(name, calibration.NAMES)})"
+            f"{name} (the nearest that is: {parameters.nearest(name, table.calibrated)})"
             for name in unread
         ]
         node.get_logger().warning(
@@ -71,11 +71,13 @@ def _calibration(node: Node, path: Path) -> dict[str, parameters.Value]:
     return found
 
 
-def _check(node: Node, changed: list[rclpy.Parameter]) -> SetParametersResult:
+def _check(
+    node: Node, table: parameters.Table, changed: list[rclpy.Parameter]
+) -> SetParametersResult:
     """Each value by itself, and together with those that stay as they are."""
-    present = {item.name: item.value for item in node.get_parameters(list(parameters.BY_NAME))}
+    present = {item.name: item.value for item in node.get_parameters(list(table.by_name))}
     try:
-        parameters.check_all({**present, **ours(changed)})
+        table.check_all({**present, **ours(changed, table)})
     except ParameterError as error:
         return SetParametersResult(successful=False, reason=str(error))
     return SetParametersResult(successful=True)
@@ -91,7 +93,7 @@ def _descriptor(parameter: parameters.Parameter) -> ParameterDescriptor:
         dynamic_typing=True,
     )
     if parameter.low is not None and parameter.high is not None:
-        if isinstance(parameter.default, int):
+        if parameter.kind is int:
             whole = IntegerRange(
                 from_value=int(parameter.low), to_value=int(parameter.high), step=1
             )

@@ -50,7 +50,7 @@ Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MessageSettings:
     """Frames, prefix included; standard deviations that the covariances are made of (SI units);
-    and the wheels.
+    and the wheels. What is of the IMU is empty or 0 where there is none.
     """
 
     odom_frame: str
@@ -69,9 +69,9 @@ class MessageSettings:
         return cls(
             odom_frame=prefix + values["odom_frame"],
             base_frame=prefix + values["base_frame"],
-            imu_frame=prefix + values["imu_frame"],
-            acceleration_stddev=values["linear_acceleration_stddev"],
-            angular_velocity_stddev=values["angular_velocity_stddev"],
+            imu_frame=prefix + values.get("imu_frame", ""),
+            acceleration_stddev=values.get("linear_acceleration_stddev", 0.0),
+            angular_velocity_stddev=values.get("angular_velocity_stddev", 0.0),
             twist_linear_stddev=values["twist_linear_stddev"],
             twist_angular_stddev=values["twist_angular_stddev"],
             wheels=wheels,

@@ -57,9 +57,9 @@ class OmniBotDriver(Node):
         self._session = Session(
             self._board,
             parameters.session_settings(self._values, self._profile.kinematics(self._values)),
-            run=self._values["auto_start"],
+            run=self._values.get("auto_start", True),
             axis_signs=tuple(self._values["axis_signs"]),
-            control=self._values["control_method"],
+            control=self._values.get("control_method", "velocity"),
             obeys=not is_recording(port),
         )
         settings = self._message_settings()
@@ -73,6 +73,7 @@ class OmniBotDriver(Node):
             self, self._link, self._board.traits, self._values["calibration_file"]
         )
         self._create_inputs()
+        self._publishing.extras = self._profile.extras(self, self._link, self._values)
         if isinstance(self._link, Link):  # a recording is no link to be judged
             self._diagnostics = Diagnostics(self, self._link, lambda: self._refusals, port)
         if advice := selfcheck.clock_advice(port, self.get_parameter("use_sim_time").value):
@@ -143,7 +144,8 @@ class OmniBotDriver(Node):
         return messages.MessageSettings.from_parameters(self._values, wheels)
 
     def _apply_parameters(self, changed: list[rclpy.Parameter]) -> None:
-        self._values = parameters.check_all({**self._values, **declaration.ours(changed)})
+        table = self._profile.PARAMETERS
+        self._values = table.check_all({**self._values, **declaration.ours(changed, table)})
         self._publishing.settings = self._message_settings()
         self._link.reconnect_interval_s = self._values["reconnect_interval"]
         wheels = self._profile.kinematics(self._values)
@@ -154,16 +156,18 @@ class OmniBotDriver(Node):
     # From ROS to the board
 
     def _create_inputs(self) -> None:
-        if self._values["enable_stamped_cmd_vel"]:
-            obey = self._obey("cmd_vel", self._twist_stamped, may_be_old=messages.is_stamped)
-            self.create_subscription(TwistStamped, "cmd_vel", obey, 1)
-        else:
-            obey = self._obey("cmd_vel", _twist)
-            self.create_subscription(Twist, "cmd_vel", obey, 1, raw=True)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._looks = [self._see_other_types, self._see_namesakes, self._see_no_clock]
+        self._looks = [self._see_namesakes, self._see_no_clock]
         self.create_timer(LOOK_EVERY_S, self._look_around, clock=steady)
         authorities = self._board.traits.authorities
+        if Authority.BASE in authorities:
+            self._looks.append(self._see_other_types)
+            if self._values["enable_stamped_cmd_vel"]:
+                obey = self._obey("cmd_vel", self._twist_stamped, may_be_old=messages.is_stamped)
+                self.create_subscription(TwistStamped, "cmd_vel", obey, 1)
+            else:
+                obey = self._obey("cmd_vel", _twist)
+                self.create_subscription(Twist, "cmd_vel", obey, 1, raw=True)
         if Authority.WHEELS in authorities:
             obey = self._obey("wheel_cmd", _wheels)
             self.create_subscription(Float32MultiArray, "wheel_cmd", obey, 1)

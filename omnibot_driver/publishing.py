@@ -15,6 +15,7 @@ from nav_msgs.msg import Odometry
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import ClockChange, JumpThreshold, TimeJump
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from sensor_msgs.msg import Imu, JointState
@@ -22,7 +23,7 @@ from std_msgs.msg import Bool, String, UInt8MultiArray
 
 from omnibot_driver import messages, selfcheck
 from omnibot_driver.cdr import Messages, Serializer, difference
-from omnibot_driver.core.events import Event, Notice, StateChanged
+from omnibot_driver.core.events import Event, Extra, Notice, StateChanged
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.packets import Packet
@@ -68,7 +69,9 @@ class Publishing:
         if traits.imu:
             self._imu = node.create_publisher(Imu, "imu/data_raw", 10)
         self._odometry = node.create_publisher(Odometry, "odom", 10)
-        self._joints = node.create_publisher(JointState, "joint_states", 10)
+        self._joints: Publisher | None = None
+        if settings.wheels.joints:
+            self._joints = node.create_publisher(JointState, "joint_states", 10)
         self._send_transform = transform_publisher(node) if values["publish_tf"] else None
         self._state = node.create_publisher(String, "~/state", LATCHED)
         self._estop_active = node.create_publisher(Bool, "~/estop_active", LATCHED)
@@ -83,7 +86,10 @@ class Publishing:
             RequestDone: self._answer,
             Notice: self._warn,
             StateChanged: lambda event, _clock_offset_ns: self._show(event),
+            Extra: self._publish_extra,
         }
+        self.extras: Mapping[type, Callable[[Any, int], None]] = {}
+        """Who publishes each type of value that only this board has, with its stamp in ns."""
 
     @property
     def settings(self) -> messages.MessageSettings:
@@ -147,7 +153,7 @@ class Publishing:
         offset_ns = now_ns - time.monotonic_ns()
         for event in events:
             kind = type(event)
-            if not isinstance(event, ImuEstimate | OdometryEstimate):
+            if not isinstance(event, ImuEstimate | OdometryEstimate | Extra):
                 self._handlers[kind](event, offset_ns)
             elif now_ns:
                 steady_ns = round(event.stamp_s * 1e9)
@@ -187,8 +193,13 @@ class Publishing:
         if self._send_transform is not None:
             stamp = messages.time_message(stamp_ns)
             self._send_transform(messages.transform_message(estimate, stamp, self._settings))
-        self._wheels = messages.turned(self._wheels, estimate, self._settings.wheels)
-        self._joints.publish(self._make.joint_state(self._wheels, stamp_ns))
+        if self._joints is not None:
+            self._wheels = messages.turned(self._wheels, estimate, self._settings.wheels)
+            self._joints.publish(self._make.joint_state(self._wheels, stamp_ns))
+
+    def _publish_extra(self, extra: Extra, clock_offset_ns: int) -> None:
+        stamp_ns = round(extra.stamp_s * 1e9) + clock_offset_ns
+        self.extras[type(extra.value)](extra.value, stamp_ns)
 
     def _answer(self, done: RequestDone, _clock_offset_ns: int) -> None:
         assert isinstance(done.token, Future)

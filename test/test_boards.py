@@ -3,18 +3,28 @@
 """Each kind of board meets the rest of the driver in its profile alone."""
 
 import ast
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from omnibot_driver import boards, parameters
+from omnibot_driver import boards, messages
+from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.core.geometry.omni import OmniKinematics
+from omnibot_driver.core.omnibot import OmniBot
+from omnibot_driver.core.requests import Request
+from omnibot_driver.parameters import Parameter, session_settings, table
 from omnibot_driver.simulator.__main__ import boards as simulated_boards
 from omnibot_driver.simulator.common import options
 
 PACKAGE = Path(boards.__file__).parent.parent
-KNOW_BOARDS = ("boards", "simulator", "urls", "tools", "demo", "parameters", *boards.PROFILES)
-"""Folders. What is left in parameters, simulator and tools of one board moves to it in time."""
+KNOW_BOARDS = ("boards", "simulator", "urls", "tools", "demo", *boards.PROFILES)
+"""Folders. What is left in simulator and tools of one board moves to it in time."""
 
 
 def imported(path: Path) -> set[str]:
@@ -48,7 +58,7 @@ def test_common_code_imports_no_board(path: Path) -> None:
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
     """With a kinematics whose joints are the wheels that can be commanded."""
-    values = parameters.check_all({"board": name})
+    values = boards.check_all({"board": name})
     profile = boards.load(name)
     board = profile.make(values)
     assert board.settings == profile.settings(values)
@@ -65,8 +75,99 @@ def test_every_profile_names_its_simulated_board(name: str) -> None:
     assert board.facts.keys() >= {"x_m", "y_m", "yaw_rad"}
 
 
-def test_a_board_that_is_not_built_is_refused_by_name() -> None:
-    """In one sentence, with those that are."""
-    with pytest.raises(ParameterError, match="'board' must be one of omnibot, not 'mart'"):
-        parameters.check_all({"board": "mart"})
-    assert tuple(boards.PROFILES) == parameters.BY_NAME["board"].choices
+@pytest.mark.parametrize("name", boards.NOT_BUILT)
+def test_a_board_that_is_not_built_is_refused_by_name(name: str) -> None:
+    """In one sentence; it is no choice, and no profile."""
+    sentence = f"the board {name} is not built yet; this driver has {', '.join(boards.PROFILES)}"
+    with pytest.raises(ParameterError) as refused:
+        boards.check_all({"board": name})
+    assert str(refused.value) == sentence
+    assert name not in boards.PROFILES
+
+
+@pytest.mark.parametrize("wrong", ["martha", "", 5, True, None, ["omnibot"]])
+def test_what_is_no_board_is_refused_with_those_there_are(wrong: object) -> None:
+    """Of whatever type."""
+    with pytest.raises(ParameterError, match="'board' must be "):
+        boards.check_all({"board": wrong})
+
+
+@pytest.mark.parametrize("name", boards.PROFILES)
+def test_every_profile_has_a_table_of_its_own(name: str) -> None:
+    """In which no name comes twice, and its board is the only one."""
+    table = boards.load(name).PARAMETERS
+    assert sum(map(len, table.sections.values())) == len(table.rows)
+    assert (table.board, table.by_name["board"].choices) == (name, (name,))
+    assert boards.owners_of("port") == list(boards.PROFILES)
+
+
+FEW = replace(
+    OmniBot.traits,
+    imu_period_s=None,
+    authorities=frozenset({Authority.POSE}),
+    requests=frozenset({Request.RESET}),
+)
+OWN = Parameter("dock_distance", 1.0, "m", "How far.", low=0.0, high=5.0)
+
+
+def refuse_far_docks(values: Mapping[str, Any]) -> None:
+    if values["dock_distance"] > 2.0:
+        raise ParameterError("too far")
+
+
+def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
+    """Common rows by what it can do, with its defaults, and without those it has no use for."""
+    own = table(
+        "few",
+        FEW,
+        own={"Docking": (OWN,)},
+        without=("baudrate",),
+        changed={"port": {"default": "udp://10.0.0.1:5000"}},
+        checks=(refuse_far_docks,),
+    )
+    assert own.sections["Docking"] == (OWN,)
+    assert "The IMU" not in own.sections
+    assert own.by_name["on_exit"].choices == ("stop", "reset")
+    assert own.by_name["port"].default == "udp://10.0.0.1:5000"
+    assert own.by_name["port"].fixed
+    absent = {
+        "auto_start", "baudrate", "gyro_bias", "imu_frame", "linear_acceleration_stddev",
+        "max_linear_speed", "max_wheel_speed", "enable_stamped_cmd_vel", "accel_range",
+    }  # fmt: skip
+    assert not absent & set(own.by_name)
+    assert {"cmd_vel_timeout", "odom_frame", "fastest_linear_speed"} <= set(own.by_name)
+    values = own.check_all({"dock_distance": 2})
+    assert values["dock_distance"] == 2.0
+    with pytest.raises(ParameterError, match="too far"):
+        own.check_all({"dock_distance": 3.0})
+
+
+def test_the_core_takes_a_board_that_lacks_most_parameters() -> None:
+    """What is absent is not asked for."""
+    values = table("few", FEW).check_all({})
+    settings = session_settings(values, OmniKinematics(0.029, 0.143))
+    assert settings.limits.wheel_radps == 0.0
+    assert (
+        messages.MessageSettings.from_parameters(values, OmniKinematics(0.029, 0.143)).imu_frame
+        == ""
+    )
+
+
+def test_a_parameter_of_another_board_is_refused_by_that_boards_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And an unknown one with the nearest of this board."""
+    other = SimpleNamespace(PARAMETERS=table("few", FEW, own={"Docking": (OWN,)}))
+    monkeypatch.setitem(boards.PROFILES, "few", "few_profile")
+    monkeypatch.setitem(sys.modules, "few_profile", other)
+    assert boards.check_all({"board": "few", "dock_distance": 1})["board"] == "few"
+    with pytest.raises(ParameterError) as refused:
+        boards.check_all({"board": "few", "delta_frame": "earth"})
+    assert (
+        str(refused.value)
+        == "parameter 'delta_frame' belongs to board omnibot, not to few; remove it"
+    )
+    with pytest.raises(ParameterError, match="'dock_distance' belongs to board few, not to omnib"):
+        boards.check_all({"dock_distance": 1.0})
+    with pytest.raises(ParameterError, match=r"'dock_distanc'.*'dock_distance'.*config/few\.yaml"):
+        boards.check_all({"board": "few", "dock_distanc": 1.0})

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from omnibot_driver import calibration
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.errors import ParameterError
 
 BIAS = [0.01, -0.02, 0.03]
@@ -19,23 +20,26 @@ def test_what_is_saved_is_loaded_exactly(tmp_path: Path, bias: list[float]) -> N
     """To the last digit."""
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": bias})
-    assert calibration.load(path) == {"gyro_bias": bias}
+    assert calibration.load(path, PARAMETERS) == {"gyro_bias": bias}
 
 
 def test_no_file_yet_is_no_calibration(tmp_path: Path) -> None:
     """Nor is an empty one; the folder comes with the file."""
     path = tmp_path / "new" / "robot.yaml"
-    assert calibration.load(path) == {}
+    assert calibration.load(path, PARAMETERS) == {}
     calibration.save(path, {"gyro_bias": BIAS})
     path.write_text("")
-    assert calibration.load(path) == {}
+    assert calibration.load(path, PARAMETERS) == {}
 
 
 def test_other_names_in_the_file_stay(tmp_path: Path) -> None:
     """Also in their order."""
     path = tmp_path / "robot.yaml"
     path.write_text("robot: no. 7\ngyro_bias: [0, 0, 0]\naccel_bias: [1, 2, 3]\n")
-    assert calibration.load(path) == {"gyro_bias": [0.0] * 3, "accel_bias": [1.0, 2.0, 3.0]}
+    assert calibration.load(path, PARAMETERS) == {
+        "gyro_bias": [0.0] * 3,
+        "accel_bias": [1.0, 2.0, 3.0],
+    }
     calibration.save(path, {"gyro_bias": BIAS})
     content = yaml.safe_load(path.read_text())
     assert list(content.items()) == [
@@ -56,15 +60,15 @@ def test_a_file_that_makes_no_sense_is_an_error_that_says_what_to_do(
     """It names the file; nothing is overwritten."""
     path = tmp_path / "robot.yaml"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
-    with pytest.raises(ParameterError, match="mend it, or remove it") as caught:
-        calibration.load(path)
+    with pytest.raises(ParameterError, match="correct it, or remove it") as caught:
+        calibration.load(path, PARAMETERS)
     assert str(path) in str(caught.value)
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
     """Read as little as written."""
     with pytest.raises(ParameterError, match="cannot be read"):
-        calibration.load(tmp_path)
+        calibration.load(tmp_path, PARAMETERS)
 
 
 def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
@@ -80,7 +84,7 @@ def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
     monkeypatch.setattr("os.fsync", full)
     with pytest.raises(OSError, match="No space"):
         calibration.save(path, {"gyro_bias": [0.0, 0.0, 0.0]})
-    assert calibration.load(path) == {"gyro_bias": BIAS}
+    assert calibration.load(path, PARAMETERS) == {"gyro_bias": BIAS}
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -97,7 +101,7 @@ def test_a_symbolic_link_stays_one(tmp_path: Path) -> None:
     link.symlink_to(path)
     calibration.save(link, {"gyro_bias": BIAS})
     assert link.is_symlink()
-    assert calibration.load(path) == {"gyro_bias": BIAS}
+    assert calibration.load(path, PARAMETERS) == {"gyro_bias": BIAS}
     assert list(path.parent.iterdir()) == [path]
 
 

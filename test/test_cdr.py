@@ -4,6 +4,7 @@
 
 import struct
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,11 +15,12 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
-from omnibot_driver import cdr, parameters
+from omnibot_driver import boards, cdr
 from omnibot_driver.boards import omnibot
 from omnibot_driver.cdr import Messages, Serializer, difference
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
+from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
@@ -26,7 +28,7 @@ from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.messages import MessageSettings, Wheels, turned, unturned
 
-DEFAULTS = parameters.check_all({})
+DEFAULTS = boards.check_all({})
 
 numbers = st.floats(allow_nan=False, allow_infinity=False, width=32)
 vectors = st.tuples(numbers, numbers, numbers)
@@ -52,7 +54,7 @@ def message_name(message: object) -> str:
 @st.composite
 def settings(draw: st.DrawFn) -> MessageSettings:
     """Frames of any length, so that every alignment occurs, and any noise."""
-    values: dict[str, Any] = parameters.check_all({})
+    values: dict[str, Any] = boards.check_all({})
     values |= {name: draw(frames) for name in ("odom_frame", "base_frame", "imu_frame")}
     values |= {name: draw(st.floats(1e-6, 10.0)) for name in values if name.endswith("stddev")}
     return MessageSettings.from_parameters(values, omnibot.kinematics(values))
@@ -112,7 +114,7 @@ def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
 @pytest.mark.parametrize("length", range(21))
 def test_no_frame_length_is_refused_at_start(length: int) -> None:
     """So each alignment is fast."""
-    values = parameters.check_all({"imu_frame": "i" * length or "x", "odom_frame": "o" * 7})
+    values = boards.check_all({"imu_frame": "i" * length or "x", "odom_frame": "o" * 7})
     assert difference(MessageSettings.from_parameters(values, omnibot.kinematics(values))) == ""
 
 
@@ -166,3 +168,18 @@ def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> No
     data = cdr.LITTLE_ENDIAN + struct.pack("<6d", *[0.1] * 6)
     with pytest.raises(CommandRefused, match="no Twist"):
         cdr.twist(data[:length])
+
+
+@pytest.mark.parametrize(
+    "wheels",
+    [
+        DifferentialKinematics(0.05, 0.3),
+        OmniKinematics(0.029, 0.143),
+        SimpleNamespace(joints=()),
+        SimpleNamespace(joints=("a", "bc", "def", "ghij", "k" * 31)),
+    ],
+    ids=lambda wheels: f"{len(wheels.joints)} joints",
+)
+def test_any_number_of_wheels_is_serialised_as_rclpy_does(wheels: Any) -> None:
+    """None at all, too: then there is no joint_states."""
+    assert difference(MessageSettings.from_parameters(boards.check_all({}), wheels)) == ""

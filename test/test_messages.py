@@ -11,7 +11,7 @@ from geometry_msgs.msg import PoseStamped, Twist
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver import messages, parameters
+from omnibot_driver import boards, messages
 from omnibot_driver.boards import omnibot
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.omni import OmniKinematics
@@ -22,10 +22,10 @@ from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.reporting.diagnosis import Level, Status
 
-DEFAULTS = parameters.check_all({})
+DEFAULTS = boards.check_all({})
 SETTINGS = messages.MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
 PREFIXED = messages.MessageSettings.from_parameters(
-    parameters.check_all({"frame_prefix": "robot1/"}), omnibot.kinematics(DEFAULTS)
+    boards.check_all({"frame_prefix": "robot1/"}), omnibot.kinematics(DEFAULTS)
 )
 STAMP = messages.time_message(1_700_000_000_123_456_789)
 

@@ -8,16 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.errors import ParameterError
-from omnibot_driver.parameters import BY_NAME, PARAMETERS, Parameter
+from omnibot_driver.parameters import Parameter
 
-VECTORS = [BY_NAME["gyro_bias"], BY_NAME["accel_bias"]]
+VECTORS = [PARAMETERS.by_name["gyro_bias"], PARAMETERS.by_name["accel_bias"]]
 RANGED = [
-    parameter for parameter in PARAMETERS if parameter.low is not None and parameter not in VECTORS
+    parameter
+    for parameter in PARAMETERS.rows
+    if parameter.low is not None and parameter not in VECTORS
 ]
 FLOATS = [parameter for parameter in RANGED if isinstance(parameter.default, float)]
-CHOICES = [parameter for parameter in PARAMETERS if parameter.choices]
-FRAMES = [parameter for parameter in PARAMETERS if parameter.name.endswith("_frame")]
+CHOICES = [row for row in PARAMETERS.rows if row.choices and not row.is_list]
+FRAMES = [parameter for parameter in PARAMETERS.rows if parameter.name.endswith("_frame")]
 
 
 def name_of(parameter: object) -> str | None:
@@ -80,7 +83,7 @@ WRONG_TYPES: dict[type, list[object]] = {
     ("parameter", "wrong"),
     [
         (parameter, wrong)
-        for parameter in PARAMETERS
+        for parameter in PARAMETERS.rows
         for wrong in WRONG_TYPES[type(parameter.default)]
     ],
     ids=lambda value: value.name if isinstance(value, Parameter) else repr(value),
@@ -107,7 +110,7 @@ def test_a_value_of_another_type_is_refused(parameter: Parameter, wrong: object)
 def test_types_are_told_in_the_words_of_ros(name: str, wrong: object, words: str) -> None:
     """Those of ``ros2 param describe``; who wrote no for a word is told what became of it."""
     with pytest.raises(ParameterError) as caught:
-        BY_NAME[name].check(wrong)
+        PARAMETERS.by_name[name].check(wrong)
     message = str(caught.value)
     assert message.startswith(f"parameter '{name}' {words}")
     assert message.endswith(")") == (name == "on_exit")
@@ -122,7 +125,7 @@ json_like = st.recursive(
 )  # fmt: skip
 
 
-@given(st.sampled_from(PARAMETERS), json_like)
+@given(st.sampled_from(PARAMETERS.rows), json_like)
 def test_any_value_is_either_taken_in_the_right_type_or_refused(
     parameter: Parameter, value: object
 ) -> None:
@@ -139,13 +142,13 @@ def test_any_value_is_either_taken_in_the_right_type_or_refused(
 def test_axis_signs_are_nothing_but_ones(wrong: list[float]) -> None:
     """A sign is no factor."""
     with pytest.raises(ParameterError, match="each 1 or -1"):
-        BY_NAME["axis_signs"].check(wrong)
+        PARAMETERS.by_name["axis_signs"].check(wrong)
 
 
 @pytest.mark.parametrize("signs", [[1, -1, 1], (1, -1, 1), [1.0, -1.0, 1.0]])
 def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
     """In any sequence; integers come of it."""
-    taken = BY_NAME["axis_signs"].check(signs)
+    taken = PARAMETERS.by_name["axis_signs"].check(signs)
     assert taken == [1, -1, 1]
     assert isinstance(taken, list)
     assert all(type(sign) is int for sign in taken)
@@ -165,9 +168,9 @@ def test_a_frame_name_is_not_empty_and_has_no_leading_slash(
 def test_a_frame_prefix_has_no_leading_slash(wrong: str) -> None:
     """tf2 knows no such frames; no prefix at all is one."""
     with pytest.raises(ParameterError, match=r"'frame_prefix'.*such as robot1/"):
-        BY_NAME["frame_prefix"].check(wrong)
-    assert BY_NAME["frame_prefix"].check("robot1/") == "robot1/"
-    assert BY_NAME["frame_prefix"].check("") == ""
+        PARAMETERS.by_name["frame_prefix"].check(wrong)
+    assert PARAMETERS.by_name["frame_prefix"].check("robot1/") == "robot1/"
+    assert PARAMETERS.by_name["frame_prefix"].check("") == ""
 
 
 @pytest.mark.parametrize("parameter", VECTORS, ids=name_of)
@@ -181,3 +184,46 @@ def test_a_bias_is_three_numbers_each_within_its_range(parameter: Parameter) -> 
     for wrong in (parameter.high + 1, -math.inf, math.nan, True, "1"):
         with pytest.raises(ParameterError, match=f"'{parameter.name}'.*three numbers, each"):
             parameter.check([0.0, wrong, 0.0])
+
+
+GAINS = Parameter("gains", [1.0], "1", "Two to four gains.", low=0.0, high=10.0, length=(2, 4))
+WORDS = Parameter("words", ["on"], "", "Any words.", choices=("on", "off"), length=(0, 2))
+ANY = Parameter("any", ["x"], "", "One word.")
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "taken"),
+    [
+        (GAINS, [1, 2.5], [1.0, 2.5]),
+        (GAINS, (1.0, 2.0, 3.0, 4.0), [1.0, 2.0, 3.0, 4.0]),
+        (WORDS, [], []),
+        (WORDS, ["on", "off"], ["on", "off"]),
+        (ANY, ["anything"], ["anything"]),
+    ],
+)
+def test_a_list_may_have_any_length_that_its_row_allows(
+    parameter: Parameter, value: object, taken: object
+) -> None:
+    """Of numbers or words."""
+    assert parameter.check(value) == taken
+
+
+@pytest.mark.parametrize(
+    ("parameter", "wrong", "sentence"),
+    [
+        (GAINS, [1.0], "must be 2 to 4 numbers, each 0 to 10 1, not [1.0]"),
+        (GAINS, [1.0, 11.0], "must be 2 to 4 numbers, each 0 to 10 1, not [1.0, 11.0]"),
+        (GAINS, 1.0, "must be an array of doubles, not 1.0"),
+        (WORDS, ["no"], "must be 0 to 2 strings, each on or off, not ['no']"),
+        (WORDS, [True], "must be 0 to 2 strings, each on or off, not [True]"),
+        (ANY, ["a", "b"], "must be one string, not ['a', 'b']"),
+        (ANY, "a", "must be an array of strings, not 'a'"),
+    ],
+)
+def test_a_wrong_list_is_refused_with_what_it_may_be(
+    parameter: Parameter, wrong: object, sentence: str
+) -> None:
+    """How many, of what, and what each may be."""
+    with pytest.raises(ParameterError) as refused:
+        parameter.check(wrong)
+    assert str(refused.value).startswith(f"parameter '{parameter.name}' {sentence}")

@@ -9,19 +9,15 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.boards import omnibot
+from omnibot_driver.boards import check_all, omnibot
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
-from omnibot_driver.parameters import (
-    BY_NAME,
-    PARAMETERS,
-    Parameter,
-    check_all,
-    session_settings,
-)
+from omnibot_driver.parameters import Parameter, session_settings
 
-CONFIG = Path(__file__).parent.parent / "config" / "driver.yaml"
+CONFIG = Path(__file__).parent.parent / "config" / "omnibot.yaml"
+FORMER = CONFIG.with_name("driver.yaml")
 PROMISED: dict[str, object] = {
     "port": "/dev/ttyUSB0",
     "baudrate": 115200,
@@ -73,11 +69,11 @@ def name_of(parameter: object) -> str | None:
 @pytest.mark.parametrize(("name", "default"), PROMISED.items())
 def test_every_promised_parameter_is_there_with_its_default(name: str, default: object) -> None:
     """Value and type: a float stays a float."""
-    assert BY_NAME[name].default == default
-    assert type(BY_NAME[name].default) is type(default)
+    assert PARAMETERS.by_name[name].default == default
+    assert type(PARAMETERS.by_name[name].default) is type(default)
 
 
-@pytest.mark.parametrize("parameter", PARAMETERS, ids=name_of)
+@pytest.mark.parametrize("parameter", PARAMETERS.rows, ids=name_of)
 def test_every_default_passes_its_own_check_and_is_explained(parameter: Parameter) -> None:
     """With a description that is a sentence, and a unit where it is a measure."""
     value = parameter.check(parameter.default)
@@ -93,24 +89,24 @@ def test_every_default_passes_its_own_check_and_is_explained(parameter: Paramete
 
 def test_names_are_unique() -> None:
     """Two rows of one name would hide each other."""
-    assert len(BY_NAME) == len(PARAMETERS)
+    assert len(PARAMETERS.by_name) == len(PARAMETERS.rows)
 
 
 @pytest.mark.parametrize("name", ["port", "odom_frame", "base_frame", "imu_frame"])
 def test_identity_cannot_change_while_it_runs(name: str) -> None:
     """Port and frames are read-only."""
-    assert BY_NAME[name].fixed
+    assert PARAMETERS.by_name[name].fixed
 
 
 @pytest.mark.parametrize("name", ["max_linear_speed", "linear_scale", "cmd_vel_timeout"])
 def test_tuning_may_change_while_it_runs(name: str) -> None:
     """It is found by trying."""
-    assert not BY_NAME[name].fixed
+    assert not PARAMETERS.by_name[name].fixed
 
 
 def test_what_is_not_given_is_the_default() -> None:
     """And what is given is taken."""
-    assert check_all({}) == {parameter.name: parameter.default for parameter in PARAMETERS}
+    assert check_all({}) == {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     values = check_all({"max_linear_speed": 1, "port": "/dev/ttyACM3"})
     assert values["max_linear_speed"] == 1.0
     assert values["port"] == "/dev/ttyACM3"
@@ -137,7 +133,7 @@ def test_an_unknown_name_is_refused_with_the_nearest_known_one(mistyped: str, me
 @given(st.text())
 def test_any_unknown_name_is_refused(name: str) -> None:
     """However far from all others, the empty one too."""
-    if name not in BY_NAME:
+    if name not in PARAMETERS.by_name:
         with pytest.raises(ParameterError, match="the nearest is"):
             check_all({name: 1})
 
@@ -226,15 +222,20 @@ def in_the_file() -> dict[str, object]:
     return values
 
 
+def test_the_file_has_its_former_name_as_well() -> None:
+    """For one release."""
+    assert FORMER.read_bytes() == CONFIG.read_bytes()
+
+
 def test_the_file_of_parameters_is_the_table() -> None:
     """Every name with its default, in a type that a strict reader takes."""
     values = in_the_file()
-    assert values == {parameter.name: parameter.default for parameter in PARAMETERS}
+    assert values == {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     for name, value in values.items():
-        assert type(value) is type(BY_NAME[name].default), name
+        assert type(value) is type(PARAMETERS.by_name[name].default), name
 
 
-@pytest.mark.parametrize("parameter", PARAMETERS, ids=name_of)
+@pytest.mark.parametrize("parameter", PARAMETERS.rows, ids=name_of)
 def test_the_file_tells_what_each_parameter_may_be(parameter: Parameter) -> None:
     """Description, range or choices, and unit, in the comment above it."""
     text = CONFIG.read_text(encoding="utf-8")

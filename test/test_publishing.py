@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 
 import pytest
@@ -17,8 +18,9 @@ from rclpy.serialization import deserialize_message
 from rclpy.time import Time
 from sensor_msgs.msg import Imu, JointState
 
-from omnibot_driver import parameters
+from omnibot_driver import boards, parameters
 from omnibot_driver.boards import omnibot
+from omnibot_driver.core.events import Extra
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
@@ -32,7 +34,7 @@ from omnibot_driver.messages import MessageSettings
 from omnibot_driver.publishing import Publishing
 from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
-VALUES = {**parameters.check_all({}), "publish_tf": False}
+VALUES = {**boards.check_all({}), "publish_tf": False}
 
 
 @pytest.fixture
@@ -192,3 +194,19 @@ def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     read(b"Paused: 1\n" + b"".join(board.step() for _ in range(8)))
     assert session.state == "nominal"
     assert published[-1] == "nominal"
+
+
+@dataclass(frozen=True, slots=True)
+class Charge:
+    """A value of one board's own kind."""
+
+    volts: float
+
+
+def test_what_only_one_board_measures_is_published_by_its_type(node: Node) -> None:
+    """By whom its profile names, with the stamp in ROS time, in order with all else."""
+    _, publishing = session_with(node)
+    published: list[tuple[float, int]] = []
+    publishing.extras = {Charge: lambda charge, ns: published.append((charge.volts, ns))}
+    publishing.publish([Extra(Charge(12.5), 2.0), Extra(Charge(12.4), 2.5)], 10**9)
+    assert published == [(12.5, 3 * 10**9), (12.4, 3_500_000_000)]

@@ -14,7 +14,7 @@ from types import FrameType
 
 import pytest
 
-from omnibot_driver import parameters
+from omnibot_driver import boards, parameters
 from omnibot_driver.boards import omnibot
 from omnibot_driver.cdr import LITTLE_ENDIAN, Serializer, twist
 from omnibot_driver.core.geometry.se2 import Pose
@@ -27,7 +27,7 @@ from omnibot_driver.core.session import Session
 from omnibot_driver.messages import MessageSettings, turned, unturned
 from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
-DEFAULTS = parameters.check_all({})
+DEFAULTS = boards.check_all({})
 TICK_S = 0.01
 SETTLED = 400
 TICKS = 400
@@ -56,7 +56,7 @@ def calls(work: Callable[[], object]) -> int:
 
 def opened_session() -> Session:
     """As the driver makes it."""
-    values = parameters.check_all({})
+    values = boards.check_all({})
     session = Session(
         omnibot.make(values),
         parameters.session_settings(values, omnibot.kinematics(values)),

@@ -1,18 +1,25 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Neuron OmniBot: what makes it of the driver's parameters."""
+"""The Neuron OmniBot: its parameters, and what makes it of them."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
+from omnibot_driver.boards.omnibot_parameters import OMNIBOT, require_a_frame_for_goals
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.imu.scale import ImuScale
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.parameters import table
 from omnibot_driver.transports.serial_port import SerialPort
 
-SIMULATOR = "omnibot_driver.simulator.omnibot"
-"""The package of its simulated board."""
+SIMULATOR: Final = "omnibot_driver.simulator.omnibot"
+PARAMETERS: Final = table(
+    "omnibot",
+    OmniBot.traits,
+    own={"The OmniBot": OMNIBOT},
+    checks=(require_a_frame_for_goals,),
+)
 
 
 def make(values: Mapping[str, Any]) -> OmniBot:
@@ -46,3 +53,8 @@ def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
 def kinematics(values: Mapping[str, Any]) -> OmniKinematics:
     """Its wheels A, B, C."""
     return OmniKinematics(values["wheel_radius"], values["base_radius"])
+
+
+def extras(_node: Any, _link: Any, _values: Mapping[str, Any]) -> Mapping[type, Any]:
+    """It has nothing that other boards have not."""
+    return {}

@@ -8,14 +8,15 @@ actuator that says orders. It knows no ROS, no port and no clock.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from omnibot_driver.core.commands.actuator import Actuator
 from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.packets import NO_PACKETS, Packets
-from omnibot_driver.core.readings import Reading, SampleBoundary, Vector3
+from omnibot_driver.core.readings import Reading, SampleBoundary
 from omnibot_driver.core.traits import Traits
 
 
@@ -34,15 +35,19 @@ class Mode(Enum):
         self.running = name in ("nominal", "imu_only")
 
 
+RateName = Literal["IMU", "Odometry", "Pose"]
+"""A kind of reading, as it is called in diagnostics."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardFigures:
     """What a board's translator counts, since the driver began.
 
-    ``rates_hz``: of IMU readings, displacements and poses, as they should be; ``faults``: how often
-    the framing was lost, with ``discarded_bytes``; ``saturated``: commands that did not fit.
+    ``rates_hz``: how often each kind of reading should come that the board sends; ``faults``: how
+    often the framing was lost, with ``discarded_bytes``; ``saturated``: commands that did not fit.
     """
 
-    rates_hz: Vector3 = (0.0, 0.0, 0.0)
+    rates_hz: Mapping[RateName, float] = field(default_factory=dict)
     faults: int = 0
     discarded_bytes: int = 0
     saturated: int = 0

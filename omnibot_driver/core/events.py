@@ -26,10 +26,13 @@ class Notice:
 
 @dataclass(frozen=True, slots=True)
 class Extra:
-    """What else a board told, in a value of a kind of its own, at ``stamp_s``."""
+    """Something that this board alone measures: any value of a type that its profile publishes.
 
+    ``stamp_s``: when it was measured.
+    """
+
+    value: object
     stamp_s: float
-    content: object
 
 
-Event = ImuEstimate | OdometryEstimate | Extra | StateChanged | RequestDone | Notice
+Event = ImuEstimate | OdometryEstimate | StateChanged | RequestDone | Notice | Extra

@@ -7,7 +7,7 @@ Must not know any board, ROS or processes.
 
 from dataclasses import dataclass
 
-from omnibot_driver import boards, parameters
+from omnibot_driver import boards
 from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -32,7 +32,7 @@ class Capability:
 
 def of(name: str) -> Capability:
     """That of a board by its name. Raises ParameterError where it is not built, or cannot drive."""
-    values = parameters.check_all({"board": name})
+    values = boards.check_all({"board": name})
     profile = boards.load(name)
     traits = profile.make(values).traits
     if Authority.BASE not in traits.authorities:

@@ -1,20 +1,24 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of the driver's work: the line, commands, frames. Knows no ROS."""
+"""The parameters of the driver's work, whatever the board: the line, commands, frames.
+
+Which of them a board has is in ``table``. Knows no ROS.
+"""
 
 from typing import Final
 
 from omnibot_driver.parameters.parameter import Parameter
 
+BOARD: Final = Parameter(
+    "board",
+    "",
+    "",
+    "The motor board at the other end of the line.",
+    fixed=True,
+)
+"""Its default and only choice are the board whose table it is in."""
+
 LINE: Final = (
-    Parameter(
-        "board",
-        "omnibot",
-        "",
-        "The motor board at the other end of the line.",
-        choices=("omnibot",),
-        fixed=True,
-    ),
     Parameter(
         "port",
         "/dev/ttyUSB0",
@@ -36,7 +40,7 @@ LINE: Final = (
         "auto_start",
         True,
         "",
-        "Start the board (S) whenever it is there and not running.",
+        "Start the board whenever it is there and not running.",
         fixed=True,
     ),
     Parameter(
@@ -73,15 +77,6 @@ LINE: Final = (
 
 COMMANDS: Final = (
     Parameter(
-        "control_method",
-        "velocity",
-        "",
-        "Where the board's own switch stands: whether it takes velocities (cmd_vel, wheel_cmd) or"
-        " poses to drive to (cmd_pose).",
-        choices=("velocity", "position"),
-        fixed=True,
-    ),
-    Parameter(
         "enable_stamped_cmd_vel",
         False,
         "",
@@ -117,7 +112,7 @@ COMMANDS: Final = (
         0.0,
         "m/s²",
         "How fast cmd_vel may change the linear velocity, as a vector; 0 is at once. A command to"
-        " stand still is never slowed, wheel_cmd neither.",
+        " stand still, or to single wheels, is never slowed.",
         low=0.0,
         high=100.0,
     ),
@@ -133,7 +128,7 @@ COMMANDS: Final = (
         "cmd_vel_timeout",
         0.5,
         "s",
-        "Age at which cmd_vel and wheel_cmd are worth nothing and the robot is stopped.",
+        "Age at which a velocity command expires; the robot is then stopped.",
         low=0.05,
         high=10.0,
     ),
@@ -150,38 +145,6 @@ COMMANDS: Final = (
         True,
         "",
         "Stop a robot that moves otherwise than commanded, and refuse motion; off, it drives on.",
-    ),
-    Parameter(
-        "linear_scale",
-        70.0,
-        "LSB/(m/s)",
-        "Command unit of the board for linear speed (and for the rim speed of a wheel).",
-        low=1.0,
-        high=10_000.0,
-    ),
-    Parameter(
-        "angular_scale",
-        500.0,
-        "LSB/(rad/s)",
-        "Command unit of the board for the yaw rate.",
-        low=1.0,
-        high=100_000.0,
-    ),
-    Parameter(
-        "position_scale",
-        1000.0,
-        "LSB/m",
-        "Command unit of the board for a position to drive to.",
-        low=1.0,
-        high=100_000.0,
-    ),
-    Parameter(
-        "heading_scale",
-        1000.0,
-        "LSB/rad",
-        "Command unit of the board for a heading to turn to.",
-        low=1.0,
-        high=100_000.0,
     ),
 )
 

@@ -11,15 +11,19 @@ from omnibot_driver.core.errors import ParameterError
 TYPES: Final = {bool: "a bool", int: "an integer", float: "a double", str: "a string"}
 """In the words of ROS."""
 QUOTE: Final = "YAML reads on, off, yes and no as bool: put it in quotes"
-Value = bool | int | float | str | list[int] | list[float]
+NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six")
+Item = int | float | str
+Value = bool | Item | list[int] | list[float] | list[str]
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """One row of the table. The default's type is the parameter's type.
 
-    ``low`` and ``high`` are inclusive, for each number of a list; ``fixed`` means: given at start,
-    read-only afterwards. A list is of three, signs where the default's are integers.
+    ``low`` and ``high`` are inclusive; ``fixed`` means: given at start, read-only afterwards;
+    ``calibrated``: a calibration file may hold it. The default of a list has at least one item.
+    Range and choices then hold for each item, and ``length`` is how many there are, at least and at
+    most; without it, as many as in the default.
     """
 
     name: str
@@ -28,35 +32,50 @@ class Parameter:
     description: str
     low: float | None = None
     high: float | None = None
-    choices: tuple[int | float | str, ...] = ()
+    choices: tuple[Item, ...] = ()
     fixed: bool = False
+    calibrated: bool = False
+    length: tuple[int, int] | None = None
+
+    @property
+    def is_list(self) -> bool:
+        """Whether its value is a list."""
+        return isinstance(self.default, list)
+
+    @property
+    def kind(self) -> type:
+        """The type of its value, or of each item."""
+        return type(self.default[0] if isinstance(self.default, list) else self.default)
+
+    @property
+    def lengths(self) -> tuple[int, int]:
+        """Of a list: the fewest and the most items."""
+        assert isinstance(self.default, list)
+        return self.length or (len(self.default),) * 2
 
     @property
     def allowed(self) -> str:
         """The allowed values in words; empty when any value of the type will do."""
         if self.choices:
-            return "one of " + ", ".join(map(str, self.choices))
+            choices = list(map(str, self.choices))
+            return (
+                f"each {' or '.join(choices)}" if self.is_list else f"one of {', '.join(choices)}"
+            )
         if self.low is not None:
-            each = "each " if isinstance(self.default, list) else ""
+            each = "each " if self.is_list else ""
             return f"{each}{self.low:.10g} to {self.high:.10g} {self.unit}".rstrip()
         return ""
 
     def check(self, value: object) -> Value:
         """The value in the parameter's own type. Raises ParameterError."""
-        if isinstance(self.default, float) and type(value) is int:
-            value = float(value)
-        elif type(self.default) is int and isinstance(value, float) and value.is_integer():
-            value = int(value)
-        elif isinstance(self.default, list) and not isinstance(value, str | bytes):
-            value = list(value) if isinstance(value, Iterable) else value
-        if type(value) is not type(self.default):
-            raise self._refusal(value, self._kind)
-        if isinstance(value, list):
-            return self._check_three(value)
+        if isinstance(self.default, list):
+            items: Value = self._check_list(value)
+            return items
+        value = _converted(value, self.kind)
+        if type(value) is not self.kind:
+            raise self._refusal(value, TYPES[self.kind])
         assert isinstance(value, bool | int | float | str)
-        if self.choices and value not in self.choices:
-            raise self._refusal(value, self.allowed)
-        if not self._in_range(value):
+        if not self._may_be(value):
             raise self._refusal(value, self.allowed)
         if self.name.endswith("_frame") and (not value or str(value).startswith("/")):
             raise self._refusal(value, "a frame name without a leading slash")
@@ -66,28 +85,45 @@ class Parameter:
             raise self._refusal(value, "a prefix without a leading slash, such as robot1/")
         return value
 
-    def _check_three(self, value: list[Any]) -> list[int] | list[float]:
-        assert isinstance(self.default, list)
-        if type(self.default[0]) is int:
-            if len(value) != 3 or any(item not in (1, -1) for item in value):
-                raise self._refusal(value, "three numbers, each 1 or -1")
-            return [int(item) for item in value]
-        numbers = all(type(item) in (int, float) for item in value)
-        if len(value) != 3 or not numbers or not all(map(self._in_range, value)):
-            raise self._refusal(value, f"three numbers, {self.allowed}")
-        return [float(item) for item in value]
-
-    def _in_range(self, value: bool | int | float | str) -> bool:
-        if self.low is None or self.high is None or isinstance(value, str):
-            return True
-        return self.low <= value <= self.high
+    def _check_list(self, value: object) -> Any:
+        if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+            raise self._refusal(value, f"an array of {TYPES[self.kind].split()[1]}s")
+        given = list(value)
+        items = [_converted(item, self.kind) for item in given]
+        fewest, most = self.lengths
+        if not fewest <= len(items) <= most or not all(
+            type(item) is self.kind and self._may_be(item) for item in items
+        ):
+            raise self._refusal(given, self._shape)
+        return items
 
     @property
-    def _kind(self) -> str:
-        if isinstance(self.default, list):
-            return f"an array of {TYPES[type(self.default[0])].split()[1]}s"
-        return TYPES[type(self.default)]
+    def _shape(self) -> str:
+        """Of a list, in words."""
+        things = "strings" if self.kind is str else "numbers"
+        fewest, most = self.lengths
+        count = NUMBERS[most] if most < len(NUMBERS) else str(most)
+        count = count if fewest == most else f"{fewest} to {most}"
+        things = things if most != 1 else things[:-1]
+        return f"{count} {things}" + (f", {self.allowed}" if self.allowed else "")
+
+    def _may_be(self, value: Any) -> bool:
+        """Whether it is among the choices, or in the range."""
+        if self.choices:
+            return value in self.choices
+        if self.low is None or self.high is None:
+            return True
+        return bool(self.low <= value <= self.high)
 
     def _refusal(self, value: object, wanted: str) -> ParameterError:
-        remark = f" ({QUOTE})" if isinstance(self.default, str) and isinstance(value, bool) else ""
+        remark = f" ({QUOTE})" if self.kind is str and isinstance(value, bool) else ""
         return ParameterError(f"parameter '{self.name}' must be {wanted}, not {value!r}{remark}")
+
+
+def _converted(value: object, kind: type) -> object:
+    """As YAML means it: 1 for a double, 1.0 for an integer."""
+    if kind is float and type(value) is int:
+        return float(value)
+    if kind is int and isinstance(value, float) and value.is_integer():
+        return int(value)
+    return value

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of what is driven: the robot, its board, its IMU, and how sure they measure."""
+"""The parameters of what is driven, whatever its board: the robot, its IMU, how sure they measure.
+
+Which of them a board has is in ``table``. Knows no ROS.
+"""
 
 from typing import Final
 
-from omnibot_driver.core.imu.scale import ACCEL_COUNTS_PER_G, GYRO_COUNTS_PER_DPS
-from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S
 from omnibot_driver.parameters.parameter import Parameter
 
 ROBOT: Final = (
@@ -13,65 +14,10 @@ ROBOT: Final = (
         "axis_signs",
         [1, 1, 1],
         "",
-        "1 or -1 for x, y and yaw, applied to commands and to odometry.",
+        "For x, y and yaw: -1 turns the board's axis round, in commands and in odometry.",
+        choices=(1, -1),
         fixed=True,
-    ),
-    Parameter(
-        "delta_frame",
-        "earth",
-        "",
-        "What the board's odometry deltas are: differences of two positions in its earth frame,"
-        " motion along its own axes, or (older firmware) counts of its wheels.",
-        choices=("earth", "body", "wheel_counts"),
-        fixed=True,
-    ),
-    Parameter(
-        "delta_period",
-        0.04,
-        "s",
-        "Time from one of the board's odometry deltas to the next. The manual has 25 Hz in one"
-        " place, 10 Hz in another; the driver says so if the board keeps to another.",
-        choices=DELTA_PERIODS_S,
-        fixed=True,
-    ),
-    Parameter(
-        "use_board_pose",
-        True,
-        "",
-        "Let the board's own pose settle lost motion and rounding; otherwise only its first"
-        " heading is taken.",
-    ),
-    Parameter(
-        "pose_byte_order",
-        "big",
-        "",
-        "Byte order of the floats in the board's pose.",
-        choices=("big", "little"),
-        fixed=True,
-    ),
-    Parameter(
-        "wheel_radius",
-        0.029,
-        "m",
-        "Radius of a wheel, for wheel_cmd and for odometry from wheel counts.",
-        low=0.001,
-        high=1.0,
-    ),
-    Parameter(
-        "base_radius",
-        0.143,
-        "m",
-        "From the centre of the robot to a wheel, for odometry from wheel counts and covariance.",
-        low=0.01,
-        high=10.0,
-    ),
-    Parameter(
-        "counts_per_revolution",
-        1560,
-        "counts",
-        "Encoder counts of one turn of a wheel, for odometry from wheel counts.",
-        low=1,
-        high=1_000_000,
+        calibrated=True,
     ),
     Parameter(
         "odom_linear_scale",
@@ -81,6 +27,7 @@ ROBOT: Final = (
         " calibrate geometry finds it.",
         low=0.5,
         high=2.0,
+        calibrated=True,
     ),
     Parameter(
         "odom_angular_scale",
@@ -89,6 +36,7 @@ ROBOT: Final = (
         "Likewise, for turning.",
         low=0.5,
         high=2.0,
+        calibrated=True,
     ),
     Parameter(
         "fastest_linear_speed",
@@ -134,25 +82,17 @@ ROBOT: Final = (
         low=0.1,
         high=1000.0,
     ),
+    Parameter(
+        "calibration_file",
+        "",
+        "",
+        "YAML file that calibrations write; what they found replaces what is given here"
+        " (docs/calibrate.md).",
+        fixed=True,
+    ),
 )
 
 IMU: Final = (
-    Parameter(
-        "accel_range",
-        2,
-        "g",
-        "Full scale that the accelerometer is set to.",
-        choices=tuple(ACCEL_COUNTS_PER_G),
-        fixed=True,
-    ),
-    Parameter(
-        "gyro_range",
-        250,
-        "°/s",
-        "Full scale that the gyro is set to.",
-        choices=tuple(GYRO_COUNTS_PER_DPS),
-        fixed=True,
-    ),
     Parameter(
         "gyro_bias",
         [0.0, 0.0, 0.0],
@@ -161,6 +101,7 @@ IMU: Final = (
         " finds it.",
         low=-1.0,
         high=1.0,
+        calibrated=True,
     ),
     Parameter(
         "accel_bias",
@@ -169,6 +110,7 @@ IMU: Final = (
         "What the accelerometer reads too much, in its own axes; taken off.",
         low=-5.0,
         high=5.0,
+        calibrated=True,
     ),
     Parameter(
         "auto_gyro_bias",
@@ -176,14 +118,6 @@ IMU: Final = (
         "",
         "Refine the gyro's bias slowly whenever the robot stands still. Do not use it on what turns"
         " itself (ship, turntable).",
-    ),
-    Parameter(
-        "calibration_file",
-        "",
-        "",
-        "YAML file that ~/calibrate_gyro and the tool calibrate write; what they found replaces"
-        " what is given here (docs/calibrate.md).",
-        fixed=True,
     ),
 )
 
@@ -195,6 +129,7 @@ NOISE: Final = (
         "Noise of one accelerometer sample (400 µg/√Hz over 50 Hz), for the covariance.",
         low=1e-6,
         high=100.0,
+        calibrated=True,
     ),
     Parameter(
         "angular_velocity_stddev",
@@ -203,6 +138,7 @@ NOISE: Final = (
         "Noise of one gyro sample (0.05 °/s rms), for the covariance.",
         low=1e-6,
         high=100.0,
+        calibrated=True,
     ),
     Parameter(
         "odom_wheel_drift",

@@ -1,7 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From checked values to what the core is set to: each value under its meaning there."""
+"""From checked values to what the core is set to: each value under its meaning there.
 
+What a board's table lacks, means nothing to that board.
+"""
+
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -21,11 +25,11 @@ def session_settings(values: Mapping[str, Any], wheels: Kinematics) -> SessionSe
     """What the session needs of checked values; ``wheels``: of the board's profile."""
     return SessionSettings(
         limits=SpeedLimits(
-            linear_mps=values["max_linear_speed"],
-            angular_radps=values["max_angular_speed"],
-            wheel_radps=values["max_wheel_speed"],
-            linear_mps2=values["max_linear_acceleration"],
-            angular_radps2=values["max_angular_acceleration"],
+            linear_mps=values.get("max_linear_speed", 0.0),
+            angular_radps=values.get("max_angular_speed", 0.0),
+            wheel_radps=values.get("max_wheel_speed", 0.0),
+            linear_mps2=values.get("max_linear_acceleration", 0.0),
+            angular_radps2=values.get("max_angular_acceleration", 0.0),
         ),
         commands=CommandSettings(
             timeout_s=values["cmd_vel_timeout"], rate_hz=values["command_rate"]
@@ -40,7 +44,7 @@ def session_settings(values: Mapping[str, Any], wheels: Kinematics) -> SessionSe
                 unheard_mps2=values["odom_gap_acceleration"],
                 unheard_radps2=values["odom_gap_angular_acceleration"],
             ),
-            use_board_pose=values["use_board_pose"],
+            use_board_pose=values.get("use_board_pose", True),
             fastest_mps=values["fastest_linear_speed"],
             fastest_radps=values["fastest_angular_speed"],
             linear_scale=values["odom_linear_scale"],
@@ -51,14 +55,18 @@ def session_settings(values: Mapping[str, Any], wheels: Kinematics) -> SessionSe
             fastest_radps=values["fastest_angular_speed"],
             fastest_mps2=values["fastest_linear_acceleration"],
             fastest_radps2=values["fastest_angular_acceleration"],
-            force_step_mps2=values["largest_force_step"],
-            full_scale_mps2=values["accel_range"] * STANDARD_GRAVITY,
+            force_step_mps2=values.get("largest_force_step", math.inf),
+            full_scale_mps2=values.get("accel_range", math.inf) * STANDARD_GRAVITY,
         ),
-        imu=ImuCorrection(
-            gyro_bias=_vector(values["gyro_bias"]),
-            accel_bias=_vector(values["accel_bias"]),
-            auto_gyro_bias=values["auto_gyro_bias"],
-        ),
+        imu=_imu(values) if "gyro_bias" in values else ImuCorrection(),
+    )
+
+
+def _imu(values: Mapping[str, Any]) -> ImuCorrection:
+    return ImuCorrection(
+        gyro_bias=_vector(values["gyro_bias"]),
+        accel_bias=_vector(values["accel_bias"]),
+        auto_gyro_bias=values["auto_gyro_bias"],
     )
 
 

@@ -16,7 +16,7 @@ from carriage import FAULTS, receive
 from ratios import Figure, alternate, short
 from truth import SCENARIOS, generate
 
-from omnibot_driver import parameters
+from omnibot_driver import boards, parameters
 from omnibot_driver.boards import omnibot
 from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, PoseFrame
 from omnibot_driver.core.omnibot.frames import Frame
@@ -165,7 +165,7 @@ def memory(hours: float = 1.0) -> str:
 
 
 def _session() -> Session:
-    settings = parameters.check_all({})
+    settings = boards.check_all({})
     session = Session(
         omnibot.make(settings),
         parameters.session_settings(settings, omnibot.kinematics(settings)),

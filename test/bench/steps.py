@@ -19,7 +19,7 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState
 
-from omnibot_driver import parameters
+from omnibot_driver import boards, parameters
 from omnibot_driver.boards import omnibot
 from omnibot_driver.cdr import Serializer
 from omnibot_driver.core.geometry.se2 import Pose
@@ -40,7 +40,7 @@ class Relay:
     """``publish`` is given what a step made of a read."""
 
     def __init__(self, node: Node) -> None:
-        values = parameters.check_all({})
+        values = boards.check_all({})
         settings = MessageSettings.from_parameters(values, omnibot.kinematics(values))
         self._make, self._wheels, self._sizes = (
             Serializer(settings),

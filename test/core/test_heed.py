@@ -6,7 +6,7 @@ from contextlib import suppress
 
 import pytest
 
-from omnibot_driver import parameters
+from omnibot_driver import boards, parameters
 from omnibot_driver.boards import omnibot
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -20,7 +20,7 @@ TICK_S = 0.01
 
 
 def opened() -> Session:
-    values = parameters.check_all({})
+    values = boards.check_all({})
     board = omnibot.settings(values)
     settings = parameters.session_settings(values, omnibot.kinematics(values))
     session = Session(OmniBot(board), settings, run=True)

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from urdf_parser_py.urdf import URDF
 
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.parameters import BY_NAME
 
 ROOT = Path(__file__).parents[2]
 WHEELS = ("wheel_a_joint", "wheel_b_joint", "wheel_c_joint")
@@ -71,14 +71,14 @@ def test_the_joints_are_those_of_joint_states() -> None:
 
 def test_the_frames_are_those_of_the_driver() -> None:
     """base_link is the root: odom moves it, and a frame has one parent."""
-    assert ROBOT.get_root() == BY_NAME["base_frame"].default
-    assert {BY_NAME["imu_frame"].default, "base_footprint"} < set(ROBOT.link_map)
+    assert ROBOT.get_root() == PARAMETERS.by_name["base_frame"].default
+    assert {PARAMETERS.by_name["imu_frame"].default, "base_footprint"} < set(ROBOT.link_map)
 
 
 def test_the_default_geometry_is_the_drivers() -> None:
     """One wheel radius and one base radius in description, parameters and manual."""
     for name, manual_m in GEOMETRY.items():
-        assert BY_NAME[name].default == manual_m
+        assert PARAMETERS.by_name[name].default == manual_m
     for name in WHEELS:
         x, y, _ = ROBOT.joint_map[name].origin.xyz
         assert math.hypot(x, y) == pytest.approx(GEOMETRY["base_radius"])

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from omnibot_driver.parameters import BY_NAME
+from omnibot_driver.boards.omnibot import PARAMETERS
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
@@ -41,7 +41,7 @@ def found(pattern: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("name", GENERATED)
 def test_what_is_generated_is_what_the_code_says(name: str) -> None:
-    """Parameters, driver.yaml, mode table and diagram; `make docs` writes them."""
+    """Parameters, their files, mode table and diagram; `make docs` writes them."""
     assert (ROOT / name).read_text(encoding="utf-8") == GENERATED[name](), "run: make docs"
 
 
@@ -80,11 +80,11 @@ def test_every_command_exists() -> None:
     assert {*found(r"ros2 launch omnibot_driver\s+([\w.]+)")} <= launches
     targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
     assert {*found(r"`make ([a-z]+)[ `]")} <= set(targets)
-    assert {*found(r" -p '?([a-z_]+):=")} - OTHERS_PARAMETERS <= set(BY_NAME)
+    assert {*found(r" -p '?([a-z_]+):=")} - OTHERS_PARAMETERS <= set(PARAMETERS.by_name)
     code = "".join(file.read_text() for file in (ROOT / "omnibot_driver").rglob("*.py"))
     services = re.findall(r'create_service\(\s*\w+, "~/(\w+)"', code)
     assert {*found(r"ros2 service call /omnibot_driver/(\w+)")} <= set(services)
-    assert {*found(r"ros2 param \w+ /omnibot_driver (\w+)")} <= set(BY_NAME)
+    assert {*found(r"ros2 param \w+ /omnibot_driver (\w+)")} <= set(PARAMETERS.by_name)
 
 
 @pytest.mark.skipif(

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.parameters import BY_NAME
 
 ROOT = Path(__file__).parents[2]
 TROUBLESHOOTING = ROOT / "docs/troubleshooting.md"
@@ -110,7 +110,7 @@ def test_every_assumption_has_its_step_and_what_mends_it() -> None:
     form = re.findall(r"^\| (.+) \| (\d) \| (.+) \| \|$", text, re.MULTILINE)
     assert {step for _, step, _ in form} == steps
     named = {name for _, _, mends in form for name in re.findall(r"`(\w+)`", mends)}
-    assert named - {"imu_rpy"} <= set(BY_NAME)
+    assert named - {"imu_rpy"} <= set(PARAMETERS.by_name)
 
 
 def test_the_wheels_turn_as_the_guide_says() -> None:

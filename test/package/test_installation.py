@@ -144,7 +144,7 @@ def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, pr
         workspace,
         [
             executables / "driver",
-            *("--ros-args", "--params-file", prefix / "share" / PACKAGE / "config/driver.yaml"),
+            *("--ros-args", "--params-file", prefix / "share" / PACKAGE / "config/omnibot.yaml"),
             *("-p", f"port:={board}"),
         ],
     )

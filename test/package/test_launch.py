@@ -18,7 +18,8 @@ from typing import Any
 import pytest
 import yaml
 
-from omnibot_driver.parameters import BY_NAME
+from omnibot_driver import boards
+from omnibot_driver.boards.omnibot import PARAMETERS
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = "omnibot_driver"
@@ -124,10 +125,12 @@ def test_a_launch_file_names_only_what_is_installed(path: Path) -> None:
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     ]
     folders = [text for text in strings if text in INSTALLED]
-    names = [text for text in strings if text.endswith((".py", ".yaml", ".xacro", ".rviz"))]
+    names = [text.strip() for text in strings]
+    names = [name for name in names if name.endswith((".py", ".yaml", ".xacro", ".rviz"))]
     assert names
-    for name in names:
-        assert any((ROOT / folder / name).is_file() for folder in folders), name
+    for name in names:  # one that begins with a dot follows the name of the board
+        for file in [f"{board}{name}" for board in boards.PROFILES] if name[0] == "." else [name]:
+            assert any((ROOT / folder / file).is_file() for folder in folders), file
 
 
 def test_the_driver_has_every_parameter_that_is_offered() -> None:
@@ -138,7 +141,7 @@ def test_the_driver_has_every_parameter_that_is_offered() -> None:
         for node in tree.body
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict)
     )
-    assert {"port"} < set(offered) <= set(BY_NAME)
+    assert {"board", "port"} < set(offered) <= set(PARAMETERS.by_name)
 
 
 @needs_launch
@@ -147,7 +150,7 @@ def test_the_driver_gets_the_defaults_and_nothing_else(launch: Callable[..., Sta
     started = launch("driver.launch.py")
     assert set(started) == {"driver"}
     assert parameters(started["driver"]) == {
-        parameter.name: parameter.default for parameter in BY_NAME.values()
+        parameter.name: parameter.default for parameter in PARAMETERS.by_name.values()
     }
 
 
@@ -166,6 +169,19 @@ def test_the_driver_gets_what_is_given(launch: Callable[..., Started]) -> None:
     )
     assert "__ns:=/robot1" in started["driver"]["arguments"]
     assert "__node:=omnibot_driver" in started["driver"]["arguments"]
+
+
+@needs_launch
+def test_the_parameter_file_is_that_of_the_board(
+    launch: Callable[..., Started], tmp_path: Path
+) -> None:
+    """Unless another is given; then the board that is given goes with that one."""
+    defaults = {row.name: row.default for row in PARAMETERS.rows}
+    assert parameters(launch("driver.launch.py", "board:=omnibot")["driver"]) == defaults
+    own = tmp_path / "own.yaml"
+    own.write_text("/**:\n  ros__parameters:\n    port: sim://\n")
+    started = launch("driver.launch.py", "board:=omnibot", f"params_file:={own}")
+    assert parameters(started["driver"]) == {"board": "omnibot", "port": "sim://"}
 
 
 @needs_launch

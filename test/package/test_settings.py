@@ -14,15 +14,18 @@ import rclpy
 import yaml
 from rclpy.context import Context
 
-from omnibot_driver.parameters import BY_NAME
+from omnibot_driver.boards.omnibot import PARAMETERS
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / "config"
 NODE = "omnibot_driver"
 
-FRAMES = {BY_NAME[name].default for name in ("odom_frame", "base_frame")} | {"map"}
-LINEAR, ANGULAR = BY_NAME["max_linear_speed"].default, BY_NAME["max_angular_speed"].default
-TIMEOUT = BY_NAME["cmd_vel_timeout"].default
+FRAMES = {PARAMETERS.by_name[name].default for name in ("odom_frame", "base_frame")} | {"map"}
+LINEAR, ANGULAR = (
+    PARAMETERS.by_name["max_linear_speed"].default,
+    PARAMETERS.by_name["max_angular_speed"].default,
+)
+TIMEOUT = PARAMETERS.by_name["cmd_vel_timeout"].default
 
 # Topics of others that the displays show.
 OTHERS = {"robot_description", "diagnostics", "goal_pose"}
@@ -159,7 +162,7 @@ def test_the_mux_passes_on_what_the_driver_takes() -> None:
     sources = mux["topics"].values()
     assert {source["timeout"] for source in sources} == {TIMEOUT}
     assert not DRIVER & {source["topic"] for source in sources}
-    assert mux["use_stamped"] is BY_NAME["enable_stamped_cmd_vel"].default
+    assert mux["use_stamped"] is PARAMETERS.by_name["enable_stamped_cmd_vel"].default
     assert "-r cmd_vel_out:=cmd_vel\n" in (CONFIG / "twist_mux.yaml").read_text()
 
 
@@ -172,7 +175,7 @@ def test_rviz_shows_topics_and_frames_that_exist() -> None:
         for topic in everything_under(key, rviz)
     }
     assert {"odom", "robot_description"} < topics <= DRIVER | OTHERS
-    assert rviz["Global Options"]["Fixed Frame"] == BY_NAME["odom_frame"].default
+    assert rviz["Global Options"]["Fixed Frame"] == PARAMETERS.by_name["odom_frame"].default
 
 
 def test_foxglove_shows_topics_and_services_that_exist() -> None:

@@ -16,7 +16,7 @@ from probe import Probe
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
 
-from omnibot_driver.parameters import PARAMETERS
+from omnibot_driver.boards.omnibot import PARAMETERS
 
 Start = Callable[..., Any]
 
@@ -95,7 +95,7 @@ def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
     assert (ended.returncode, ended.stderr) == (0, "")
     assert ended.stdout.startswith("usage: ros2 run omnibot_driver driver ")
     assert "--ros-args -p port:=/dev/ttyUSB0\n" in ended.stdout
-    assert "config/driver.yaml" in ended.stdout
+    assert "config/omnibot.yaml" in ended.stdout
 
 
 OPENS_NOTHING = "import serial; serial.serial_for_url = None"
@@ -179,9 +179,9 @@ def test_every_parameter_is_described(
 ) -> None:
     """Description, unit and range, for ``ros2 param describe`` and rqt."""
     probe: Probe = probe_of(start_driver(start_board().path))
-    names = [parameter.name for parameter in PARAMETERS]
+    names = [parameter.name for parameter in PARAMETERS.rows]
     descriptors = probe.call(DescribeParameters, "describe_parameters", names=names).descriptors
-    for parameter, descriptor in zip(PARAMETERS, descriptors, strict=True):
+    for parameter, descriptor in zip(PARAMETERS.rows, descriptors, strict=True):
         assert parameter.description in descriptor.description
         assert parameter.unit in descriptor.description
         assert descriptor.read_only == parameter.fixed

@@ -7,8 +7,8 @@ from typing import Any
 
 from session_bench import TICK_S, Bench
 
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.simulator.omnibot import BoardSettings
 from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.motion import HALT, Bounds, Law, Topic
@@ -26,7 +26,9 @@ class BenchRobot:
         self.bench.open()
         self.bench.run_until_state("nominal")
         self.bench.run(1.0)
-        self.parameters = {name: parameter.default for name, parameter in BY_NAME.items()}
+        self.parameters = {
+            name: parameter.default for name, parameter in PARAMETERS.by_name.items()
+        }
 
     def drive(
         self,

@@ -4,15 +4,17 @@
 
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 from calibrate_rig import Rig
 from driver_process import PATIENCE_S
 from std_msgs.msg import String
 
-from omnibot_driver.parameters import PARAMETERS
+from omnibot_driver.boards import omnibot
+from omnibot_driver.boards.omnibot import PARAMETERS
+from omnibot_driver.parameters import Parameter
 from omnibot_driver.tools.calibrate import client, listener
 from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.motion import Bounds, steady
@@ -46,8 +48,9 @@ def test_a_driver_of_another_version_is_told(
     rigged: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """It does not know a parameter of ours."""
-    newer = SimpleNamespace(name="of_tomorrow")
-    monkeypatch.setattr(client, "PARAMETERS", (*PARAMETERS, newer))
+    newer = Parameter("of_tomorrow", 1, "", "")
+    table = replace(PARAMETERS, sections={**PARAMETERS.sections, "New": (newer,)})
+    monkeypatch.setattr(omnibot, "PARAMETERS", table)
     assert rigged.calibrate("scale") == 1
     assert "is of another version than this tool" in capsys.readouterr().err
 

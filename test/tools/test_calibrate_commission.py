@@ -11,7 +11,7 @@ from calibrate_rig import parameters_of, rig
 from seeing_user import User
 
 from omnibot_driver import calibration
-from omnibot_driver.parameters import PARAMETERS
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.tools.calibrate import commission
 from omnibot_driver.tools.calibrate.commission_result import Found, result_of
 from omnibot_driver.tools.calibrate.console import Console
@@ -58,7 +58,7 @@ def test_the_whole_walk_finds_what_was_planted(
             "axis_signs": [1, -1, -1],
             "imu_rpy": [3.1416, 0.0, 1.5708],
         }
-        assert set(robot.written()) <= {*calibration.NAMES, *calibration.RECORDED}
+        assert set(robot.written()) <= {*PARAMETERS.calibrated, *calibration.RECORDED}
         assert "xacro_args" in said
         assert (tmp_path / "calibrate_commission.png").stat().st_size > 10_000
     with rig(tmp_path, {"calibration_file": str(robot.output)}) as again:
@@ -86,7 +86,7 @@ def test_switch_and_deltas_are_told_by_the_data(
 class Deaf:
     """A robot that can be told everything."""
 
-    parameters: ClassVar[dict[str, Any]] = {one.name: one.default for one in PARAMETERS}
+    parameters: ClassVar[dict[str, Any]] = {one.name: one.default for one in PARAMETERS.rows}
 
     def drive(self, *_: object, **__: object) -> Log:
         return Log()

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from omnibot_driver import calibration
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.tools.calibrate import imu, robot
 from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.result import Finding, Result
@@ -62,7 +63,7 @@ def ending(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Ending:
 def test_all_is_well(ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """What was found is told, saved and drawn."""
     assert ending() == 0
-    assert calibration.load(tmp_path / "robot.yaml") == FOUND
+    assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
     assert "<svg" in (tmp_path / "imu.svg").read_text()
     assert "71.3" in capsys.readouterr().out
 
@@ -73,7 +74,7 @@ def test_a_picture_that_cannot_be_drawn_costs_the_picture_alone(
 ) -> None:
     """The result is saved, and the sentence says so."""
     assert ending(draw=draw) == 1
-    assert calibration.load(tmp_path / "robot.yaml") == FOUND
+    assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
     said = capsys.readouterr()
     assert f"saved to {tmp_path}/robot.yaml, but {tmp_path}/imu.svg is not drawn: " in said.err
     assert "71.3" in said.out
@@ -99,7 +100,7 @@ def test_a_broken_pipe_loses_nothing(
     with os.fdopen(writer, "w") as gone:
         monkeypatch.setattr(sys, "stdout", gone)
         assert ending() == 1
-    assert calibration.load(tmp_path / "robot.yaml") == FOUND
+    assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
 
 
 def test_what_is_to_be_copied_stands_on_one_line(

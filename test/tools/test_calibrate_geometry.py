@@ -17,8 +17,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from surveyor import Surveyor
 
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.tools.calibrate import geometry
 from omnibot_driver.tools.calibrate.arguments import command_line
 from omnibot_driver.tools.calibrate.console import Console
@@ -150,7 +150,7 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
 
 def test_sizes_that_were_found_are_those_believed_next_time() -> None:
     """So a second calibration goes on from the first; the driver itself turns counts into ways."""
-    now = {name: parameter.default for name, parameter in BY_NAME.items()}
+    now = {name: parameter.default for name, parameter in PARAMETERS.by_name.items()}
     found = {
         "wheel_radius": 0.029 * 1.02,
         "base_radius": 0.143 * 0.97,

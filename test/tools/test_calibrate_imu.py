@@ -12,7 +12,7 @@ from driver_process import Driver
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from omnibot_driver.parameters import BY_NAME
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.tools.calibrate.allan import allan, noise
 from omnibot_driver.tools.calibrate.files import draw
 from omnibot_driver.tools.calibrate.imu import result
@@ -102,7 +102,7 @@ def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
     """Of noise, which no compression makes small."""
     imu = sensor(120.0)
     picture = tmp_path / "imu.png"
-    now = {name: parameter.default for name, parameter in BY_NAME.items()}
+    now = {name: parameter.default for name, parameter in PARAMETERS.by_name.items()}
     draw(result(rest(imu), imu, now, 9.80665), tmp_path / "robot.yaml", picture)
     assert picture.stat().st_size < 170_000
 

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver import calibration
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.readings import Vector3
-from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.console import Console, digits
 from omnibot_driver.tools.calibrate.files import draw, output_file, picture_file, save
@@ -146,8 +146,8 @@ def test_what_is_written_is_what_the_driver_loads(tmp_path: Path) -> None:
     """Beside everything that was in the file before."""
     path = tmp_path / "robot.yaml"
     path.write_text("name: number 7\ngyro_bias: [0.0, 0.0, 0.1]\nlinear_scale: 71.0\n")
-    save(result(linear_scale=80.5, axis_signs=[1, -1, 1]), path)
-    assert calibration.load(path) == {
+    save(result(linear_scale=80.5, axis_signs=[1, -1, 1]), path, PARAMETERS)
+    assert calibration.load(path, PARAMETERS) == {
         "gyro_bias": [0.0, 0.0, 0.1], "linear_scale": 80.5, "axis_signs": [1, -1, 1],
     }  # fmt: skip
     assert yaml.safe_load(path.read_text())["name"] == "number 7"
@@ -157,16 +157,16 @@ def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
     """The next start must not fail."""
     path = tmp_path / "robot.yaml"
     with pytest.raises(ToolError, match="parameter 'linear_scale' must be"):
-        save(result(linear_scale=1e9), path)
+        save(result(linear_scale=1e9), path, PARAMETERS)
     assert not path.exists()
 
 
 def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
     """For the file and the picture; after ten minutes of driving is no time to refuse them."""
     path, picture = tmp_path / "a" / "b" / "robot.yaml", tmp_path / "c" / "d" / "picture.png"
-    assert output_file(str(path), "") == path
+    assert output_file(str(path), "", PARAMETERS) == path
     assert picture_file(str(picture), "imu") == picture
-    save(result(linear_scale=80.5), path)
+    save(result(linear_scale=80.5), path, PARAMETERS)
     draw(result(linear_scale=80.5), path, picture)
     assert path.exists()
     assert picture.exists()
@@ -174,7 +174,7 @@ def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
 
 def test_everything_that_may_be_written_is_a_parameter() -> None:
     """A name that the driver does not know would end it."""
-    assert set(calibration.NAMES) <= set(BY_NAME)
+    assert {"axis_signs", "gyro_bias", "linear_scale"} < set(PARAMETERS.calibrated)
 
 
 def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -> None:
@@ -182,16 +182,16 @@ def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -
     ros = tmp_path / "driver.yaml"
     ros.write_text("/**:\n  ros__parameters:\n    port: x\n")
     with pytest.raises(ToolError, match="is a file of ROS parameters"):
-        output_file(str(ros), "")
+        output_file(str(ros), "", PARAMETERS)
     (tmp_path / "bad.yaml").write_text("gyro_bias: 1")
     with pytest.raises(ToolError, match="or name another file with --output"):
-        output_file(str(tmp_path / "bad.yaml"), "")
+        output_file(str(tmp_path / "bad.yaml"), "", PARAMETERS)
     with pytest.raises(ToolError, match="cannot be written"):
         picture_file(str(ros / "picture.png"), "imu")
     with pytest.raises(ToolError, match=r"let it end in \.png"):
         picture_file(str(tmp_path / "picture.doc"), "imu")
     assert picture_file(str(tmp_path), "imu") == tmp_path / "calibrate_imu.png"
-    assert output_file(None, str(tmp_path / "own.yaml")) == tmp_path / "own.yaml"
+    assert output_file(None, str(tmp_path / "own.yaml"), PARAMETERS) == tmp_path / "own.yaml"
 
 
 @pytest.mark.parametrize(

@@ -11,14 +11,14 @@ from calibrate_rig import parameters_of, rig, row
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from omnibot_driver.parameters import BY_NAME
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.scale import result
 from omnibot_driver.tools.calibrate.speeds import SETTLE_S, plan, scale, speeds
 from omnibot_driver.tools.needs import ToolError
 
 UP, NO_BIAS = np.array([0.0, 0.0, -1.0]), np.zeros(3)
-NOW = {name: parameter.default for name, parameter in BY_NAME.items()}
+NOW = {name: parameter.default for name, parameter in PARAMETERS.by_name.items()}
 ASSUMED = (70.0, 70.0, 500.0)
 
 

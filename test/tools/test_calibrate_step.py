@@ -9,7 +9,7 @@ import pytest
 from calibrate_rig import rig, row
 
 from omnibot_driver import calibration
-from omnibot_driver.parameters import PARAMETERS
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.simulator.omnibot.motors import MotorConstants
 from omnibot_driver.tools.calibrate import step
 from omnibot_driver.tools.calibrate.arguments import command_line
@@ -53,7 +53,7 @@ def test_a_planted_motor_is_found(
 
 def still(answer: str, *words: str) -> None:
     """Run with a robot that can do nothing but say its parameters."""
-    parameters = {parameter.name: parameter.default for parameter in PARAMETERS}
+    parameters = {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     robot = SimpleNamespace(parameters=parameters)
     arguments = command_line().parse_args(["step", *words])
     step.run(robot, Console(read=lambda _question: answer), arguments)

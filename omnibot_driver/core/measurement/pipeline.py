@@ -145,6 +145,6 @@ class MeasurementPipeline:
         if isinstance(reading, ImuReading):
             return [self.inertial.estimate(reading, stamp_s)]
         if isinstance(reading, ExtraReading):
-            return [Extra(stamp_s, reading.content)]
+            return [Extra(reading.content, stamp_s)]
         self._clock.restart()
         return []

@@ -8,6 +8,8 @@ else follows from that. This module knows rates; it does not know what is in a f
 
 from typing import Final
 
+from omnibot_driver.core.board import RateName
+
 TICK_S: Final = 0.01
 """Of the control loop; an IMU frame comes with each."""
 POSE_PERIOD_S: Final = 0.2
@@ -33,8 +35,11 @@ class Schedule:
         self.imus_alone = max(FEWEST_ALONE, DELTAS_MISSING * self.imus_per_delta + 1)
         """IMU frames without a delta that make IMU-only mode."""
         self.bytes_per_s = _IMU_BYTES_PER_S + _DELTA_BYTES / delta_period_s + _POSE_BYTES_PER_S
-        self.rates_hz = (1.0 / TICK_S, 1.0 / delta_period_s, 1.0 / POSE_PERIOD_S)
-        """Of IMU frames, deltas and poses."""
+        self.rates_hz: dict[RateName, float] = {
+            "IMU": 1.0 / TICK_S,
+            "Odometry": 1.0 / delta_period_s,
+            "Pose": 1.0 / POSE_PERIOD_S,
+        }
 
 
 USUAL: Final = Schedule()

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final
 
+from omnibot_driver.core.board import RateName
 from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
 
 RECENT_S: Final = 10.0
@@ -31,6 +32,12 @@ BUSY_SHARE: Final = 0.1
 """Of the time that the reader waits for the processor."""
 
 RUNNING: Final = ("nominal", "imu_only")
+OF_KIND: Final[Mapping[RateName, tuple[str, ...]]] = {
+    "IMU": ("IMU frames lost", "IMU readings refused"),
+    "Odometry": ("Odometry frames lost", "Odometry readings refused"),
+    "Pose": ("Poses refused",),
+}
+"""Figures that say nothing of a board which does not send this kind of reading."""
 
 
 class Level(IntEnum):
@@ -72,17 +79,17 @@ class Diagnosis:
     def judge(
         self, link: LinkFigures, session: SessionFigures, refusals: Refusals, now: float
     ) -> list[Status]:
-        """All verdicts, always of the same names in the same order."""
+        """All verdicts, of one board always of the same names in the same order."""
         self._remember(session, now)
-        return [
+        statuses = [
             self._link(link, now),
             self._board(session, now),
             self._stream(link, session, now),
             self._time(session, now),
             self._commands(session, refusals, now),
             self._estop(session),
-            self._imu(session),
         ]
+        return [*statuses, self._imu(session)] if "IMU" in session.board.rates_hz else statuses
 
     def _remember(self, session: SessionFigures, now: float) -> None:
         """The same state all along."""
@@ -149,16 +156,14 @@ class Diagnosis:
         overran = self._grew("overruns", link.overruns or 0, now)
         waiting = self._waiting_share(link, now)
         doubtful = self._grew("refused", readings_refused, now)
-        rates = self._rates_hz()
-        wanted = (
-            session.board.rates_hz if session.state == "nominal" else session.board.rates_hz[:1]
-        )
+        rates, wanted = self._rates_hz(), session.board.rates_hz
         level, message = Level.OK, "complete"
         if session.state not in RUNNING:
             level, message = Level.STALE, "the board sends no measurements"
         elif rates and any(
-            abs(rate - want) > RATE_TOLERANCE * want + 1.0 / self._span_s
-            for rate, want in zip(rates, wanted, strict=False)
+            abs(rates[name] - want) > RATE_TOLERANCE * want + 1.0 / self._span_s
+            for name, want in wanted.items()
+            if name == "IMU" or session.state == "nominal"
         ):
             level = Level.WARN
             message = (
@@ -187,12 +192,10 @@ class Diagnosis:
                 "complete, but read late: the reader waits"
                 f" {waiting:.0%} of the time for the processor"
             )
-        names = ("IMU", "Odometry", "Pose")
-        shown = rates or (math.nan,) * 3
         values = {
             **{
-                f"{name} rate (Hz)": f"{rate:.1f} of {want:g}"
-                for name, rate, want in zip(names, shown, session.board.rates_hz, strict=True)
+                f"{name} rate (Hz)": f"{rates[name] if rates else math.nan:.1f} of {want:g}"
+                for name, want in wanted.items()
             },
             "Framing faults": str(session.board.faults),
             "Bytes discarded": str(session.board.discarded_bytes),
@@ -204,7 +207,13 @@ class Diagnosis:
             "Odometry readings refused": str(refused.displacements),
             "Poses refused": str(refused.poses),
         }
-        return Status("Stream", level, message, values)
+        absent = [key for name in OF_KIND.keys() - wanted.keys() for key in OF_KIND[name]]
+        return Status(
+            "Stream",
+            level,
+            message,
+            {key: value for key, value in values.items() if key not in absent},
+        )
 
     def _waiting_share(self, link: LinkFigures, now: float) -> float:
         """Of the recent time that the reader was ready to run and did not."""
@@ -220,14 +229,17 @@ class Diagnosis:
     def _span_s(self) -> float:
         return self._window[-1][0] - self._window[0][0]
 
-    def _rates_hz(self) -> tuple[float, float, float] | None:
+    def _rates_hz(self) -> dict[RateName, float] | None:
         """Of the readings in this state; None before there was time to count any."""
         if not self._span_s:
             return None
         old, new = self._window[0][1].tally, self._window[-1][1].tally
-        counts = (new.imu - old.imu, new.displacements - old.displacements, new.poses - old.poses)
-        imu, displacements, poses = (count / self._span_s for count in counts)
-        return imu, displacements, poses
+        counts: dict[RateName, int] = {
+            "IMU": new.imu - old.imu,
+            "Odometry": new.displacements - old.displacements,
+            "Pose": new.poses - old.poses,
+        }
+        return {name: count / self._span_s for name, count in counts.items()}
 
     def _time(self, session: SessionFigures, now: float) -> Status:
         old, new = self._window[0][1].tally, self._window[-1][1].tally

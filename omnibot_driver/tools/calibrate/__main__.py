@@ -51,6 +51,7 @@ def _calibrate(
     interruption: Interruption,
     read: Callable[[str], str],
 ) -> None:
+    from omnibot_driver.tools.calibrate.arguments import require_able
     from omnibot_driver.tools.calibrate.console import Console
     from omnibot_driver.tools.calibrate.files import draw, output_file, picture_file, save
 
@@ -62,11 +63,13 @@ def _calibrate(
     console = Console(yes=arguments.yes, read=read)
     picture = picture_file(arguments.plot, arguments.subcommand)
     with connect(arguments.namespace, ros_arguments, interruption) as robot:
-        output = output_file(arguments.output, str(robot.parameters["calibration_file"]))
+        require_able(arguments.subcommand, robot.parameters)
+        drivers = str(robot.parameters["calibration_file"])
+        output = output_file(arguments.output, drivers, robot.table)
         result = run(robot, console, arguments)
         interruption.check()
         try:
-            save(result, output)
+            save(result, output, robot.table)
         finally:  # what was measured is told, whatever becomes of the file
             console.table(f"calibrate {arguments.subcommand}: {robot.driver}", result.findings)
         for note in result.notes:

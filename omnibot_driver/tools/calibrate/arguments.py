@@ -4,12 +4,33 @@
 
 import argparse
 import math
+from collections.abc import Mapping
 from typing import Final
 
 from omnibot_driver.core.imu.scale import STANDARD_GRAVITY
 from omnibot_driver.tools.calibrate.seen import WHEELS
+from omnibot_driver.tools.needs import ToolError
 
 PARTS: Final = ("board", "wheels", "imu")
+
+
+NEEDS: Final = {
+    "commission": ("delta_frame", "the OmniBot's wheels and odometry"),
+    "imu": ("gyro_bias", "an IMU"),
+    "scale": ("linear_scale", "a unit of its own for commanded speeds"),
+    "geometry": ("base_radius", "three wheels around its centre"),
+    "step": ("max_wheel_speed", "commands to single wheels"),
+}
+"""By subcommand: a parameter that a driver has where this can be done, and what it stands for."""
+
+
+def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:
+    """Raises ToolError where the board of the driver with these parameters lacks what is needed."""
+    parameter, thing = NEEDS[subcommand]
+    if parameter not in parameters:
+        raise ToolError(
+            f"calibrate {subcommand} needs {thing}: the board {parameters['board']} has none of it"
+        )
 
 
 def command_line() -> argparse.ArgumentParser:

@@ -16,7 +16,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
 
-from omnibot_driver.parameters import BY_NAME, PARAMETERS, Value
+from omnibot_driver import boards
+from omnibot_driver.parameters import Table, Value
 from omnibot_driver.tools.calibrate.interruption import Interruption
 from omnibot_driver.tools.needs import ToolError
 
@@ -25,14 +26,17 @@ ANSWER_WITHIN_S: Final = 12.0
 
 
 class Client:
-    """``driver``: the full name of the driver's node; ``parameters``: its own, by name."""
+    """``driver``: the full name of the driver's node; ``parameters``: its own, by name, which are
+    those of ``table``.
+    """
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
         self._node, self._interruption = node, interruption
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(node)
         self.driver = self._find()
-        self.parameters = self._get_parameters()
+        self.table = self._table()
+        self.parameters = self._get_parameters([row.name for row in self.table.rows])
 
     def _find(self) -> str:
         here: list[str] = []
@@ -72,8 +76,16 @@ class Client:
     def _namespace(self) -> str:
         return self._node.get_namespace().rstrip("/")
 
-    def _get_parameters(self) -> dict[str, Value]:
-        names = [parameter.name for parameter in PARAMETERS]
+    def _table(self) -> Table:
+        """Of the board that the driver has."""
+        board = self._get_parameters(["board"])["board"]
+        if board not in boards.PROFILES:
+            raise ToolError(
+                f"{self.driver} drives a board {board}, which this tool does not know: update it"
+            )
+        return boards.load(str(board)).PARAMETERS
+
+    def _get_parameters(self, names: Sequence[str]) -> dict[str, Value]:
         request = GetParameters.Request(names=names)
         answer = self._call(GetParameters, f"{self.driver}/get_parameters", request)
         values = [parameter_value_to_python(value) for value in answer.values]
@@ -98,7 +110,9 @@ class Client:
 
     def apply(self, values: Mapping[str, Value]) -> None:
         """Likewise, those that may change while the driver runs."""
-        changeable = {name: value for name, value in values.items() if not BY_NAME[name].fixed}
+        changeable = {
+            name: value for name, value in values.items() if not self.table.by_name[name].fixed
+        }
         if changeable:
             self.set_parameters(changeable)
 

@@ -10,7 +10,7 @@ import yaml
 
 from omnibot_driver import calibration
 from omnibot_driver.core.errors import ParameterError
-from omnibot_driver.parameters import BY_NAME
+from omnibot_driver.parameters import Table
 from omnibot_driver.tools.calibrate.result import Result
 from omnibot_driver.tools.needs import ToolError
 
@@ -18,14 +18,14 @@ DEFAULT = "omnibot_calibration.yaml"
 PICTURES = (".png", ".svg", ".pdf")
 
 
-def output_file(given: str | None, drivers: str) -> Path:
+def output_file(given: str | None, drivers: str, table: Table) -> Path:
     """The file to write: the one given, else the driver's own, else one in this folder.
 
     Raises ToolError where it cannot be written or holds something else.
     """
     try:
         path = calibration.locate(given or drivers or DEFAULT)
-        calibration.load(path)
+        calibration.load(path, table)
         content: Any = yaml.safe_load(path.read_text(encoding="utf-8")) if path.exists() else {}
     except ParameterError as error:
         raise ToolError(f"{error}; or name another file with --output") from error
@@ -52,11 +52,11 @@ def picture_file(given: str | None, subcommand: str) -> Path:
     return path
 
 
-def save(result: Result, output: Path) -> None:
+def save(result: Result, output: Path, table: Table) -> None:
     """What was found; raises ToolError, and then the file is as it was."""
     try:
         for name, value in result.parameters.items():
-            BY_NAME[name].check(value)
+            table.by_name[name].check(value)
         if result.parameters or result.record:
             calibration.save(output, {**result.record, **result.parameters})
     except (OSError, ParameterError) as error:

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from omnibot_driver import boards
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.parameters import BY_NAME
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.geometry_figure import draw
 from omnibot_driver.tools.calibrate.geometry_fit import Geometry, Reading, fit, rolled
@@ -67,7 +67,8 @@ def believed(now: Mapping[str, Any]) -> dict[str, float]:
     if now["delta_frame"] == "wheel_counts":
         return {name: now[name] for name in ("wheel_radius", "base_radius")}
     linear, angular = now["odom_linear_scale"], now["odom_angular_scale"]
-    wheel_m, base_m = (BY_NAME[name].default for name in ("wheel_radius", "base_radius"))
+    nominal = boards.load(now["board"]).PARAMETERS.by_name
+    wheel_m, base_m = (nominal[name].default for name in ("wheel_radius", "base_radius"))
     return {
         "wheel_radius": wheel_m * linear,
         "base_radius": base_m * linear / angular,

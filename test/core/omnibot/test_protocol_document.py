@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple
 
 import pytest
 
+from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.omnibot import (
     CommandFrame,
@@ -28,7 +29,6 @@ from omnibot_driver.core.omnibot import (
 )
 from omnibot_driver.core.omnibot.command_encoder import CommandEncoder
 from omnibot_driver.core.packets import joined
-from omnibot_driver.parameters import BY_NAME
 
 DOCUMENT = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text(encoding="utf-8")
 
@@ -191,5 +191,5 @@ def test_the_parameters_that_carry_a_decision_exist_with_the_stated_defaults() -
     rows = re.findall(r"^\| `([a-z]\w+)` \| ([^|]+?) \|", DOCUMENT, re.MULTILINE)
     assert {name for name, _ in rows} == DECISIONS
     for name, value in rows:
-        default = BY_NAME[name].default
+        default = PARAMETERS.by_name[name].default
         assert value == default if isinstance(default, str) else json.loads(value) == default

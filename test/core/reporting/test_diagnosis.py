@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from omnibot_driver.core.board import BoardFigures
+from omnibot_driver.core.board import BoardFigures, RateName
 from omnibot_driver.core.measurement.outlier_filter import Refused
 from omnibot_driver.core.measurement.statistics import StreamStatistics
 from omnibot_driver.core.reporting.diagnosis import RECENT_S, Diagnosis, Level, Refusals, Status
@@ -35,7 +35,7 @@ class Robot:
         self.figures = SessionFigures(
             state="nominal",
             tally=StreamStatistics(),
-            board=BoardFigures(rates_hz=(100.0, 25.0, 5.0)),
+            board=BoardFigures(rates_hz={"IMU": 100.0, "Odometry": 25.0, "Pose": 5.0}),
             refused=Refused(0, 0, 0),
             skew_ppm=20.0,
             commands=CommandFigures(),
@@ -240,3 +240,16 @@ def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
     assert commands.level is Level.OK
     assert "faster than the limits" in commands.message
     assert commands.values["Limited"] == "3"
+
+
+def test_what_a_board_does_not_send_has_no_figures() -> None:
+    """Neither a status of an IMU, nor rates and counts of it, nor poses."""
+    robot = Robot()
+    rates_hz: dict[RateName, float] = {"Odometry": 2.5}
+    robot.set(board=BoardFigures(rates_hz=rates_hz))
+    robot.count(displacements=0)
+    judged = Diagnosis().judge(robot.link, robot.figures, robot.refusals, robot.now)
+    assert [status.name for status in judged] == NAMES[:-1]
+    stream = next(status.values for status in judged if status.name == "Stream")
+    assert {"Odometry rate (Hz)", "Odometry frames lost", "Sequence gaps"} <= set(stream)
+    assert not [key for key in stream if "IMU" in key or "Pose" in key]

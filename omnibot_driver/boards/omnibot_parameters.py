@@ -1,0 +1,144 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The parameters that the OmniBot has and other boards need not have. Knows no ROS."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.core.imu.scale import ACCEL_COUNTS_PER_G, GYRO_COUNTS_PER_DPS
+from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S
+from omnibot_driver.parameters import Parameter
+
+OMNIBOT: Final = (
+    Parameter(
+        "control_method",
+        "velocity",
+        "",
+        "Where the board's own switch stands: whether it takes velocities (cmd_vel, wheel_cmd) or"
+        " poses to drive to (cmd_pose).",
+        choices=("velocity", "position"),
+        fixed=True,
+        calibrated=True,
+    ),
+    Parameter(
+        "linear_scale",
+        70.0,
+        "LSB/(m/s)",
+        "Command unit of the board for linear speed (and for the rim speed of a wheel).",
+        low=1.0,
+        high=10_000.0,
+        calibrated=True,
+    ),
+    Parameter(
+        "angular_scale",
+        500.0,
+        "LSB/(rad/s)",
+        "Command unit of the board for the yaw rate.",
+        low=1.0,
+        high=100_000.0,
+        calibrated=True,
+    ),
+    Parameter(
+        "position_scale",
+        1000.0,
+        "LSB/m",
+        "Command unit of the board for a position to drive to.",
+        low=1.0,
+        high=100_000.0,
+    ),
+    Parameter(
+        "heading_scale",
+        1000.0,
+        "LSB/rad",
+        "Command unit of the board for a heading to turn to.",
+        low=1.0,
+        high=100_000.0,
+    ),
+    Parameter(
+        "delta_frame",
+        "earth",
+        "",
+        "What the board's odometry deltas are: differences of two positions in its earth frame,"
+        " motion along its own axes, or (older firmware) counts of its wheels.",
+        choices=("earth", "body", "wheel_counts"),
+        fixed=True,
+        calibrated=True,
+    ),
+    Parameter(
+        "delta_period",
+        0.04,
+        "s",
+        "Time from one of the board's odometry deltas to the next. The manual has 25 Hz in one"
+        " place, 10 Hz in another; the driver says so if the board keeps to another.",
+        choices=DELTA_PERIODS_S,
+        fixed=True,
+    ),
+    Parameter(
+        "use_board_pose",
+        True,
+        "",
+        "Let the board's own pose settle lost motion and rounding; otherwise only its first"
+        " heading is taken.",
+    ),
+    Parameter(
+        "pose_byte_order",
+        "big",
+        "",
+        "Byte order of the floats in the board's pose.",
+        choices=("big", "little"),
+        fixed=True,
+    ),
+    Parameter(
+        "wheel_radius",
+        0.029,
+        "m",
+        "Radius of a wheel, for wheel_cmd and for odometry from wheel counts.",
+        low=0.001,
+        high=1.0,
+        calibrated=True,
+    ),
+    Parameter(
+        "base_radius",
+        0.143,
+        "m",
+        "From the centre of the robot to a wheel, for odometry from wheel counts and covariance.",
+        low=0.01,
+        high=10.0,
+        calibrated=True,
+    ),
+    Parameter(
+        "counts_per_revolution",
+        1560,
+        "counts",
+        "Encoder counts of one turn of a wheel, for odometry from wheel counts.",
+        low=1,
+        high=1_000_000,
+    ),
+    Parameter(
+        "accel_range",
+        2,
+        "g",
+        "Full scale that the accelerometer is set to.",
+        choices=tuple(ACCEL_COUNTS_PER_G),
+        fixed=True,
+    ),
+    Parameter(
+        "gyro_range",
+        250,
+        "°/s",
+        "Full scale that the gyro is set to.",
+        choices=tuple(GYRO_COUNTS_PER_DPS),
+        fixed=True,
+    ),
+)
+
+
+def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
+    """A mirror turns the other way; signs that say otherwise leave positions without meaning."""
+    x, y, yaw = values["axis_signs"]
+    if values["control_method"] == "position" and x * y != yaw:
+        raise ParameterError(
+            f"parameter 'axis_signs' must not be {values['axis_signs']} with control_method"
+            " 'position': the sign of yaw must be that of x times that of y"
+        )

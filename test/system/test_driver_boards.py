@@ -1,0 +1,124 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Everything a user touches follows the board: what it lacks is not there at all."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from driver_process import Driver
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from plain_board import PARAMETERS
+from probe import Probe
+from rcl_interfaces.srv import ListParameters
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+Start = Callable[..., Any]
+PLAIN: Final = f"""
+import sys
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+from omnibot_driver import boards
+boards.PROFILES["plain"] = "plain_board"
+"""
+NODE: Final = "omnibot_driver"
+
+
+def start_plain(start_driver: Start, port: str | None, **parameters: object) -> Driver:
+    driver: Driver = start_driver(port, before=PLAIN, board="plain", **parameters)
+    return driver
+
+
+def names(found: list[tuple[str, list[str]]], home: str) -> set[str]:
+    """Within the robot's namespace, without what every ROS node has."""
+    of_ros = ("parameter", "type_description", "/rosout", "/tf")
+    relative = {name.removeprefix(f"{home}/") for name, _types in found}
+    return {name for name in relative if not any(word in name for word in of_ros)}
+
+
+def test_what_a_board_lacks_is_not_advertised(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """No IMU, no wheel command, no pause: no topic, service or parameter of theirs."""
+    driver = start_plain(start_driver, start_board().path)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    home, node = f"/{driver.namespace}", probe.node
+    assert names(node.get_publisher_names_and_types_by_node(NODE, home), home) == {
+        "odom", "joint_states", "/diagnostics", "heard",
+        f"{NODE}/state", f"{NODE}/estop_active",
+    }  # fmt: skip
+    assert names(node.get_subscriber_names_and_types_by_node(NODE, home), home) == {
+        "cmd_vel", "estop",
+    }  # fmt: skip
+    assert names(node.get_service_names_and_types_by_node(NODE, home), home) == {
+        f"{NODE}/start", f"{NODE}/estop", f"{NODE}/reset_odometry", f"{NODE}/ask",
+    }  # fmt: skip
+    declared = set(probe.call(ListParameters, "list_parameters").result.names)
+    assert set(PARAMETERS.by_name) <= declared
+    assert not {name for name in declared if "imu" in name or "gyro" in name or "accel_" in name}
+    assert not {"max_wheel_speed", "linear_scale", "control_method"} & declared
+
+
+def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
+    """It drives, its wheels have their names, its own service answers."""
+    board = start_board()
+    probe: Probe = probe_of(start_plain(start_driver, board.path, track_width=0.4))
+    joints, odometry = probe.listen(JointState, "joint_states"), probe.listen(Odometry, "odom")
+    diagnoses = probe.listen(DiagnosticArray, "/diagnostics")
+    probe.wait_for_state("nominal")
+    probe.wait_for(lambda: joints and odometry)
+    assert joints[-1].name == ["left_wheel_joint", "right_wheel_joint"]
+    twist = Twist()
+    twist.linear.x = 0.1
+    probe.publisher(Twist, "cmd_vel").publish(twist)
+    assert board.wait_for(lambda b: b.commands[-1].values == (7, 0, 0), 20.0)
+    assert probe.call(Trigger, "ask").message == "nominal"
+    probe.wait_for(
+        lambda: {f"{NODE}: Stream"} <= {status.name for one in diagnoses for status in one.status}
+    )
+    (stream, *_) = [s for one in diagnoses for s in one.status if s.name == f"{NODE}: Stream"]
+    told = {pair.key for pair in stream.values}
+    assert {"Odometry rate (Hz)", "Odometry frames lost"} <= told
+    assert not {key for key in told if "IMU" in key}
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        (
+            {"delta_frame": "earth"},
+            "'delta_frame' belongs to board omnibot, not to plain; remove it",
+        ),
+        ({"gyro_bias": "[0.0,0.0,0.0]"}, "'gyro_bias' belongs to board omnibot, not to plain"),
+        ({"track_widt": 0.3}, "no parameter 'track_widt'; the nearest is 'track_width'"),
+        ({"on_exit": "pause"}, "'on_exit' must be one of stop, not 'pause'"),
+        ({"names": "[a,b,c,d]"}, "'names' must be 0 to 3 strings, not"),
+    ],
+)
+def test_what_means_nothing_to_the_board_is_refused(
+    start_driver: Start, parameters: dict[str, object], message: str
+) -> None:
+    """With a sentence that says whose it is, or what is meant."""
+    driver = start_plain(start_driver, "/dev/null", **parameters)
+    driver.wait_for_line(message)
+    assert driver.end() == 2
+
+
+@pytest.mark.parametrize(
+    ("board", "message"),
+    [
+        ("mart", "cannot start: the board mart is not built yet; this driver has omnibot"),
+        ("martha", "cannot start: parameter 'board' must be one of omnibot, not 'martha'"),
+    ],
+)
+def test_a_board_that_is_not_there_ends_the_start(
+    start_driver: Start, board: str, message: str
+) -> None:
+    """In one sentence."""
+    driver: Driver = start_driver("/dev/null", board=board)
+    driver.wait_for_line(message)
+    assert driver.end() == 2
