@@ -41,9 +41,9 @@ def load(path: Path, table: Table) -> dict[str, Value]:
     content = _read(path)
     try:
         return {
-            name: table.by_name[name].check(content[name])
-            for name in table.calibrated
-            if name in content
+            name: table.by_name[name].check(value)
+            for name, value in content.items()
+            if name in table.calibrated
         }
     except ParameterError as error:
         raise _bad(path, f"is wrong ({error})") from error

@@ -31,6 +31,7 @@ from std_msgs.msg import Header, UInt8MultiArray
 from omnibot_driver.core.commands.limits import require_finite
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.kinematics import Kinematics
+from omnibot_driver.core.geometry.quaternion import yaw_of
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
@@ -213,8 +214,7 @@ def goal_pose(stamped: Any, odom_frame: str) -> Pose:
             f"cmd_pose refused: its orientation is tilted by {tilt_deg:.0f}°; this robot turns"
             " about z alone"
         )
-    yaw_rad = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return Pose(position.x, position.y, yaw_rad)
+    return Pose(position.x, position.y, yaw_of(x, y, z, w))
 
 
 def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:

@@ -15,6 +15,7 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, String
 
+from omnibot_driver.core.geometry.quaternion import yaw_of
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.demo.display import status_row
@@ -104,7 +105,10 @@ class Robot:
     def _on_odom(self, message: Odometry) -> None:
         self.odom.arrived(time.monotonic())
         position, turn = message.pose.pose.position, message.pose.pose.orientation
-        before, self.pose = self.pose, Pose(position.x, position.y, 2 * math.atan2(turn.z, turn.w))
+        before, self.pose = (
+            self.pose,
+            Pose(position.x, position.y, yaw_of(turn.x, turn.y, turn.z, turn.w)),
+        )
         self.driven_m += math.dist((before.x_m, before.y_m), (self.pose.x_m, self.pose.y_m))
         self.points.append((position.x, position.y))
         linear, angular = message.twist.twist.linear, message.twist.twist.angular

@@ -2,6 +2,7 @@
 
 """Everything a user touches follows the board: what it lacks is not there at all."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
@@ -16,6 +17,8 @@ from probe import Probe
 from rcl_interfaces.srv import ListParameters
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
+
+from omnibot_driver.tools.monitor.__main__ import main
 
 Start = Callable[..., Any]
 PLAIN: Final = f"""
@@ -84,6 +87,23 @@ def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: St
     told = {pair.key for pair in stream.values}
     assert {"Odometry rate (Hz)", "Odometry frames lost"} <= told
     assert not {key for key in told if "IMU" in key}
+
+
+def test_the_monitor_shows_what_the_board_has(
+    start_board: Start,
+    start_driver: Start,
+    probe_of: Start,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """No IMU is shown, and none is missed."""
+    driver = start_plain(start_driver, start_board().path)
+    probe_of(driver).wait_for_state("nominal")
+    assert main(["--json", "--namespace", driver.namespace]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["state"], told["troubles"]) == ("nominal", [])
+    assert "imu" not in told
+    assert set(told["rates_hz"]) == {"odom"}
+    assert "IMU" not in told["diagnostics"]
 
 
 @pytest.mark.parametrize(

@@ -94,7 +94,7 @@ def test_a_calibration_that_cannot_be_saved_is_applied_and_says_so(robot: Robot)
     assert not answer.success
     assert answer.message.startswith("gyro bias (0.0")
     assert "it is applied, but not saved" in answer.message
-    assert "mend it" in answer.message
+    assert "correct it" in answer.message
     assert robot.file.read_text() == "gyro_bias: [1, 2"
 
 
@@ -105,7 +105,7 @@ def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
     path = tmp_path / "robot.yaml"
     path.write_text("gyro_bias: [1, 2")
     driver = start_driver("/dev/null", calibration_file=path)
-    driver.wait_for_line("calibration_file.*mend it, or remove it")
+    driver.wait_for_line("calibration_file.*correct it, or remove it")
     assert driver.end() == 2
 
 

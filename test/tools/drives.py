@@ -16,6 +16,7 @@ from omnibot_driver.tools.report.log import Log, Series, Span, Status
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 START_NS = 1_790_000_000_000_000_000
+WHEELS = tuple(f"wheel_{wheel}_joint" for wheel in "abc")
 REST_S = 4.0
 """At the beginning and at the end."""
 DELAY_S = 0.1
@@ -124,11 +125,10 @@ class Drive:
                 *(header(at_s, "odom"), "base_link", (pose, cov36)),
                 (((vx, vy, 0.0), (0.0, 0.0, rate)), cov36),
             )
-        wheels = [f"wheel_{wheel}_joint" for wheel in "abc"]
         for at_s, row, late_s in self._rows(self.joints):
             add(
                 *(f"{name}/joint_states", "sensor_msgs/msg/JointState", at_s + late_s),
-                *(header(at_s, ""), wheels, np.array(row), np.array(row), np.zeros(0)),
+                *(header(at_s, ""), list(WHEELS), np.array(row), np.array(row), np.zeros(0)),
             )
         kind = f"geometry_msgs/msg/Twist{'Stamped' if self.stamped_commands else ''}"
         for at_s, (vx, vy, rate), late_s in self._rows(self.cmd_vel):
@@ -169,6 +169,7 @@ class Drive:
             joint_states=series[2],
             cmd_vel=series[3],
             wheel_cmd=nothing,
+            wheels=WHEELS,
             states=spans(self.states, end_s),
             estops=spans([(at, "latched" if on else "free") for at, on in self.estops], end_s),
             diagnostics=tuple(Status(at_s, "/dev/ttyUSB0", *rest) for at_s, *rest in self.statuses),

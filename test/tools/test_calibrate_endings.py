@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from omnibot_driver import calibration
+from omnibot_driver import boards, calibration
 from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.tools.calibrate import imu, robot
 from omnibot_driver.tools.calibrate.__main__ import main
@@ -42,7 +42,9 @@ def ending(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Ending:
 
     @contextmanager
     def connect(*_arguments: object) -> Iterator[SimpleNamespace]:
-        yield SimpleNamespace(parameters={"calibration_file": ""}, driver="/omnibot_driver")
+        yield SimpleNamespace(
+            parameters=boards.check_all({}), table=PARAMETERS, driver="/omnibot_driver"
+        )
 
     def end(
         *words: str,

@@ -16,6 +16,7 @@ from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.readings import Vector3
 from omnibot_driver.tools.calibrate.__main__ import main
+from omnibot_driver.tools.calibrate.arguments import SUBCOMMANDS, require_able
 from omnibot_driver.tools.calibrate.console import Console, digits
 from omnibot_driver.tools.calibrate.files import draw, output_file, picture_file, save
 from omnibot_driver.tools.calibrate.log import Log
@@ -104,8 +105,16 @@ def test_stairs_are_climbed_one_by_one() -> None:
 def test_an_empty_log_has_empty_columns() -> None:
     """Of the right shape, so that nobody needs to ask."""
     log = Log()
-    assert log.imu.rate_radps.shape == log.odometry.pose.shape == log.wheels.angle_rad.shape
+    assert log.imu.rate_radps.shape == log.odometry.pose.shape == (0, 3)
+    assert log.wheels.angle_rad.shape == log.wheels.rate_radps.shape == (0, 0)
     assert log.commands.values.shape == (0, 3)
+
+
+def test_wheels_are_as_many_as_the_robot_has() -> None:
+    """Angles first, then their rates."""
+    log = Log(wheel_rows=[(0.0, 1.0, 2.0, 3.0, 4.0), (1.0, 5.0, 6.0, 7.0, 8.0)])
+    assert log.wheels.angle_rad.tolist() == [[1.0, 2.0], [5.0, 6.0]]
+    assert log.wheels.rate_radps.tolist() == [[3.0, 4.0], [7.0, 8.0]]
 
 
 def test_a_question_is_repeated_until_the_answer_makes_sense() -> None:
@@ -201,3 +210,14 @@ def test_wrong_usage_is_exit_code_2(words: list[str], capsys: pytest.CaptureFixt
     """With a sentence."""
     assert main(words) == 2
     assert "calibrate" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("what", "thing"), [("imu", "an IMU"), ("step", "a firmware")])
+def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: str) -> None:
+    """Of a driver with these parameters; the OmniBot can do it all."""
+    for subcommand in SUBCOMMANDS:
+        require_able(subcommand, PARAMETERS.by_name)
+    with pytest.raises(
+        ToolError, match=f"^calibrate {what} needs {thing}.* the board few has not$"
+    ):
+        require_able(what, {"board": "few", "odom_frame": "odom"})

@@ -171,3 +171,21 @@ def test_nothing_in_a_message_is_markup() -> None:
         assert any("[/bold] [red" in row for row in screen(app))
 
     on_screen(robot, steps)
+
+
+def test_a_key_for_what_the_board_cannot_do_is_not_there() -> None:
+    """It is not shown, and asks for nothing; all others are."""
+    robot = FakeRobot()
+    robot.shown = view(lacks=frozenset({"pause"}))
+
+    async def steps(pilot: Pilot[Any], app: Monitor) -> None:
+        app.refresh_view()
+        await pilot.pause()
+        await pilot.press("p", "g")
+        await pilot.pause()
+        footer = screen(app)[-1]
+        assert "start" in footer
+        assert "pause" not in footer
+
+    on_screen(robot, steps)
+    assert robot.asked == ["start"]

@@ -15,6 +15,7 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.reporting.diagnosis import Level, Status
 from omnibot_driver.tools.monitor import text
+from omnibot_driver.tools.monitor.model import Flow
 from omnibot_driver.tools.monitor.plot import draw_path, sparkline
 
 anything = st.floats()
@@ -147,3 +148,15 @@ def test_a_sparkline_has_its_width(values: list[int], columns: int) -> None:
     shown = values[-columns:] if columns else []
     assert [char == " " for char in line[columns - len(shown) :]] == [not v for v in shown]
     assert ("▇" in line) == any(shown)
+
+
+def test_a_board_without_an_imu_has_no_rows_of_it() -> None:
+    """In words and in JSON, and it is not missed."""
+    shown = view(lacks=frozenset({"imu"}), imu=Flow(0.0, None, ()), force_mps2=None)
+    words = "\n".join(text.figures(shown))
+    assert "odom" in words
+    assert not [word for word in ("imu", "force", "gyro") if word in words]
+    told = json.loads(text.as_json(shown, []))
+    assert "imu" not in told
+    assert set(told["rates_hz"]) == {"odom"}
+    assert shown.missing(diagnostics=True) == []

@@ -3,14 +3,17 @@
 """What a report says of a robot with a trouble in its motion or in its IMU."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from drives import DELAY_S, Drive, Topic
 from verdicts import said, troubles
 
+from omnibot_driver.tools.report import following, plots
 from omnibot_driver.tools.report.findings import Level
 from omnibot_driver.tools.report.judge import judge
+from omnibot_driver.tools.report.recorder import Recorder
 
 
 @pytest.fixture
@@ -197,3 +200,42 @@ def test_wheel_commands_are_compared_with_the_wheels(drive: Drive) -> None:
     assert followed.level is Level.WARN
     assert "wheel A 1.00" in followed.text
     assert "wheel B 0.50" in followed.text
+
+
+JOINTS = ("left_wheel_joint", "right_wheel_joint", "front_steering_joint")
+
+
+def two_wheels() -> Recorder:
+    """One rate in five is commanded of the left wheel and half of it turned."""
+    recorder = Recorder("/")
+    for number in range(200):
+        rate, stamp = float(number % 50 > 10), SimpleNamespace(sec=number, nanosec=1)
+        header = SimpleNamespace(stamp=stamp)
+        joints = SimpleNamespace(name=JOINTS, velocity=(0.5 * rate, rate, 9.0), header=header)
+        told = SimpleNamespace(data=(rate, rate) if number else (1.0,))
+        at_ns = number * 10**9
+        recorder.hear("wheel_cmd", "std_msgs/msg/Float32MultiArray", at_ns, told)
+        recorder.hear("joint_states", "sensor_msgs/msg/JointState", at_ns, joints)
+    return recorder
+
+
+def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
+    """A steering is no wheel; a command of another length is one that the driver refuses."""
+    log = two_wheels().log()
+    assert log.wheels == JOINTS[:2]
+    assert log.joint_states.values[20].tolist() == [0.5, 1.0]
+    assert log.wheel_cmd.values[20].tolist() == [1.0, 1.0]
+    assert np.isnan(log.wheel_cmd.values[0]).tolist() == [True, True]
+    (pair,) = following.pairs(log)
+    assert pair.axes == ("left wheel", "right wheel")
+    plots.velocities(log)
+
+
+def test_an_imu_that_the_board_has_not_is_not_missed(drive: Drive) -> None:
+    """The driver's diagnostics count no frames of it then."""
+    drive.imu.drop(0.0, 99.0)
+    said_of_it = [finding.text for finding in judge(drive.log())]
+    assert "No message of imu/data_raw: nothing can be said of the IMU." in said_of_it
+    counts = {"Odometry frames lost": "0"}
+    drive.statuses[:] = [(1.0, "omnibot_driver: Stream", 0, "complete", counts)]
+    assert not [one for one in judge(drive.log()) if "imu/data_raw" in one.text]

@@ -18,8 +18,8 @@ NEEDS: Final = {
     "commission": ("delta_frame", "the OmniBot's wheels and odometry"),
     "imu": ("gyro_bias", "an IMU"),
     "scale": ("linear_scale", "a unit of its own for commanded speeds"),
-    "geometry": ("base_radius", "three wheels around its centre"),
-    "step": ("max_wheel_speed", "commands to single wheels"),
+    "geometry": ("base_radius", "wheels around its centre"),
+    "step": ("linear_scale", "a firmware whose control of a wheel it knows"),
 }
 """By subcommand: a parameter that a driver has where this can be done, and what it stands for."""
 
@@ -29,7 +29,7 @@ def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:
     parameter, thing = NEEDS[subcommand]
     if parameter not in parameters:
         raise ToolError(
-            f"calibrate {subcommand} needs {thing}: the board {parameters['board']} has none of it"
+            f"calibrate {subcommand} needs {thing}, which the board {parameters['board']} has not"
         )
 
 

@@ -19,6 +19,7 @@ from std_srvs.srv import SetBool, Trigger
 from omnibot_driver import boards
 from omnibot_driver.parameters import Table, Value
 from omnibot_driver.tools.calibrate.interruption import Interruption
+from omnibot_driver.tools.drivers import running_drivers
 from omnibot_driver.tools.needs import ToolError
 
 FOUND_WITHIN_S: Final = 5.0
@@ -47,7 +48,7 @@ class Client:
 
         if self._wait(look, FOUND_WITHIN_S):
             return here[0]
-        if not (others := drivers(self._node)):
+        if not (others := running_drivers(self._node)):
             raise ToolError(
                 "no driver is running: start one (ros2 run omnibot_driver driver), or set"
                 " ROS_DOMAIN_ID as it is where the driver runs"
@@ -70,7 +71,9 @@ class Client:
 
     def _here(self) -> list[str]:
         return [
-            name for name in drivers(self._node) if name.rpartition("/")[0] == self._namespace()
+            name
+            for name in running_drivers(self._node)
+            if name.rpartition("/")[0] == self._namespace()
         ]
 
     def _namespace(self) -> str:
@@ -155,10 +158,3 @@ class Client:
         deadline_s = time.monotonic() + seconds
         while (left_s := deadline_s - time.monotonic()) > 0:
             self._executor.spin_once(timeout_sec=left_s)
-
-
-def drivers(node: Node) -> list[str]:
-    """Full names of the drivers that run, by the service that only they have."""
-    offered = (name for name, _kinds in node.get_service_names_and_types())
-    tail = "/calibrate_gyro"
-    return sorted(name.removesuffix(tail) for name in offered if name.endswith(tail))

@@ -18,6 +18,7 @@ from omnibot_driver.tools.calibrate.geometry_fit import Geometry, Reading, fit, 
 from omnibot_driver.tools.calibrate.log import Column
 from omnibot_driver.tools.calibrate.motion import Bounds
 from omnibot_driver.tools.calibrate.result import Finding, Result
+from omnibot_driver.tools.calibrate.seen import WHEELS
 from omnibot_driver.tools.calibrate.waypoints import square, visit
 from omnibot_driver.tools.needs import ToolError
 
@@ -159,7 +160,7 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
     findings += [
         Finding(name=f"wheel {wheel} over the mean", value=100 * float(more),
                 sigma=100 * float(sigma), unit="%")
-        for wheel, more, sigma in zip("ABC", found.unlike, found.unlike_sigma, strict=True)
+        for wheel, more, sigma in zip(WHEELS, found.unlike, found.unlike_sigma, strict=True)
     ]  # fmt: skip
     before, after = misses(readings, found, was["base_radius"])
     notes = [
@@ -170,7 +171,7 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
     notes += [
         f"Wheel {wheel} is {abs(more):.1%} {'larger' if more > 0 else 'smaller'} than the mean,"
         " which no parameter mends: look at its rollers, and whether all wheels carry alike."
-        for wheel, more, sigma in zip("ABC", found.unlike, found.unlike_sigma, strict=True)
+        for wheel, more, sigma in zip(WHEELS, found.unlike, found.unlike_sigma, strict=True)
         if abs(more) > max(PLAIN, 3 * sigma)
     ]
     if found.excess > 2.0:

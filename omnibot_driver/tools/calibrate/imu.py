@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from omnibot_driver.core.reporting.diagnosis import RUNNING
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.log import Imu
 from omnibot_driver.tools.calibrate.rest import Rest, rest, still
@@ -43,7 +44,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
             ask(robot.log)
             told(part)
 
-        log = robot.rest(60 * arguments.minutes, show=show, states=("nominal", "imu_only"))
+        log = robot.rest(60 * arguments.minutes, show=show, states=RUNNING)
     imu = log.imu
     as_sensed = Imu(
         imu.stamp_s, imu.force_mps2 + biases["accel_bias"], imu.rate_radps + biases["gyro_bias"]

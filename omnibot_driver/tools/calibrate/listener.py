@@ -14,6 +14,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, String
 
+from omnibot_driver.core.geometry.quaternion import yaw_of
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.tools.calibrate.client import FOUND_WITHIN_S, Client
 from omnibot_driver.tools.calibrate.interruption import Interruption
@@ -21,7 +22,7 @@ from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.motion import HALT
 from omnibot_driver.tools.needs import ToolError
 
-IMU, ODOMETRY = TOPICS = "imu/data_raw", "odom"
+IMU, ODOMETRY = "imu/data_raw", "odom"
 LOST_S: Final = 0.3
 """A robot that is not heard for so long is driven no further."""
 AT_ONCE: Final = 100
@@ -37,18 +38,22 @@ class Listener(Client):
         self.log = Log()
         self._states: list[str] = []
         self._estop = False
-        self._heard_s = dict.fromkeys(TOPICS, -math.inf)
+        has_imu = "imu_frame" in self.parameters
+        self._topics = (IMU, ODOMETRY) if has_imu else (ODOMETRY,)
+        self._heard_s = dict.fromkeys(self._topics, -math.inf)
         self._pose, self._twist = Pose(), HALT
-        self._wheel_rates = HALT
-        node.create_subscription(Imu, IMU, self._on_imu, 50)
+        self._wheel_rates: tuple[float, ...] = HALT
+        if has_imu:
+            node.create_subscription(Imu, IMU, self._on_imu, 50)
         node.create_subscription(Odometry, ODOMETRY, self._on_odometry, 50)
         node.create_subscription(JointState, "joint_states", self._on_wheels, 50)
         node.create_subscription(String, f"{self.driver}/state", self._on_state, LATCHED)
         node.create_subscription(Bool, f"{self.driver}/estop_active", self._on_estop, LATCHED)
-        if not self._wait(lambda: self._states and self._heard_s[IMU] > 0, FOUND_WITHIN_S):
+        first = self._topics[0]
+        if not self._wait(lambda: self._states and self._heard_s[first] > 0, FOUND_WITHIN_S):
             state = self._states[-1] if self._states else "unknown"
             raise ToolError(
-                f"{self.driver} sends no {IMU} (state: {state}): see what it logs, and"
+                f"{self.driver} sends no {first} (state: {state}): see what it logs, and"
                 " docs/troubleshooting.md"
             )
 
@@ -63,7 +68,7 @@ class Listener(Client):
         self._heard_s[ODOMETRY] = time.monotonic()
         position, turn = message.pose.pose.position, message.pose.pose.orientation
         twist = message.twist.twist
-        yaw_rad = 2 * math.atan2(turn.z, turn.w)
+        yaw_rad = yaw_of(turn.x, turn.y, turn.z, turn.w)
         yaw_rad = self._pose.yaw_rad + math.remainder(yaw_rad - self._pose.yaw_rad, math.tau)
         self._pose = Pose(position.x, position.y, yaw_rad)
         self._twist = (twist.linear.x, twist.linear.y, twist.angular.z)
@@ -72,8 +77,9 @@ class Listener(Client):
         )
 
     def _on_wheels(self, message: JointState) -> None:
-        rates = tuple(message.velocity) if len(message.velocity) == 3 else (math.nan,) * 3
-        if not math.isnan(rates[0]):
+        known = len(message.velocity) == len(message.name)
+        rates = tuple(message.velocity) if known else (math.nan,) * len(message.name)
+        if known:
             self._wheel_rates = rates
         self.log.wheel_rows.append((_seconds(message), *message.position, *rates))
 
@@ -86,7 +92,7 @@ class Listener(Client):
     def _begin(self, states: Sequence[str]) -> None:
         """Hear the robot anew: while a person was asked, nothing was heard."""
         self._require_alone()
-        self._heard_s = dict.fromkeys(TOPICS, -math.inf)
+        self._heard_s = dict.fromkeys(self._topics, -math.inf)
         self._wait(lambda: min(self._heard_s.values()) > 0, 1.0)
         del self._states[:-1]
         self._require_sound(states)
@@ -109,7 +115,7 @@ class Listener(Client):
 
     def _lost(self) -> list[str]:
         """Topics that are silent; what waits to be read is read first, for we may be slow."""
-        wanted = (IMU,) if self._states[-1] == "imu_only" else TOPICS
+        wanted = (IMU,) if self._states[-1] == "imu_only" else self._topics
         if silent(self._heard_s, wanted, time.monotonic()):
             for _ in range(AT_ONCE):
                 self._executor.spin_once(timeout_sec=0.0)

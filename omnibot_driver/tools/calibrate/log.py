@@ -35,7 +35,7 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True)
 class Wheels:
-    """``angle_rad`` and ``rate_radps``: (n, 3), wheels A, B, C."""
+    """``angle_rad`` and ``rate_radps``: (n, wheels), in the order of ``joint_states``."""
 
     stamp_s: Column
     angle_rad: Column
@@ -75,9 +75,10 @@ class Log:
 
     @property
     def wheels(self) -> Wheels:
-        """Rows of a stamp, three angles and three rates (NaN where the driver gave none)."""
-        rows = _columns(self.wheel_rows, 7)
-        return Wheels(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
+        """Rows of a stamp, angles and as many rates (NaN where the driver gave none)."""
+        wheels = len(self.wheel_rows[0]) // 2 if self.wheel_rows else 0
+        rows = _columns(self.wheel_rows, 1 + 2 * wheels)
+        return Wheels(rows[:, 0], rows[:, 1 : 1 + wheels], rows[:, 1 + wheels :])
 
     @property
     def commands(self) -> Commands:

@@ -106,6 +106,7 @@ class Monitor(App[None]):
     def __init__(self, robot: Robot) -> None:
         super().__init__()
         self._robot = robot
+        self._lacks: frozenset[str] = frozenset()
         self._parts = {name: Static(id=name, markup=False) for name in PARTS}
 
     def compose(self) -> ComposeResult:
@@ -138,6 +139,9 @@ class Monitor(App[None]):
     def refresh_view(self) -> None:
         """Show what is known now."""
         view = self._robot.view()
+        if view.lacks != self._lacks:
+            self._lacks = view.lacks
+            self.refresh_bindings()
         self._show_title(view)
         line = self._parts["estop"]
         line.set_class(bool(view.estop) or view.estop_asked, "latched")
@@ -188,6 +192,10 @@ class Monitor(App[None]):
             event.stop()
         elif event.key in ("plus", "minus"):
             dead_man.change_speed(1 if event.key == "plus" else -1)
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """A key for what the robot's board cannot do is not shown, and does nothing."""
+        return action not in self._lacks and super().check_action(action, parameters)
 
     def on_app_blur(self) -> None:
         """Whoever looks elsewhere does not steer."""

@@ -5,7 +5,6 @@
 Callbacks run on an executor's thread of their own, so what a screen does delays none of them.
 """
 
-import math
 import os
 import threading
 import time
@@ -16,7 +15,7 @@ from typing import Any, Final
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
-from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import GetParameters, ListParameters
 from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -29,9 +28,11 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool, Trigger
 
+from omnibot_driver.core.geometry.quaternion import yaw_of
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.reporting.diagnosis import Status
 from omnibot_driver.messages import UNMEASURED_VARIANCE
+from omnibot_driver.tools.drivers import running_drivers
 from omnibot_driver.tools.monitor.model import (
     DIAGNOSTICS_TOPIC,
     IMU_TOPIC,
@@ -47,6 +48,8 @@ from omnibot_driver.tools.needs import ToolError
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 INSIST_EVERY_S: Final = 0.2
 PARAMETERS: Final = ("port", "max_linear_speed", "max_angular_speed")
+IMU_PARAMETER: Final = "imu_frame"
+"""A driver has it where its board has an IMU."""
 
 
 class Feed:
@@ -78,7 +81,7 @@ class Feed:
             )
             self.driver = self._node.resolve_topic_name(f"{name}/state").removesuffix("/state")
             self._model, self._lock = Model(self.driver, time.monotonic()), threading.Lock()
-            self._port = ""
+            self._port, self._without_imu, self._learned = "", False, False
             self._listen()
             self._offer()
         except (InvalidNamespaceException, InvalidTopicNameException) as error:
@@ -105,15 +108,13 @@ class Feed:
     def view(self) -> View:
         """What is known now."""
         with self._lock:
-            return self._model.view(time.monotonic(), steers=self._velocity.steers)
+            return self._model.view(
+                time.monotonic(), steers=self._velocity.steers, lacks=self._lacks()
+            )
 
     def drivers(self) -> list[str]:
         """Names of those that are there, wherever they are."""
-        return sorted(
-            name.removesuffix("/estop_active")
-            for name, _types in self._node.get_topic_names_and_types()
-            if name.endswith("/estop_active") and self._node.count_publishers(name)
-        )
+        return running_drivers(self._node)
 
     def namesakes(self) -> str:
         """A sentence where there is more than one driver of this name."""
@@ -171,6 +172,7 @@ class Feed:
         node.create_subscription(DiagnosticArray, DIAGNOSTICS_TOPIC, self._on_diagnostics, ANY)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(INSIST_EVERY_S, self._insist, clock=steady)
+        node.create_timer(INSIST_EVERY_S, self._learn, clock=steady)
         self._velocity = VelocityTopic(
             node,
             name,
@@ -183,6 +185,25 @@ class Feed:
         if self._ask.service_is_ready():
             request = GetParameters.Request(names=PARAMETERS)
             self._ask.call_async(request).add_done_callback(self._on_parameters)
+        self._learned = False
+
+    def _learn(self) -> None:
+        """Once with each state, as it may be another driver's: what its board has."""
+        if not self._learned and self._list.service_is_ready():
+            self._learned = True
+            listing = self._list.call_async(ListParameters.Request())
+            listing.add_done_callback(self._on_names)
+
+    def _on_names(self, future: Any) -> None:
+        self._without_imu = IMU_PARAMETER not in future.result().result.names
+
+    def _lacks(self) -> frozenset[str]:
+        """What the board of this driver cannot do; nothing while that is not known."""
+        offers = {"start": self._start, "pause": self._pause}
+        if not self._estop.service_is_ready():
+            offers = {}
+        lacking = {name for name, client in offers.items() if not client.service_is_ready()}
+        return frozenset(lacking | ({"imu"} if self._without_imu else set()))
 
     def _on_parameters(self, future: Any) -> None:
         values = future.result().values
@@ -203,8 +224,7 @@ class Feed:
 
     def _on_odom(self, message: Odometry) -> None:
         at, turn = message.pose.pose.position, message.pose.pose.orientation
-        yaw_rad = math.remainder(2.0 * math.atan2(turn.z, turn.w), math.tau)
-        pose = Pose(at.x, at.y, yaw_rad)
+        pose = Pose(at.x, at.y, yaw_of(turn.x, turn.y, turn.z, turn.w))
         twist = body_twist(message.twist.twist)
         known = message.twist.covariance[0] < UNMEASURED_VARIANCE
         self._know(lambda model, now_s: model.odom(pose, twist if known else None, now_s))
@@ -229,6 +249,7 @@ class Feed:
     def _offer(self) -> None:
         node, name = self._node, self._name
         self._ask = node.create_client(GetParameters, f"{name}/get_parameters")
+        self._list = node.create_client(ListParameters, f"{name}/list_parameters")
         self._estop = node.create_client(SetBool, f"{name}/estop")
         self._start = node.create_client(Trigger, f"{name}/start")
         self._pause = node.create_client(SetBool, f"{name}/pause")

@@ -45,7 +45,8 @@ class Flow:
 class View:
     """All of it at one moment. What is not known, or no longer, is None or empty.
 
-    ``steers`` is whether somebody takes what is commanded here.
+    ``steers`` is whether somebody takes what is commanded here; ``lacks``: what the robot's board
+    cannot do, of ``imu``, ``start`` and ``pause``.
     """
 
     driver: str
@@ -64,6 +65,7 @@ class View:
     path: tuple[tuple[float, float], ...]
     steers: bool
     said: str
+    lacks: frozenset[str] = frozenset()
 
     @property
     def silent(self) -> bool:
@@ -83,7 +85,9 @@ class View:
         wanted = {
             "state": bool(self.state),
             "estop_active": self.estop is not None,
-            IMU_TOPIC: self.imu.age_s is not None or self.state not in RUNNING,
+            IMU_TOPIC: self.imu.age_s is not None
+            or self.state not in RUNNING
+            or "imu" in self.lacks,
             ODOM_TOPIC: self.odom.age_s is not None or self.state != "nominal",
             DIAGNOSTICS_TOPIC: bool(self.statuses) or not diagnostics,
         }
@@ -154,7 +158,9 @@ class Model:
         """``/diagnostics`` of this driver."""
         self._statuses, self._diagnosed_s, self._heard_s = statuses, now_s, now_s
 
-    def view(self, now_s: float, *, steers: bool = False) -> View:
+    def view(
+        self, now_s: float, *, steers: bool = False, lacks: frozenset[str] = frozenset()
+    ) -> View:
         """All that is known now."""
         moves = self._commanded and now_s - self._commanded[1] < COMMAND_LIVES_S
         imu, odom = (
@@ -178,6 +184,7 @@ class Model:
             path=tuple(self._path),
             steers=steers,
             said=self.said,
+            lacks=lacks,
         )
 
     def _follow(self, pose: Pose, now_s: float) -> None:

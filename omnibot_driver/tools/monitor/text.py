@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.reporting.diagnosis import Level, Status
-from omnibot_driver.tools.monitor.model import IMU_TOPIC, ODOM_TOPIC, View
+from omnibot_driver.tools.monitor.model import IMU_TOPIC, ODOM_TOPIC, Flow, View
 from omnibot_driver.tools.monitor.plot import sparkline
 
 WIDTH: Final = 7
@@ -63,17 +63,20 @@ def estop(view: View) -> str:
 
 def figures(view: View) -> list[str]:
     """Rates, pose, velocities, IMU: lines of 42 columns at most."""
+    inertial = [
+        f"force     m/s²     {numbers(view.force_mps2)}",
+        f"gyro      rad/s    {numbers(view.rate_radps)}",
+    ]
     return [
         *(
             f"{name:<12}{flow.hz:5.0f} Hz  {sparkline(flow.history, BAR_COLUMNS)}"
-            for name, flow in ((IMU_TOPIC, view.imu), (ODOM_TOPIC, view.odom))
+            for name, flow in _flows(view).items()
         ),
         "                        x       y yaw or z",
         f"pose      m, °     {_pose(view)}",
         f"commanded m/s rad/s{numbers(_twist(view.commanded))}",
         f"measured  m/s rad/s{numbers(_twist(view.measured))}",
-        f"force     m/s²     {numbers(view.force_mps2)}",
-        f"gyro      rad/s    {numbers(view.rate_radps)}",
+        *([] if "imu" in view.lacks else inertial),
     ]
 
 
@@ -110,28 +113,36 @@ def report(view: View) -> str:
 
 def as_json(view: View, troubles: Iterable[str]) -> str:
     """The same for programs; JSON knows no NaN, so what is not finite is null and in troubles."""
+    inertial = {
+        "imu": {
+            "linear_acceleration_mps2": _finite(view.force_mps2),
+            "angular_velocity_radps": _finite(view.rate_radps),
+        }
+    }
     return json.dumps(
         {
             "driver": view.driver,
             "state": view.state or None,
             "estop": view.estop,
-            "rates_hz": {
-                IMU_TOPIC: round(view.imu.hz, 1),
-                ODOM_TOPIC: round(view.odom.hz, 1),
-            },
+            "rates_hz": {name: round(flow.hz, 1) for name, flow in _flows(view).items()},
             "pose": _fields(view.pose),
             "commanded": _fields(view.commanded),
             "measured": _fields(view.measured),
-            "imu": {
-                "linear_acceleration_mps2": _finite(view.force_mps2),
-                "angular_velocity_radps": _finite(view.rate_radps),
-            },
+            **({} if "imu" in view.lacks else inertial),
             "diagnostics": {s.name: _status(s) for s in view.statuses},
             "troubles": list(troubles),
         },
         indent=2,
         ensure_ascii=False,
     )
+
+
+def _flows(view: View) -> dict[str, Flow]:
+    """The topics whose rates are shown."""
+    flows = {IMU_TOPIC: view.imu, ODOM_TOPIC: view.odom}
+    return {
+        name: flow for name, flow in flows.items() if name != IMU_TOPIC or "imu" not in view.lacks
+    }
 
 
 def _urgency(status: Status) -> int:

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from omnibot_driver.core.reporting.diagnosis import RUNNING
 from omnibot_driver.tools.report.log import Array, Log
 
 X, Y, Z, COMMAND, RED, GREY = "#0072B2", "#D55E00", "#009E73", "#222222", "#C0272D", "#8A8F98"
@@ -87,7 +88,7 @@ def shade(axes: Axes, log: Log) -> None:
     for span in log.latched:
         axes.axvspan(span.begin_s, span.end_s, color=RED, alpha=0.18, linewidth=0)
     for span in log.states:
-        if span.what not in ("nominal", "imu_only"):
+        if span.what not in RUNNING:
             colour = STATES.get(span.what, GREY)
             axes.axvspan(span.begin_s, span.end_s, color=colour, alpha=0.25, linewidth=0)
 

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from omnibot_driver.core.reporting.diagnosis import RUNNING
 from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Mask, Series, Span
 
@@ -27,10 +28,10 @@ class Pair:
     """A command topic and what answers it. ``weights`` make the axes speeds of a rim in m/s."""
 
     topic: str
-    axes: tuple[str, str, str]
-    units: tuple[str, str, str]
-    weights: tuple[float, float, float]
-    scales: tuple[str, str, str]
+    axes: tuple[str, ...]
+    units: tuple[str, ...]
+    weights: tuple[float, ...]
+    scales: tuple[str, ...]
     commands: Series
     measured: Series
 
@@ -51,16 +52,23 @@ def twists(log: Log) -> Pair:
 
 def pairs(log: Log) -> list[Pair]:
     """Those of which the log has both sides, without what is not finite."""
+    count = len(log.wheels)
     wheels = Pair(
         "wheel_cmd",
-        ("wheel A", "wheel B", "wheel C"),
-        ("rad/s",) * 3,
-        (0.029,) * 3,
-        ("linear_scale",) * 3,
+        tuple(map(wheel_name, log.wheels)),
+        ("rad/s",) * count,
+        (0.029,) * count,
+        ("linear_scale",) * count,
         log.wheel_cmd.only(log.wheel_cmd.finite),
         _sampled(log.joint_states),
     )
     return [pair for pair in (twists(log), wheels) if len(pair.commands) and len(pair.measured) > 1]
+
+
+def wheel_name(joint: str) -> str:
+    """For people: wheel A, left wheel."""
+    words = joint.removesuffix("_joint").split("_")
+    return " ".join(word.upper() if len(word) == 1 else word for word in words)
 
 
 def shown(log: Log) -> list[Pair]:
@@ -155,7 +163,7 @@ def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
 
 def _stopped(log: Log, at_s: Array) -> Mask:
     """While commands were not carried out, and shortly after."""
-    off = [state for state in log.states if state.what not in ("nominal", "imu_only")]
+    off = [state for state in log.states if state.what not in RUNNING]
     spans = [
         Span(item.begin_s, item.end_s + COMMAND_TIMEOUT_S, "") for item in (*off, *log.latched)
     ]
@@ -202,7 +210,7 @@ def _stalled(stalls: list[Span]) -> Iterator[Finding]:
 def _followed(log: Log, pair: Pair, found: Answer | None) -> Iterator[Finding]:
     if found is None or np.isnan(found.gains).all():
         return
-    told = [axis for axis in range(3) if np.isfinite(found.gains[axis])]
+    told = [axis for axis in range(len(pair.axes)) if np.isfinite(found.gains[axis])]
     figures = ", ".join(
         f"{pair.axes[axis]} {found.gains[axis]:.2f} (±{found.error[axis]:.2g})" for axis in told
     )

@@ -14,7 +14,6 @@ Mask = NDArray[np.bool_]
 
 COMMAND_TIMEOUT_S: Final = 0.5
 """The driver's default of ``cmd_vel_timeout``; what is older commands nothing."""
-RUNNING: Final = ("nominal", "imu_only")
 SETTLING_S: Final = 0.2
 """Around a change of state, in which a stream may begin or end."""
 
@@ -83,7 +82,8 @@ class Log:
     ``alone``: there is no other robot, so /diagnostics, which all share, is this one's.
 
     Values, in SI units: ``imu`` angular velocity and specific force (6); ``odom`` x, y, yaw, and
-    the twist (6); ``joint_states`` and ``wheel_cmd`` wheel rates (3); ``cmd_vel`` the twist (3).
+    the twist (6); ``joint_states`` and ``wheel_cmd`` rates of the ``wheels``, which are names of
+    joints; ``cmd_vel`` the twist (3).
     """
 
     robot: str
@@ -94,6 +94,7 @@ class Log:
     joint_states: Series
     cmd_vel: Series
     wheel_cmd: Series
+    wheels: tuple[str, ...] = ()
     states: tuple[Span, ...] = ()
     estops: tuple[Span, ...] = ()
     diagnostics: tuple[Status, ...] = ()

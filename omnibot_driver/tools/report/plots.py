@@ -3,7 +3,7 @@
 """Pictures of a log: each function draws one figure, which needs neither a screen nor ROS."""
 
 from collections.abc import Iterable, Iterator
-from itertools import zip_longest
+from itertools import cycle, zip_longest
 from typing import Final
 
 import numpy as np
@@ -89,16 +89,18 @@ def path(log: Log) -> Figure:
 def velocities(log: Log) -> Figure:
     """Measured over commanded, an axis each, for every pair that there is."""
     found = following.shown(log)
-    figure = new_figure(1.9 * 3 * len(found))
-    grid = np.atleast_1d(figure.subplots(3 * len(found), 1, sharex=True))
-    for number, pair in enumerate(found):
+    rows = sum(len(pair.axes) for pair in found)
+    figure = new_figure(1.9 * rows)
+    grid = np.atleast_1d(figure.subplots(rows, 1, sharex=True))
+    free = iter(grid)
+    for pair in found:
         times_s = pair.measured.stamp_s
         edges = np.unique(np.concatenate([pair.commands.arrived_s, times_s]))
         told = pair.commands.held(edges) if len(pair.commands) else None
-        for axis in range(3):
-            axes = grid[3 * number + axis]
+        for axis, colour in zip(range(len(pair.axes)), cycle((X, Y, Z)), strict=False):
+            axes = next(free)
             shade(axes, log)
-            line(axes, times_s, pair.measured.values[:, axis], (X, Y, Z)[axis], "measured")
+            line(axes, times_s, pair.measured.values[:, axis], colour, "measured")
             if told is not None:
                 line(axes, edges, told[:, axis], COMMAND, "commanded", linewidth=0.9, alpha=0.8)
             title = f"{pair.topic}: commanded and measured" if axis == 0 else ""

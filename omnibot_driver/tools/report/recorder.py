@@ -4,16 +4,20 @@
 
 import math
 from array import array
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
+from omnibot_driver.core.geometry.quaternion import yaw_of
+from omnibot_driver.tools.drivers import SIGNS
 from omnibot_driver.tools.report.log import Log, Series, Span, Status
 
-WHEELS: Final = ("wheel_a_joint", "wheel_b_joint", "wheel_c_joint")
 NO_STAMP: Final = -1
+WHEEL: Final = "wheel"
+"""Is in the name of the joint of every driven wheel, and of no other."""
 DIAGNOSTICS: Final = "/diagnostics"
 
 Row = tuple[float, ...]
@@ -27,18 +31,11 @@ def _imu(message: Any) -> Row:
 def _odometry(message: Any) -> Row:
     pose, twist = message.pose.pose, message.twist.twist
     turn = pose.orientation
-    yaw_rad = math.atan2(
-        2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2)
-    )
+    yaw_rad = yaw_of(turn.x, turn.y, turn.z, turn.w)
     return (
         *(pose.position.x, pose.position.y, yaw_rad),
         *(twist.linear.x, twist.linear.y, twist.angular.z),
     )
-
-
-def _joint_states(message: Any) -> Row:
-    rates = dict(zip(message.name, message.velocity, strict=False))
-    return tuple(rates.get(wheel, math.nan) for wheel in WHEELS)
 
 
 def _twist(message: Any) -> Row:
@@ -46,22 +43,24 @@ def _twist(message: Any) -> Row:
 
 
 def _wheels(message: Any) -> Row:
-    rates = tuple(message.data)
-    return rates if len(rates) == len(WHEELS) else (math.nan,) * 3
+    return tuple(message.data)
 
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """What a topic is to a robot: its width, and how each type that it may have is read."""
+    """What a topic is to a robot: its width, and how each type that it may have is read.
 
-    width: int
+    A width of None is that of the robot's wheels; ``joint_states`` tells their names.
+    """
+
+    width: int | None
     read: Mapping[str, Callable[[Any], Row]]
 
 
 SERIES: Final = {
     "imu/data_raw": Role(6, {"sensor_msgs/msg/Imu": _imu}),
     "odom": Role(6, {"nav_msgs/msg/Odometry": _odometry}),
-    "joint_states": Role(3, {"sensor_msgs/msg/JointState": _joint_states}),
+    "joint_states": Role(None, {"sensor_msgs/msg/JointState": lambda _message: ()}),
     "cmd_vel": Role(
         3,
         {
@@ -69,11 +68,10 @@ SERIES: Final = {
             "geometry_msgs/msg/TwistStamped": lambda message: _twist(message.twist),
         },
     ),
-    "wheel_cmd": Role(3, {"std_msgs/msg/Float32MultiArray": _wheels}),
+    "wheel_cmd": Role(None, {"std_msgs/msg/Float32MultiArray": _wheels}),
 }
 EVENTS: Final = {
-    "state": "std_msgs/msg/String",
-    "estop_active": "std_msgs/msg/Bool",
+    **SIGNS,
     DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
 }
 
@@ -82,20 +80,32 @@ class _Column:
     def __init__(self, role: Role) -> None:
         self.role = role
         self.arrived_ns, self.stamp_ns, self.values = array("q"), array("q"), array("d")
+        self.rows: list[Row] = []
+        """Where the width is not known before the end."""
 
-    def hear(self, kind: str, arrived_ns: int, message: Any) -> None:
+    def hear(self, row: Row, arrived_ns: int, message: Any) -> None:
         header = getattr(message, "header", None)
         stamp_ns = header.stamp.sec * 10**9 + header.stamp.nanosec if header else 0
-        self.values.extend(self.role.read[kind](message))
+        if self.role.width is None:
+            self.rows.append(row)
+        else:
+            self.values.extend(row)
         self.arrived_ns.append(arrived_ns)
         self.stamp_ns.append(stamp_ns or NO_STAMP)
 
-    def series(self, start_ns: int) -> Series:
+    def series(self, start_ns: int, wheels: int) -> Series:
+        """``wheels``: how many the robot has, 0 if that is not known."""
         arrived_ns, stamp_ns = (
             np.array(column, dtype=np.int64) for column in (self.arrived_ns, self.stamp_ns)
         )
         stamp_s = np.where(stamp_ns == NO_STAMP, np.nan, (stamp_ns - start_ns) / 1e9)
-        values = np.array(self.values).reshape(-1, self.role.width)
+        if self.role.width is None:
+            usual = Counter(map(len, self.rows)).most_common(1)
+            width = wheels or (usual[0][0] if usual else 0)
+            whole = [row if len(row) == width else (math.nan,) * width for row in self.rows]
+            values = np.array(whole, dtype=np.float64).reshape(len(whole), width)
+        else:
+            values = np.array(self.values).reshape(-1, self.role.width)
         order = np.argsort(arrived_ns, kind="stable")
         return Series((arrived_ns[order] - start_ns) / 1e9, stamp_s[order], values[order])
 
@@ -107,17 +117,27 @@ class Recorder:
         self._robot = robot
         self._columns = {name: _Column(role) for name, role in SERIES.items()}
         self._events: dict[str, list[tuple[int, Any]]] = {name: [] for name in EVENTS}
+        self._wheels: tuple[str, ...] = ()
         self.count = 0
 
     def hear(self, role: str, kind: str, arrived_ns: int, message: Any) -> None:
         """A message of this type on the topic that plays this role."""
         if role in self._columns:
-            self._columns[role].hear(kind, arrived_ns, message)
+            column = self._columns[role]
+            joints = role == "joint_states"
+            row = self._rates(message) if joints else column.role.read[kind](message)
+            column.hear(row, arrived_ns, message)
         elif role == DIAGNOSTICS:
             self._events[role].append((arrived_ns, message.status))
         else:
             self._events[role].append((arrived_ns, message.data))
         self.count += 1
+
+    def _rates(self, message: Any) -> Row:
+        """Of the wheels, as they are called in the first message that has any, in that order."""
+        self._wheels = self._wheels or tuple(name for name in message.name if WHEEL in name)
+        rates = dict(zip(message.name, message.velocity, strict=False))
+        return tuple(rates.get(wheel, math.nan) for wheel in self._wheels)
 
     def log(self, troubles: tuple[str, ...] = (), *, alone: bool = True) -> Log:
         """All of it in the order of arrival. There must have been a message."""
@@ -128,7 +148,10 @@ class Recorder:
         start_ns, end_s = min(times), (max(times) - min(times)) / 1e9
         for events in self._events.values():
             events.sort(key=lambda event: event[0])
-        series = {name: column.series(start_ns) for name, column in self._columns.items()}
+        series = {
+            name: column.series(start_ns, len(self._wheels))
+            for name, column in self._columns.items()
+        }
         absent = tuple(name for name in SERIES if not len(series[name]))
         return Log(
             robot=self._robot,
@@ -139,6 +162,7 @@ class Recorder:
             joint_states=series["joint_states"],
             cmd_vel=series["cmd_vel"],
             wheel_cmd=series["wheel_cmd"],
+            wheels=self._wheels,
             states=self._spans("state", start_ns, end_s, str),
             estops=self._spans(
                 "estop_active", start_ns, end_s, lambda on: "latched" if on else "free"

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from omnibot_driver.core.reporting.diagnosis import RUNNING
 from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import Array, Log, Series, Span
 
@@ -38,9 +39,7 @@ class Stream:
     lost: tuple[str, ...]
 
 
-IMU: Final = Stream(
-    "imu/data_raw", 100.0, ("nominal", "imu_only"), ("IMU frames lost", "IMU readings refused")
-)
+IMU: Final = Stream("imu/data_raw", 100.0, RUNNING, ("IMU frames lost", "IMU readings refused"))
 ODOMETRY: Final = Stream(
     "odom", 25.0, ("nominal",), ("Odometry frames lost", "Odometry readings refused")
 )

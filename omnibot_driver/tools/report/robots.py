@@ -2,9 +2,10 @@
 
 """Which robots there are among topics, known by name and type alone."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Final
 
+from omnibot_driver.tools.drivers import SIGNS, drivers_among
 from omnibot_driver.tools.needs import ToolError
 from omnibot_driver.tools.report.recorder import DIAGNOSTICS, EVENTS, SERIES
 
@@ -18,9 +19,10 @@ Topics = dict[str, str]
 def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
     """By namespace ("/" for none): what each robot has, from pairs of topic and type."""
     pairs = set(topics)
+    drivers = drivers_among(pairs)
     robots: dict[str, Topics] = {}
     for topic, kind in sorted(pairs):
-        for role, (namespace, fits) in _roles(topic, kind, pairs).items():
+        for role, (namespace, fits) in _roles(topic, kind, drivers).items():
             if fits:
                 robots.setdefault(namespace, {})[topic] = role
     robots = {name: found for name, found in robots.items() if {*found.values()} & {*PROOF}}
@@ -30,17 +32,16 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
     return robots
 
 
-def _roles(topic: str, kind: str, pairs: set[tuple[str, str]]) -> Mapping[str, tuple[str, bool]]:
+def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
     """By role that its name allows: the namespace, and whether the type allows it too."""
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
         if topic.endswith(f"/{role}"):
             roles[role] = (topic[: -len(role) - 1] or "/", kind in series.read)
     node, _, name = topic.rpartition("/")
-    other = {"state": "estop_active", "estop_active": "state"}.get(name)
-    if node and other:
-        both = (f"{node}/{other}", EVENTS[other]) in pairs
-        roles[name] = (node.rpartition("/")[0] or "/", kind == EVENTS[name] and both)
+    if node and name in SIGNS:
+        fits = kind == SIGNS[name] and node in drivers
+        roles[name] = (node.rpartition("/")[0] or "/", fits)
     return roles
 
 

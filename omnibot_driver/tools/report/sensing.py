@@ -10,21 +10,19 @@ from typing import Final
 import numpy as np
 from scipy import signal
 
+from omnibot_driver.core.imu.gyro_calibration import STILL_MPS2, STILL_RADPS
+from omnibot_driver.core.imu.scale import ACCEL_TOLERANCE, STANDARD_GRAVITY
+from omnibot_driver.core.reporting.diagnosis import STUCK_READINGS
 from omnibot_driver.tools.report.findings import Finding, Level, counted
 from omnibot_driver.tools.report.log import Array, Log, Mask, Series
 from omnibot_driver.tools.report.travel import SHORT_GAP_S, moving, steps
 
-GRAVITY_MPS2: Final = 9.80665
 SLIGHT_ERROR: Final = 0.03
-GRAVE_ERROR: Final = 0.1
 """Of gravity."""
-STUCK_READINGS: Final = 100
 REST_S: Final = 0.5
 """Away from all motion by so much, the robot is at rest."""
 LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
-STILL_GYRO_RADPS: Final = 0.01
-STILL_FORCE_MPS2: Final = 0.3
 TURNING_RADPS: Final = 0.1
 """An even turn without odometry: it might be a bias, but a rare one."""
 LARGEST_BIAS_RADPS: Final = 0.01
@@ -60,8 +58,8 @@ def at_rest(log: Log, imu: Series) -> Mask:
     blocks = imu.values[:whole].reshape(-1, BLOCK, 6)
     spread = blocks.std(axis=1)
     still = (np.abs(blocks.mean(axis=1)[:, :3]) < TURNING_RADPS).all(axis=1)
-    still &= (spread[:, :3] < STILL_GYRO_RADPS).all(axis=1)
-    still &= (spread[:, 3:] < STILL_FORCE_MPS2).all(axis=1)
+    still &= (spread[:, :3] < STILL_RADPS).all(axis=1)
+    still &= (spread[:, 3:] < STILL_MPS2).all(axis=1)
     rest[:whole] = np.repeat(still, BLOCK)
     return rest
 
@@ -139,16 +137,16 @@ def longest_same(values: Array) -> int:
 
 def _gravity(force: Array) -> Iterator[Finding]:
     norm = float(np.linalg.norm(force))
-    figure = f"Gravity reads {norm:.3f} m/s² at rest; it should be {GRAVITY_MPS2:.3f}"
-    error = abs(norm / GRAVITY_MPS2 - 1.0)
+    figure = f"Gravity reads {norm:.3f} m/s² at rest; it should be {STANDARD_GRAVITY:.3f}"
+    error = abs(norm / STANDARD_GRAVITY - 1.0)
     if error < SLIGHT_ERROR:
         yield Finding(Level.GOOD, "IMU", f"{figure}.")
-    elif error < GRAVE_ERROR:
+    elif error < ACCEL_TOLERANCE:
         yield Finding(
             Level.NOTE, "IMU", f"{figure}.", "Set accel_bias: the accelerometer is off by a little."
         )
     else:
-        factor = GRAVITY_MPS2 / max(norm, 1e-3)
+        factor = STANDARD_GRAVITY / max(norm, 1e-3)
         likely = [g for g in (2, 4, 8) if abs(factor / g - 1) < 0.1 or abs(factor * g - 1) < 0.1]
         advice = (
             f"Set accel_range to {factor:.3g} times what it is."
@@ -156,7 +154,7 @@ def _gravity(force: Array) -> Iterator[Finding]:
             else "Check accel_range and accel_bias; a shaken or falling robot is not at rest."
         )
         yield Finding(Level.BAD, "IMU", f"{figure}.", advice)
-    if norm > 0.5 * GRAVITY_MPS2:
+    if norm > 0.5 * STANDARD_GRAVITY:
         tilt_deg = float(np.degrees(np.arccos(min(1.0, abs(force[2]) / norm))))
         figure = f"At rest the sensor is tilted by {tilt_deg:.1f}°"
         if tilt_deg > LARGEST_TILT_DEG:

@@ -1,0 +1,30 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Which drivers there are, by the topics that every one of them has, whatever its board."""
+
+from collections.abc import Iterable
+from typing import Any, Final
+
+SIGNS: Final = {"state": "std_msgs/msg/String", "estop_active": "std_msgs/msg/Bool"}
+"""Under a driver's own name: topics, and their types."""
+
+
+def drivers_among(topics: Iterable[tuple[str, str]]) -> list[str]:
+    """Full names of the drivers, from pairs of topic and type."""
+    pairs = set(topics)
+    names = {topic.rpartition("/")[0] for topic, _kind in pairs}
+    return sorted(
+        name
+        for name in names
+        if name and all((f"{name}/{sign}", kind) in pairs for sign, kind in SIGNS.items())
+    )
+
+
+def running_drivers(node: Any) -> list[str]:
+    """Full names of those that publish now, as far as this rclpy node knows."""
+    found = node.get_topic_names_and_types()
+    return [
+        name
+        for name in drivers_among((topic, kind) for topic, kinds in found for kind in kinds)
+        if all(node.count_publishers(f"{name}/{sign}") for sign in SIGNS)
+    ]

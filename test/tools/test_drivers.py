@@ -1,0 +1,33 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Drivers are found by topics alone."""
+
+from types import SimpleNamespace
+
+from omnibot_driver.tools.drivers import drivers_among, running_drivers
+
+STRING, BOOL = "std_msgs/msg/String", "std_msgs/msg/Bool"
+
+
+def test_a_driver_is_a_node_with_a_state_and_an_estop() -> None:
+    """Of their types, under one name, in whatever namespace and under whatever name."""
+    topics = [
+        ("/omnibot_driver/state", STRING), ("/omnibot_driver/estop_active", BOOL),
+        ("/robot1/base/estop_active", BOOL), ("/robot1/base/state", STRING),
+        ("/other/state", STRING), ("/third/state", "std_msgs/msg/Int8"),
+        ("/third/estop_active", BOOL), ("/state", STRING), ("/estop_active", BOOL),
+    ]  # fmt: skip
+    assert drivers_among(topics) == ["/omnibot_driver", "/robot1/base"]
+    assert drivers_among([]) == []
+
+
+def test_one_that_is_only_listened_to_does_not_run() -> None:
+    """A tool that waits for a driver makes its topics as well."""
+    counts = {"/a/state": 1, "/a/estop_active": 1, "/b/state": 0, "/b/estop_active": 0}
+    node = SimpleNamespace(
+        get_topic_names_and_types=lambda: [
+            (name, [STRING if name.endswith("state") else BOOL]) for name in counts
+        ],
+        count_publishers=lambda name: counts[name],
+    )
+    assert running_drivers(node) == ["/a"]
