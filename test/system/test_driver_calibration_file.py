@@ -40,7 +40,7 @@ def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) ->
     path.write_text("axis_signs: [1, -1, -1]\nimu_rpy: [0, 0, 0]\nstep: {}\nlinear_scale: 80\n")
     line = said_of(path, start_driver)
     assert "INFO" in line
-    assert line.endswith(f"the calibration_file {path} gives linear_scale, axis_signs\n")
+    assert line.endswith(f"the calibration_file {path} gives axis_signs, linear_scale\n")
 
 
 def test_names_that_are_not_read_are_told_with_the_nearest(
