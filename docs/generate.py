@@ -60,7 +60,9 @@ def parameter_file(board: str) -> str:
                 subsequent_indent="    # ",
                 break_on_hyphens=False,
             )
-            lines.append(f"    {row.name}: {_yaml(row.default)}")
+            lines.append(
+                f"    # {row.name}:" if row.unset else f"    {row.name}: {_yaml(row.default)}"
+            )
     return "\n".join(lines) + "\n"
 
 
@@ -88,7 +90,7 @@ def _row(row: Parameter) -> str:
     cells = [
         f"`{row.name}`",
         TYPES[row.kind] + (f"[{size}]" if row.is_list else ""),
-        f"`{_yaml(row.default)}`",
+        "unset" if row.unset else f"`{_yaml(row.default)}`",
         row.unit,
         allowed,
         "fixed" if row.fixed else "dynamic",

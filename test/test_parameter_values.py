@@ -3,6 +3,7 @@
 """What one parameter may be, and what is said of any other value."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -227,3 +228,15 @@ def test_a_wrong_list_is_refused_with_what_it_may_be(
     with pytest.raises(ParameterError) as refused:
         parameter.check(wrong)
     assert str(refused.value).startswith(f"parameter '{parameter.name}' {sentence}")
+
+
+def test_what_the_board_keeps_is_unset_until_it_is_given() -> None:
+    """The default tells the type alone; None is taken nowhere else."""
+    gain = Parameter("gain", 1.0, "1", "A gain.", low=0.0, high=9.0, unset=True)
+    assert gain.initial is None
+    assert gain.check(None) is None
+    assert gain.check(2) == 2.0
+    with pytest.raises(ParameterError, match="'gain' must be 0 to 9"):
+        gain.check(10.0)
+    with pytest.raises(ParameterError, match="must be a double, not None"):
+        replace(gain, unset=False).check(None)

@@ -13,12 +13,15 @@ TYPES: Final = {bool: "a bool", int: "an integer", float: "a double", str: "a st
 QUOTE: Final = "YAML reads on, off, yes and no as bool: put it in quotes"
 NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six")
 Item = int | float | str
-Value = bool | Item | list[int] | list[float] | list[str]
+Value = bool | Item | list[int] | list[float] | list[str] | None
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """One row of the table. The default's type is the parameter's type.
+
+    ``unset``: it has no value unless it is given one (the board keeps its own); the default then
+    tells the type alone.
 
     ``low`` and ``high`` are inclusive; ``fixed`` means: given at start, read-only afterwards;
     ``calibrated``: a calibration file may hold it. The default of a list has at least one item.
@@ -36,6 +39,12 @@ class Parameter:
     fixed: bool = False
     calibrated: bool = False
     length: tuple[int, int] | None = None
+    unset: bool = False
+
+    @property
+    def initial(self) -> Value:
+        """Its value when none is given; None where it is unset."""
+        return None if self.unset else self.default
 
     @property
     def is_list(self) -> bool:
@@ -68,6 +77,8 @@ class Parameter:
 
     def check(self, value: object) -> Value:
         """The value in the parameter's own type. Raises ParameterError."""
+        if value is None and self.unset:
+            return None
         if isinstance(self.default, list):
             items: Value = self._check_list(value)
             return items

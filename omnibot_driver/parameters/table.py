@@ -91,7 +91,7 @@ class Table:
                     f"there is no parameter '{name}'; the nearest is"
                     f" '{nearest(name, self.by_name)}' (config/{self.board}.yaml has them all)"
                 )
-        values = {row.name: row.check(given.get(row.name, row.default)) for row in self.rows}
+        values = {row.name: row.check(given.get(row.name, row.initial)) for row in self.rows}
         for check in self.checks:
             check(values)
         return values

@@ -30,10 +30,11 @@ TRAITS: Final = replace(
 )
 TRACK: Final = Parameter("track_width", 0.3, "m", "From wheel to wheel.", low=0.1, high=1.0)
 NAMES: Final = Parameter("names", ["a"], "", "Names of things.", length=(0, 3), fixed=True)
+GAIN: Final = Parameter("gain", 1.0, "1", "Kept by the board.", low=0.0, high=9.0, unset=True)
 PARAMETERS: Final = table(
     "plain",
     TRAITS,
-    own={"The plain board": (TRACK, NAMES)},
+    own={"The plain board": (TRACK, NAMES, GAIN)},
     changed={"port": {"default": "/dev/ttyACM7"}, "max_linear_speed": {"default": 0.2}},
 )
 

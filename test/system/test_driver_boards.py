@@ -14,7 +14,9 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from plain_board import PARAMETERS
 from probe import Probe
-from rcl_interfaces.srv import ListParameters
+from rcl_interfaces.msg import Parameter as RosParameter
+from rcl_interfaces.msg import ParameterType, ParameterValue
+from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -64,6 +66,13 @@ def test_what_a_board_lacks_is_not_advertised(
     assert set(PARAMETERS.by_name) <= declared
     assert not {name for name in declared if "imu" in name or "gyro" in name or "accel_" in name}
     assert not {"max_wheel_speed", "linear_scale", "control_method"} & declared
+    (gain,) = probe.call(GetParameters, "get_parameters", names=["gain"]).values
+    assert gain.type == ParameterType.PARAMETER_NOT_SET
+    given = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=2.0)
+    request = [RosParameter(name="gain", value=given)]
+    assert probe.call(SetParameters, "set_parameters", parameters=request).results[0].successful
+    (gain,) = probe.call(GetParameters, "get_parameters", names=["gain"]).values
+    assert gain.double_value == 2.0
 
 
 def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
@@ -115,6 +124,7 @@ def test_the_monitor_shows_what_the_board_has(
         ),
         ({"gyro_bias": "[0.0,0.0,0.0]"}, "'gyro_bias' belongs to board omnibot, not to plain"),
         ({"track_widt": 0.3}, "no parameter 'track_widt'; the nearest is 'track_width'"),
+        ({"gain": 10.0}, "'gain' must be 0 to 9 1, not 10.0"),
         ({"on_exit": "pause"}, "'on_exit' must be one of stop, not 'pause'"),
         ({"names": "[a,b,c,d]"}, "'names' must be 0 to 3 strings, not"),
     ],
