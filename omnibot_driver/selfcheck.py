@@ -51,8 +51,8 @@ def waiting_advice(port: str, now_ns: int) -> str:
     if now_ns or port.startswith(RECORDING):
         return ""
     return (
-        "use_sim_time is set and nothing comes on /clock: imu/data_raw, odom and joint_states wait"
-        " for it; start what publishes it, or the driver with use_sim_time:=false"
+        "use_sim_time is set and nothing comes on /clock: all measurements wait for it; start what"
+        " publishes it, or the driver with use_sim_time:=false"
     )
 
 
