@@ -23,8 +23,8 @@ from omnibot_driver.simulator.__main__ import boards as simulated_boards
 from omnibot_driver.simulator.common import options
 
 PACKAGE = Path(boards.__file__).parent.parent
-KNOW_BOARDS = ("boards", "simulator", "urls", "tools", "demo", *boards.PROFILES)
-"""Folders. What is left in simulator and tools of one board moves to it in time."""
+KNOW_BOARDS = ("boards", *boards.PROFILES)
+"""Folders."""
 
 
 def imported(path: Path) -> set[str]:
