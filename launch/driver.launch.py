@@ -10,18 +10,14 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 OVERRIDES = {
-    "board": (str, "Motor board of the robot"),
     "port": (str, "Serial device or pyserial URL of the board"),
     "publish_tf": (bool, "Whether the driver publishes odom to base_link on /tf"),
     "frame_prefix": (str, "Text put before every frame name, without adding a slash: robot1/"),
 }
-DEFAULT_BOARD = "omnibot"
 
 
 def driver_node(context: LaunchContext) -> list[Node]:
     """Return the driver; an empty argument leaves the choice to the parameter file."""
-    board = LaunchConfiguration("board").perform(context) or DEFAULT_BOARD
-    defaults = PathJoinSubstitution([FindPackageShare("omnibot_driver"), "config", f"{board}.yaml"])
     overrides = {
         name: ParameterValue(LaunchConfiguration(name), value_type=type_)
         for name, (type_, _) in OVERRIDES.items()
@@ -33,7 +29,7 @@ def driver_node(context: LaunchContext) -> list[Node]:
             executable="driver",
             name="omnibot_driver",
             namespace=LaunchConfiguration("namespace"),
-            parameters=[LaunchConfiguration("params_file").perform(context) or defaults, overrides],
+            parameters=[LaunchConfiguration("params_file"), overrides],
             output="screen",
         )
     ]
@@ -52,10 +48,19 @@ def generate_launch_description() -> LaunchDescription:
                 for name, (_, description) in OVERRIDES.items()
             ),
             DeclareLaunchArgument(
+                "board",
+                default_value="omnibot",
+                description="Motor board of the robot, for which params_file is chosen.",
+            ),
+            DeclareLaunchArgument(
                 "params_file",
-                default_value="",
-                description="YAML file with the driver's parameters; empty: config/<board>.yaml of"
-                " this package, which has the defaults.",
+                default_value=[
+                    PathJoinSubstitution(
+                        [FindPackageShare("omnibot_driver"), "config", LaunchConfiguration("board")]
+                    ),
+                    ".yaml",
+                ],
+                description="YAML file with the driver's parameters, `board` among them.",
             ),
             DeclareLaunchArgument(
                 "namespace",

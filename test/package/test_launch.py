@@ -141,7 +141,7 @@ def test_the_driver_has_every_parameter_that_is_offered() -> None:
         for node in tree.body
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict)
     )
-    assert {"board", "port"} < set(offered) <= set(PARAMETERS.by_name)
+    assert {"port"} < set(offered) <= set(PARAMETERS.by_name)
 
 
 @needs_launch
@@ -175,13 +175,13 @@ def test_the_driver_gets_what_is_given(launch: Callable[..., Started]) -> None:
 def test_the_parameter_file_is_that_of_the_board(
     launch: Callable[..., Started], tmp_path: Path
 ) -> None:
-    """Unless another is given; then the board that is given goes with that one."""
+    """Unless another is given, which says itself what board it is for."""
     defaults = {row.name: row.default for row in PARAMETERS.rows}
     assert parameters(launch("driver.launch.py", "board:=omnibot")["driver"]) == defaults
     own = tmp_path / "own.yaml"
-    own.write_text("/**:\n  ros__parameters:\n    port: sim://\n")
+    own.write_text("/**:\n  ros__parameters:\n    board: omnibot\n")
     started = launch("driver.launch.py", "board:=omnibot", f"params_file:={own}")
-    assert parameters(started["driver"]) == {"board": "omnibot", "port": "sim://"}
+    assert parameters(started["driver"]) == {"board": "omnibot"}
 
 
 @needs_launch
