@@ -103,7 +103,7 @@ class OmniBotDriver(Node):
         stop = self._board.stop()
         return Link(
             self._session,
-            self._profile.opener(self._values),
+            boards.opener(self._profile, self._values),
             port,
             last_words=(stop, self._board.emergency_stop() + stop)
             if self._values["guard"]

@@ -4,9 +4,10 @@
 
 import threading
 from collections.abc import Callable, Sequence
-from functools import partial
 from typing import Any
 
+from omnibot_driver import boards
+from omnibot_driver.boards import omnibot
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.events import Event
@@ -17,7 +18,6 @@ from omnibot_driver.core.packets import packed
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link
 from omnibot_driver.simulator.omnibot import SimulatedBoard
-from omnibot_driver.transports.serial_port import SerialPort
 
 PATIENCE_S = 20.0
 STOP = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
@@ -69,7 +69,7 @@ def session(*, run: bool = True, obeys: bool = True) -> Session:
 def link_to(url: str, listener: Listener, session: Session, **taps: Callable[[Any], None]) -> Link:
     return Link(
         session,
-        partial(SerialPort, url, 115200),
+        boards.opener(omnibot, {"port": url, "baudrate": 115200}),
         url,
         last_words=LAST_WORDS,
         reconnect_interval_s=0.02,

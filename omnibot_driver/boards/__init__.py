@@ -7,6 +7,7 @@ makes it of their values. The rest of the driver knows no board.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from importlib import import_module
 from typing import Any, Final, Protocol, cast
 
@@ -42,7 +43,7 @@ class Profile(Protocol):
         """What ``Board.settings`` is to be replaced by when parameters change."""
 
     def opener(self, values: Mapping[str, Any]) -> Callable[[], Transport]:
-        """What opens the line to it."""
+        """What opens the line to a real one."""
 
     def kinematics(self, values: Mapping[str, Any]) -> Kinematics:
         """The wheels, by checked values."""
@@ -58,6 +59,15 @@ class Profile(Protocol):
 def load(name: str) -> Profile:
     """The profile of one of ``PROFILES``."""
     return cast(Profile, import_module(PROFILES[name]))
+
+
+def opener(profile: Profile, values: Mapping[str, Any]) -> Callable[[], Transport]:
+    """What opens the line: to a simulated board inside this process where ``port`` says so."""
+    port = str(values["port"])
+    if not port.lower().startswith("sim://"):
+        return profile.opener(values)
+    simulated = import_module("omnibot_driver.transports.simulated")
+    return partial(simulated.SimulatedTransport, port, profile.SIMULATOR)
 
 
 def table_for(given: Mapping[str, object]) -> Table:

@@ -37,8 +37,6 @@ asked every second."""
 PSEUDO_TERMINALS: Final = range(136, 144)
 """Linux's major device numbers of them."""
 
-serial.protocol_handler_packages.append("omnibot_driver.urls")
-
 
 class SerialPort:
     """A ``Transport`` of one channel of bytes: an open port, exclusively ours.
@@ -46,6 +44,8 @@ class SerialPort:
     Linux raises DTR and RTS when the first program opens a port. Closing leaves them raised, so
     that a board that is wired to them restarts once after plugging in at the most.
     """
+
+    ends_with_us = False
 
     def __init__(self, url: str, baudrate: int) -> None:
         self._url = url
@@ -76,11 +76,6 @@ class SerialPort:
     def descriptors(self) -> tuple[int, ...] | None:
         """One, where the port has one."""
         return None if self._descriptor is None else (self._descriptor,)
-
-    @property
-    def ends_with_us(self) -> bool:
-        """Nothing outside this process hears what is written."""
-        return self._url.lower().startswith("sim://")
 
     @property
     def overruns(self) -> int | None:

@@ -18,8 +18,8 @@ from omnibot_driver.simulator.common import options
 from omnibot_driver.simulator.common.board import Packet, SimulatedBoard
 from omnibot_driver.simulator.common.running import UNREAD_LIMIT, RunningBoard
 from omnibot_driver.simulator.common.wired import Line
+from omnibot_driver.transports import READ_TIMEOUT_S
 
-READ_TIMEOUT_S: Final = 0.2
 UNREAD_DATAGRAMS: Final = 256
 """About what a socket of Linux holds of small ones."""
 

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from toys import line_board, request_board
-from toys.robots import LineRobot, RequestRobot
+from toys.line_robot import LineRobot
+from toys.request_robot import RequestRobot
 
 from omnibot_driver.core.board import Board
 from omnibot_driver.core.commands.limits import SpeedLimits
@@ -17,7 +18,7 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySet
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.core.session import Session, SessionSettings
-from omnibot_driver.simulator import BoardSettings, SimulatedBoard
+from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 TICK_S = 0.01
 
@@ -33,7 +34,7 @@ class Robot(Protocol):
 
     def receive(self, data: bytes, now: float, channel: int) -> None: ...
 
-    def step(self) -> list[Packet]: ...
+    def advance(self) -> list[Packet]: ...
 
 
 class OmniBotRobot:
@@ -54,7 +55,7 @@ class OmniBotRobot:
     def receive(self, data: bytes, now: float, channel: int) -> None:
         self.board.receive(data)
 
-    def step(self) -> list[Packet]:
+    def advance(self) -> list[Packet]:
         data = self.board.step()
         return [(0, data)] if data else []
 
@@ -99,7 +100,7 @@ class AnyBench:
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S
-            for channel, data in self.robot.step():
+            for channel, data in self.robot.advance():
                 if self.speaks:
                     self.session.receive(data, self.now, channel)
             if self.now >= self.session.wake_at:

@@ -8,22 +8,25 @@ a service of its own.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 from rclpy.node import Node
 from std_msgs.msg import Int64
 from std_srvs.srv import Trigger
 
-from omnibot_driver.core.board import BoardFigures, ImuReading, Reading
+from omnibot_driver.core.board import BoardFigures
 from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.readings import ImuReading, Reading
 from omnibot_driver.core.requests import Request
 from omnibot_driver.parameters import Parameter, table
+from omnibot_driver.transports.serial_port import SerialPort
 
 TRAITS: Final = replace(
     OmniBot.traits,
-    imu=False,
+    imu_period_s=None,
     authorities=frozenset({Authority.BASE}),
     requests=frozenset({Request.START}),
     wheels=(),
@@ -44,7 +47,7 @@ class PlainBoard(OmniBot):
 
     traits = TRAITS
 
-    def receive(self, data: bytes, now: float) -> list[Reading]:
+    def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         readings = super().receive(data, now)
         return [reading for reading in readings if not isinstance(reading, ImuReading)]
 
@@ -67,6 +70,10 @@ def make(values: Mapping[str, Any]) -> PlainBoard:
 
 def settings(_values: Mapping[str, Any]) -> OmniBotSettings:
     return OmniBotSettings()
+
+
+def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
+    return partial(SerialPort, values["port"], 115200)
 
 
 def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:

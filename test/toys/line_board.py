@@ -20,6 +20,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.packets import Packets, packed
 from omnibot_driver.core.readings import DisplacementReading, Reading
 from omnibot_driver.core.traits import Traits
+from omnibot_driver.parameters import Parameter, table
 from omnibot_driver.transports import Transport
 from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
@@ -79,6 +80,15 @@ class LineBoard(Board):
         return WHEELS.body_twist((int(left) / radius_m, int(right) / radius_m))
 
 
+SIMULATOR = "toys.line_robot"
+PARAMETERS = table(
+    "line_board",
+    LineBoard.traits,
+    own={"The toy": (Parameter("sense_port", "/dev/ttyACM1", "", "It tells.", fixed=True),)},
+    without=("baudrate",),
+)
+
+
 def make(values: Mapping[str, Any]) -> LineBoard:
     return LineBoard()
 
@@ -92,5 +102,9 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Transport]:
-    paths = values["port"].split(",")
+    paths = values["port"], values["sense_port"]
     return partial(Several, [partial(SerialPort, path, 115200) for path in paths])
+
+
+def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
+    return {}

@@ -22,6 +22,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.packets import NO_PACKETS, Packets, packed
 from omnibot_driver.core.readings import DisplacementReading, Reading
 from omnibot_driver.core.traits import Traits
+from omnibot_driver.parameters import table
 from omnibot_driver.transports import Transport
 from omnibot_driver.transports.udp import UdpPorts
 
@@ -135,6 +136,15 @@ def move(twist: BodyTwist) -> bytes:
     return b"MOVE %d %d" % (round(1e3 * twist.vx_mps), round(1e3 * twist.yaw_rate_radps))
 
 
+SIMULATOR = "toys.request_robot"
+PARAMETERS = table(
+    "request_board",
+    RequestBoard.traits,
+    without=("baudrate",),
+    changed={"port": {"default": "udp://127.0.0.1:5000"}},
+)
+
+
 def make(values: Mapping[str, Any]) -> RequestBoard:
     return RequestBoard()
 
@@ -149,3 +159,7 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Transport]:
     return partial(UdpPorts, values["port"], 2)
+
+
+def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
+    return {}

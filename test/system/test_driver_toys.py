@@ -1,0 +1,184 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The seam for boards: two toys behind the whole driver, on real pseudo-terminals and sockets.
+
+Nothing of the driver knows them but through the profile that a name leads to.
+"""
+
+import signal
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from driver_process import Driver
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from probe import Probe
+from std_msgs.msg import Float32MultiArray, UInt8MultiArray
+from std_srvs.srv import SetBool
+from toys import line_robot, request_robot
+
+from omnibot_driver.simulator.common.serving import ServedBoard
+
+PATIENCE_S: Final = 20.0
+TOYS: Final = f"""
+import sys
+sys.path.insert(0, {str(Path(__file__).parents[1])!r})
+from omnibot_driver import boards
+boards.PROFILES |= {{name: f"toys.{{name}}" for name in ("line_board", "request_board")}}
+"""
+Start = Callable[..., Any]
+ROBOTS: Final = {"line_board": line_robot.LineRobot, "request_board": request_robot.RequestRobot}
+
+
+class Toy:
+    """One toy in real time, and the driver's arguments for it."""
+
+    def __init__(self, name: str, served: "ServedBoard[Any]") -> None:
+        self.name, self.served = name, served
+        parameters = (channel.parameter for channel in served.board.channels)
+        self.ports = {
+            parameter: address
+            for parameter, address in zip(parameters, served.addresses, strict=True)
+            if parameter
+        }
+
+    def wait_for(self, predicate: Callable[[Any], bool]) -> None:
+        assert self.served.wait_for(predicate, PATIENCE_S), self.served.board.heard[-20:]
+
+    def comes_to_a_stand(self) -> None:
+        """For a second and a half, longer than between two blocking moves."""
+        ways: deque[float] = deque(maxlen=150)
+
+        def stood(robot: Any) -> bool:
+            ways.append(robot.way_m)
+            return len(ways) == ways.maxlen and len(set(ways)) == 1
+
+        self.wait_for(stood)
+
+
+@pytest.fixture(params=ROBOTS)
+def toy(request: pytest.FixtureRequest, stack: ExitStack) -> Toy:
+    return Toy(request.param, stack.enter_context(ServedBoard(ROBOTS[request.param]())))
+
+
+def start_toy(start_driver: Start, toy: Toy, **parameters: object) -> Driver:
+    ports = dict(toy.ports)
+    driver: Driver = start_driver(
+        ports.pop("port"), before=TOYS, board=toy.name, **ports, **parameters
+    )
+    return driver
+
+
+@contextmanager
+def driven(probe: Probe, toy: Toy) -> Iterator[None]:
+    """Commanded ten times a second as long as the robot is watched."""
+    publisher = probe.publisher(Twist, "cmd_vel")
+    twist = Twist()
+    twist.linear.x = 0.2
+    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
+    try:
+        toy.wait_for(lambda robot: not robot.stands)
+        yield
+    finally:
+        probe.remove(timer)
+
+
+def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: Toy) -> None:
+    """From cmd_vel to its line, from its line to odom, and a stop when commands cease."""
+    probe: Probe = probe_of(start_toy(start_driver, toy))
+    odometry = probe.listen(Odometry, "odom")
+    probe.wait_for_state("nominal")
+    with driven(probe, toy):
+        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.1)
+    toy.comes_to_a_stand()
+    with toy.served.lock:
+        way_m = toy.served.board.way_m
+    probe.wait_for(lambda: abs(odometry[-1].pose.pose.position.x - way_m) < 0.01)
+
+
+def test_the_estop_stops_a_toy_until_it_is_released(
+    start_driver: Start, probe_of: Start, toy: Toy
+) -> None:
+    """Although commands go on."""
+    probe: Probe = probe_of(start_toy(start_driver, toy))
+    probe.wait_for_state("nominal")
+    with driven(probe, toy):
+        assert probe.call(SetBool, "estop", data=True).success
+        toy.comes_to_a_stand()
+        assert probe.call(SetBool, "estop", data=False).success
+        toy.wait_for(lambda robot: not robot.stands)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL, signal.SIGSTOP])
+def test_whatever_ends_the_driver_stops_a_toy(
+    start_driver: Start, probe_of: Start, toy: Toy, number: signal.Signals
+) -> None:
+    """Its own exit, or the guard on all its lines."""
+    driver = start_toy(start_driver, toy)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    with driven(probe, toy):
+        driver.process.send_signal(number)
+        toy.comes_to_a_stand()
+    if number is signal.SIGSTOP:
+        driver.process.send_signal(signal.SIGCONT)
+        toy.comes_to_a_stand()
+
+
+def test_each_toy_runs_inside_the_driver_too(start_driver: Start, probe_of: Start) -> None:
+    """``sim://`` is the board's own simulator."""
+    for name in ROBOTS:
+        driver = start_driver("sim://", before=TOYS, board=name)
+        probe: Probe = probe_of(driver)
+        probe.wait_for_state("nominal")
+        assert driver.end(signal.SIGINT) == 0
+
+
+def test_wheels_have_the_boards_number_and_names(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """Two values drive it, three are refused."""
+    toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
+    driver = start_toy(start_driver, toy)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    publisher = probe.publisher(Float32MultiArray, "wheel_cmd")
+    publisher.publish(Float32MultiArray(data=[1.0, 1.0, 1.0]))
+    driver.wait_for_line("it has 3 values; send exactly 2, the rates of wheels left, right")
+    publisher.publish(Float32MultiArray(data=[1.0, -1.0]))
+    toy.wait_for(lambda robot: b"v 100 -100" in robot.heard)
+
+
+def test_the_raw_bytes_of_each_line_have_a_topic(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """By the names of the lines."""
+    toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
+    probe: Probe = probe_of(start_toy(start_driver, toy, publish_raw=True))
+    told = probe.listen(UInt8MultiArray, "omnibot_driver/raw_rx/sense")
+    probe.wait_for_state("nominal")
+    probe.wait_for(lambda: any(bytes(message.data).startswith(b"d ") for message in told))
+    topics = {name for name, _ in probe.node.get_topic_names_and_types()}
+    assert {
+        f"/{probe.node.get_namespace().strip('/')}/omnibot_driver/raw_{way}/{line}"
+        for way in ("rx", "tx")
+        for line in ("drive", "sense")
+    } <= topics
+
+
+def test_one_of_two_lines_that_is_missing_is_named(start_driver: Start, stack: ExitStack) -> None:
+    """The other one is given back meanwhile."""
+    toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
+    toy.ports["sense_port"] = "/dev/no-such-port"
+    driver = start_toy(start_driver, toy)
+    driver.wait_for_line("/dev/no-such-port does not exist")
+
+
+def test_a_host_that_does_not_answer_is_named(start_driver: Start, stack: ExitStack) -> None:
+    """Nothing listens there."""
+    driver = start_driver("udp://127.0.0.1:9", before=TOYS, board="request_board")
+    driver.wait_for_line("nothing listens at udp://127.0.0.1:")
