@@ -8,7 +8,7 @@ import select
 import time
 import tty
 
-from listener import PATIENCE_S
+PATIENCE_S = 20.0
 
 
 def fill(descriptor: int, words: bytes = b"x") -> None:

@@ -3,22 +3,23 @@
 """A session with any board's other half, in simulated time: what the motion rules are tested on."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Protocol
 
 from toys import line_board, request_board
 from toys.line_robot import LineRobot
 from toys.request_robot import RequestRobot
 
+from omnibot_driver import core
+from omnibot_driver.boards import PROFILES
 from omnibot_driver.core.board import Board
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
-from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.core.session import Session, SessionSettings
-from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 TICK_S = 0.01
 
@@ -41,6 +42,8 @@ class OmniBotRobot:
     """The simulated OmniBot, as the toys' robots are."""
 
     def __init__(self) -> None:
+        from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
+
         self.board = SimulatedBoard(BoardSettings(running=True))
 
     @property
@@ -60,12 +63,21 @@ class OmniBotRobot:
         return [(0, data)] if data else []
 
 
-BOARDS: dict[str, Callable[[], tuple[Board, Any]]] = {
-    "omnibot": lambda: (OmniBot(OmniBotSettings()), OmniBotRobot()),
+def omnibot() -> tuple[Board, Any]:
+    from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+
+    return OmniBot(OmniBotSettings()), OmniBotRobot()
+
+
+MAKERS: dict[str, Callable[[], tuple[Board, Any]]] = {
+    "omnibot": omnibot,
     "two lines": lambda: (line_board.make({}), LineRobot()),
     "requests": lambda: (request_board.make({}), RequestRobot()),
 }
 """A new board of each kind, and its robot."""
+CORE = Path(core.__file__).parent
+BOARDS = [name for name in MAKERS if name not in PROFILES or (CORE / name).is_dir()]
+"""Those that are there: a board is a folder that can be removed."""
 
 
 class AnyBench:
@@ -137,7 +149,7 @@ class AnyBench:
 
 def nominal(name: str) -> AnyBench:
     """A board that stands, and obeys."""
-    bench = AnyBench(*BOARDS[name]())
+    bench = AnyBench(*MAKERS[name]())
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
     bench.run(1.5)

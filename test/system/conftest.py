@@ -6,14 +6,15 @@ import os
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 import rclpy
 from driver_process import Driver
 from probe import Probe
 
-from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
+if TYPE_CHECKING:
+    from omnibot_driver.simulator.omnibot import PtyBoard
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -31,7 +32,9 @@ def stack() -> Iterator[ExitStack]:
 
 
 @pytest.fixture
-def start_board(stack: ExitStack) -> Callable[..., PtyBoard]:
+def start_board(stack: ExitStack) -> "Callable[..., PtyBoard]":
+    from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
+
     def start(*, link: str | None = None, **settings: Any) -> PtyBoard:
         return stack.enter_context(PtyBoard(SimulatedBoard(BoardSettings(**settings)), link))
 
@@ -52,12 +55,12 @@ def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
 
 
 @pytest.fixture
-def board(start_board: Callable[..., PtyBoard]) -> PtyBoard:
+def board(start_board: "Callable[..., PtyBoard]") -> "PtyBoard":
     return start_board()
 
 
 @pytest.fixture
-def driver(board: PtyBoard, start_driver: Callable[..., Driver]) -> Driver:
+def driver(board: "PtyBoard", start_driver: Callable[..., Driver]) -> Driver:
     return start_driver(board.path)
 
 

@@ -6,9 +6,11 @@ import math
 
 import pytest
 from hypothesis import given
-from strategies import triples
+from hypothesis import strategies as st
 
 from omnibot_driver.core.imu.scale import ImuScale, gravity_advice
+
+triples = st.tuples(*[st.integers(-32768, 32767)] * 3)
 
 Triple = tuple[int, int, int]
 

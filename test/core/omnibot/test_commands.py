@@ -7,10 +7,11 @@ import re
 import struct
 
 import pytest
+from frame_strategies import words
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from session_bench import bare
-from strategies import twists, words
+from strategies import twists
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose

@@ -9,9 +9,10 @@ them comes from their single frames.
 from random import Random
 
 import pytest
+from frame_strategies import believable_frames, frames
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from strategies import believable_frames, chunkings, cut, frames
+from strategies import chunkings, cut
 from streams import (
     BYTE_S,
     HEADER_BYTES,

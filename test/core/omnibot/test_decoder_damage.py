@@ -5,9 +5,10 @@
 from random import Random
 
 import pytest
+from frame_strategies import frames
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import chunkings, frames
+from strategies import chunkings
 from streams import (
     LEAD_IN,
     REST,

@@ -15,9 +15,10 @@ How rarely a frame is wrong that stands in a damaged stream is measured in ``tes
 from typing import Any
 
 import pytest
+from frame_strategies import any_streams, believable_frames, calm_frames, paused_frames
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from strategies import any_streams, believable_frames, calm_frames, chunkings, paused_frames
+from strategies import chunkings
 
 from omnibot_driver.core.omnibot import FrameDecoder, ImuFrame, decoder, encode, trellis
 from omnibot_driver.core.omnibot.decoder import DOUBT_BYTES

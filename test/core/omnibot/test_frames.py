@@ -6,9 +6,7 @@ import math
 import struct
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from strategies import (
+from frame_strategies import (
     byte_orders,
     commands,
     counters,
@@ -18,6 +16,8 @@ from strategies import (
     pose_frames,
     triples,
 )
+from hypothesis import given
+from hypothesis import strategies as st
 
 from omnibot_driver.core.errors import FrameError
 from omnibot_driver.core.omnibot import (

@@ -6,9 +6,9 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 
 import pytest
+from frame_strategies import triples
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import triples
 from streams import BYTE_S, LEAD_IN, REST, RUNNING_STREAMS, TICK_S, frames_of, ticks_of
 
 from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame, PausedFrame, encode

@@ -5,9 +5,9 @@
 from itertools import product
 
 import pytest
+from frame_strategies import frames, imu_frames
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import frames, imu_frames
 
 from omnibot_driver.core.board import Mode
 from omnibot_driver.core.errors import RequestRefused

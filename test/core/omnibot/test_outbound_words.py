@@ -5,10 +5,10 @@
 import re
 
 import pytest
+from frame_strategies import words
 from hypothesis import given
 from hypothesis import strategies as st
 from session_bench import bare
-from strategies import words
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
