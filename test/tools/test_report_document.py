@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from omnibot_driver.core.imu.scale import ACCEL_TOLERANCE
 from omnibot_driver.tools.report import events, following, log, rhythm, sensing, travel
 
 ROOT = Path(__file__).parents[2]
@@ -42,7 +43,7 @@ def test_every_subject_has_a_row() -> None:
         ("Commands", f"for {following.SUSTAINED_S:g} s"),
         ("Odometry", f"{travel.LEAP_M:g} m or {travel.LEAP_RAD:g} rad"),
         ("IMU", f"{100 * sensing.SLIGHT_ERROR:g} %"),
-        ("IMU", f"{100 * sensing.GRAVE_ERROR:g} %"),
+        ("IMU", f"{100 * ACCEL_TOLERANCE:g} %"),
         ("IMU", f"{sensing.LARGEST_BIAS_RADPS:g} rad/s"),
         ("IMU", f"{sensing.LARGEST_TILT_DEG:g}°"),
         ("IMU", f"{100 * sensing.TURN_TOLERANCE:g} %"),

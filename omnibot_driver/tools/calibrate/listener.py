@@ -22,7 +22,7 @@ from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.motion import HALT
 from omnibot_driver.tools.needs import ToolError
 
-IMU, ODOMETRY = "imu/data_raw", "odom"
+IMU, ODOMETRY = TOPICS = "imu/data_raw", "odom"
 LOST_S: Final = 0.3
 """A robot that is not heard for so long is driven no further."""
 AT_ONCE: Final = 100
@@ -39,7 +39,7 @@ class Listener(Client):
         self._states: list[str] = []
         self._estop = False
         has_imu = "imu_frame" in self.parameters
-        self._topics = (IMU, ODOMETRY) if has_imu else (ODOMETRY,)
+        self._topics: Sequence[str] = TOPICS if has_imu else (ODOMETRY,)
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
         self._pose, self._twist = Pose(), HALT
         self._wheel_rates: tuple[float, ...] = HALT
