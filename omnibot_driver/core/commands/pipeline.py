@@ -70,7 +70,8 @@ class CommandPipeline:
         stricter = commands.timeout_s < self.policy.settings.timeout_s or limits.stricter_than(
             self._shaper.limits
         )
-        self._shaper.limits, self.policy.settings = limits, commands
+        self._shaper.limits = limits
+        self.policy.configure(commands)
         current = self.policy.current
         if not stricter or current is None or current.is_zero or isinstance(current, GoalSetpoint):
             return []

@@ -31,12 +31,12 @@ class CommandSettings:
 
 
 class CommandPolicy:
-    """``settings`` may be replaced at any time."""
+    """``proof``: what the actuator tells of stops and motions, and displacements of the robot."""
 
     def __init__(self, settings: CommandSettings, actuator: Actuator, proof: StopProof) -> None:
         self.proof = proof
         self._actuator = actuator
-        self.settings = settings
+        self.configure(settings)
         self.latched = False
         self.current: Setpoint | None = None
         """The command that is being carried out."""
@@ -48,14 +48,9 @@ class CommandPolicy:
         self._expires_at = -math.inf
         self._stopping_since: float | None = None
 
-    @property
-    def settings(self) -> CommandSettings:
-        """Expiry and repetition."""
-        return self._settings
-
-    @settings.setter
-    def settings(self, settings: CommandSettings) -> None:
-        self._settings = settings
+    def configure(self, settings: CommandSettings) -> None:
+        """From the next command and repetition on."""
+        self.settings = settings
         self._actuator.rate_hz = settings.rate_hz
 
     def command(self, setpoint: Setpoint, now: float, *, expires_at: float) -> None:

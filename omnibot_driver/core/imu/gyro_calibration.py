@@ -120,7 +120,7 @@ class GyroCalibration:
 
     def give_up(self, reason: str) -> None:
         """A measurement under way has failed, and this is why and what to do."""
-        if self.measuring:
+        if self.wake_at < math.inf:
             self._answer(False, f"the gyro's bias stays as it was: {reason}")
 
     def tick(self, now: float) -> None:

@@ -24,7 +24,7 @@ from omnibot_driver.core.omnibot.outbound import (
     transmission,
 )
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
-from omnibot_driver.core.packets import Packets, packed
+from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import Vector3
 
 STOP: Final = transmission(frames.encode(frames.STOP))
@@ -52,18 +52,17 @@ class CommandEncoder:
         """The frame for an order that is within the limits. Raises CommandRefused."""
         if self._last is not None and self._last[0] is order:
             return self._last[1]
-        packets = packed(self._bytes(order))
+        if isinstance(order, Drive):
+            data = self.velocity(order.twist)
+        elif isinstance(order, TurnWheels):
+            data = self.wheels(order.rates_radps)
+        elif isinstance(order, GoTo):
+            data = self.drive_to(order.place)
+        else:
+            data = EMERGENCY_STOP if isinstance(order, EmergencyStop) else STOP
+        packets = ((0, data),)
         self._last = order, packets
         return packets
-
-    def _bytes(self, order: Order) -> bytes:
-        if isinstance(order, Drive):
-            return self.velocity(order.twist)
-        if isinstance(order, TurnWheels):
-            return self.wheels(order.rates_radps)
-        if isinstance(order, GoTo):
-            return self.drive_to(order.place)
-        return EMERGENCY_STOP if isinstance(order, EmergencyStop) else STOP
 
     def velocity(self, twist: BodyTwist) -> bytes:
         """Base vector control; Stop when it rounds to nothing."""

@@ -131,7 +131,7 @@ def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
     """For a second at least, for five at most, 20 times a second; then the line is quiet."""
-    stream.settings = CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz)
+    stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
     stops = [at for at, frame in run(stream, 1.0, 1.6) if frame == STOP]
     if stands:
