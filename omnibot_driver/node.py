@@ -93,7 +93,7 @@ class OmniBotDriver(Node):
         if is_recording(port):
             return Replay(
                 self._session,
-                open_recording(port),
+                open_recording(port, self._board.traits.channels),
                 deliver=self._publishing.publish,
                 report=self._publishing.report_port,
                 failed=self.report_defect,

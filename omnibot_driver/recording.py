@@ -7,13 +7,14 @@ are wanted, nor what they mean.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 from urllib.parse import parse_qsl
 
 from omnibot_driver.core.errors import LinkError, ParameterError
+from omnibot_driver.core.packets import Packet
 
 SCHEME: Final = "replay://"
 RAW_TYPE: Final = "std_msgs/msg/UInt8MultiArray"
@@ -22,17 +23,17 @@ RAW_NAME: Final = "/raw_rx"
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """One topic of one bag: a folder, or a single .mcap or .db3 file.
+    """Of one bag, a folder or a single .mcap or .db3 file: a topic for each channel.
 
     ``speed``: so many times faster, infinity for as fast as can be; ``delay_s``: until it begins.
     """
 
     path: Path
-    topic: str
+    topics: tuple[str, ...]
     speed: float = 1.0
     delay_s: float = 5.0
 
-    def chunks(self) -> Iterator[tuple[int, bytes]]:
+    def chunks(self) -> Iterator[tuple[int, Packet]]:
         """When something came in, in ns of the recorder's time, and what. Raises LinkError."""
         try:
             from rosbags.rosbag2 import Reader
@@ -40,10 +41,10 @@ class Recording:
 
             types = get_typestore(Stores.ROS2_JAZZY)
             with Reader(self.path) as bag:
-                wanted = [item for item in bag.connections if item.topic == self.topic]
-                for _, at_ns, message in bag.messages(wanted):
+                wanted = [item for item in bag.connections if item.topic in self.topics]
+                for source, at_ns, message in bag.messages(wanted):
                     content: Any = types.deserialize_cdr(message, RAW_TYPE)
-                    yield at_ns, content.data.tobytes()
+                    yield at_ns, (self.topics.index(source.topic), content.data.tobytes())
         except Exception as error:  # whatever a damaged bag makes the library stumble over
             raise LinkError(f"the recording {self.path} cannot be read on: {error}") from error
 
@@ -53,8 +54,11 @@ def is_recording(url: str) -> bool:
     return url.lower().startswith(SCHEME)
 
 
-def open_recording(url: str) -> Recording:
-    """The recording that a URL means. Raises ParameterError, which says what is wrong with it."""
+def open_recording(url: str, channels: Sequence[str] = ("",)) -> Recording:
+    """The recording that a URL means, of a board with these channels.
+
+    Raises ParameterError, which says what is wrong with it.
+    """
     location, _, query = url[len(SCHEME) :].partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))
     speed = _number(url, "speed", options.pop("speed", "1"), 0.01, math.inf)
@@ -64,10 +68,10 @@ def open_recording(url: str) -> Recording:
         known = "speed, delay and topic"
         raise _refusal(url, f"there is no option '{next(iter(options))}', only {known}")
     path = Path(location)
-    return Recording(path, _find_topic(url, path, topic), speed, delay_s)
+    return Recording(path, _find_topics(url, path, topic, channels), speed, delay_s)
 
 
-def _find_topic(url: str, path: Path, wanted: str) -> str:
+def _find_topics(url: str, path: Path, wanted: str, channels: Sequence[str]) -> tuple[str, ...]:
     try:
         from rosbags.rosbag2 import Reader
     except ImportError as error:
@@ -82,9 +86,18 @@ def _find_topic(url: str, path: Path, wanted: str) -> str:
             raw = sorted({item.topic for item in bag.connections if item.msgtype == RAW_TYPE})
     except Exception as error:  # rosbags raises whatever it stumbles over
         raise _refusal(url, f"{path} is no bag that can be read: {error}") from error
-    found = [topic for topic in raw if topic == wanted or (not wanted and topic.endswith(RAW_NAME))]
+    names = [f"/{name}" if name else "" for name in channels]
+    found = {
+        topic.removesuffix(name)
+        for name in names
+        for topic in raw
+        if (topic == wanted if wanted else topic.endswith(f"{RAW_NAME}{name}"))
+    }
+    if wanted and any(names):
+        found = {topic for topic in found if topic.endswith(RAW_NAME)}
     if len(found) == 1:
-        return found[0]
+        (home,) = found
+        return tuple(home + name for name in names)
     if not raw:
         raise _refusal(url, f"no {RAW_NAME[1:]} is in it: record with `publish_raw: true`")
     raise _refusal(url, f"choose one of its topics with topic={' or topic='.join(raw)}")

@@ -16,6 +16,7 @@ from typing import Final, TypeVar
 
 from omnibot_driver.core.errors import CommandRefused, LinkError
 from omnibot_driver.core.events import Event, Notice
+from omnibot_driver.core.packets import Packet
 from omnibot_driver.core.requests import OnExit
 from omnibot_driver.core.session import Session
 from omnibot_driver.outbox import Delivery, Outbox
@@ -108,14 +109,14 @@ class Replay:
         end = "the recording has ended: nothing more will come"
         opened = False
         try:
-            for at_ns, data in self._recording.chunks():
+            for at_ns, packet in self._recording.chunks():
                 if not opened:
                     opened, self._epoch_ns, self._began_at = True, at_ns, time.monotonic()
                     self._tell(partial(self._report, None))
                     self.call(lambda session, now: session.opened(now))
                 if not self._run_until((at_ns - self._epoch_ns) * 1e-9):
                     return
-                self.call(partial(_hear, data))
+                self.call(partial(_hear, packet))
         except LinkError as error:
             end = str(error)
         self.call(lambda session, now: session.closed(now))
@@ -151,5 +152,6 @@ class Replay:
             self._outbox.put(partial(self._deliver, events, self._epoch_ns))
 
 
-def _hear(data: bytes, session: Session, now: float) -> None:
-    session.receive(data, now)
+def _hear(packet: Packet, session: Session, now: float) -> None:
+    channel, data = packet
+    session.receive(data, now, channel)

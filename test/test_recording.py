@@ -24,6 +24,7 @@ CHUNKS = [
     (1_790_000_000_000_000_001, b"\xff\xfa\x00"),
     (1_790_000_002_000_000_000, b"\n"),
 ]
+PACKETS = [(at_ns, (0, data)) for at_ns, data in CHUNKS]
 
 
 def cdr(data: bytes) -> bytes:
@@ -49,7 +50,7 @@ def test_every_byte_comes_back_with_its_time(tmp_path: Path, plugin: StoragePlug
     path = bag(tmp_path / "bag", "/omnibot_driver/raw_tx", RX, plugin=plugin)
     (file,) = (found for found in path.iterdir() if found.suffix != ".yaml")
     for place in (path, file):
-        assert list(open_recording(f"replay://{place}").chunks()) == CHUNKS
+        assert list(open_recording(f"replay://{place}").chunks()) == PACKETS
 
 
 def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
@@ -59,14 +60,25 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
         f"replay://{path}?speed=2.5&delay=0&topic=/robot2/omnibot_driver/raw_rx"
     )
     assert (recording.speed, recording.delay_s) == (2.5, 0.0)
-    assert recording.topic == "/robot2/omnibot_driver/raw_rx"
-    assert list(recording.chunks()) == CHUNKS
+    assert recording.topics == ("/robot2/omnibot_driver/raw_rx",)
+    assert list(recording.chunks()) == PACKETS
+
+
+def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
+    """In the order of its channels, whatever the names; a robot is chosen by one of its topics."""
+    path = bag(tmp_path / "bag", *(f"/{who}{RX}/{name}" for who in "ab" for name in ("one", "two")))
+    recording = open_recording(f"replay://{path}?topic=/b{RX}/one", ("two", "one"))
+    assert recording.topics == (f"/b{RX}/two", f"/b{RX}/one")
+    expected = {(at_ns, (channel, data)) for at_ns, data in CHUNKS for channel in (0, 1)}
+    assert set(recording.chunks()) == expected
+    with pytest.raises(ParameterError, match="choose one of its topics"):
+        open_recording(f"replay://{path}", ("two", "one"))
 
 
 def test_without_options_it_is_played_at_its_own_speed_after_five_seconds(tmp_path: Path) -> None:
     """Others have time to find the driver; the topic is the one there is."""
     recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
-    assert (recording.speed, recording.delay_s, recording.topic) == (1.0, 5.0, RX)
+    assert (recording.speed, recording.delay_s, recording.topics) == (1.0, 5.0, (RX,))
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from omnibot_driver.core.events import Event, Notice, StateChanged
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.packets import Packet
 from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session
 from omnibot_driver.replay import Replay
@@ -39,8 +40,9 @@ class Tape:
     speed: float = math.inf
     delay_s: float = 0.0
 
-    def chunks(self) -> Iterator[tuple[int, bytes]]:
-        yield from self.content
+    def chunks(self) -> Iterator[tuple[int, Packet]]:
+        for at_ns, data in self.content:
+            yield at_ns, (0, data)
 
 
 class Heard(Listener):
