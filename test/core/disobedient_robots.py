@@ -57,8 +57,9 @@ def stopped_after_s(
 ) -> float:
     """Board time from the first tick in which it goes astray until Stop is on the wire."""
     begun, astray, mark = bench.now, math.inf, len(bench.written)
+    first = bench.board.tick
     while bench.now < begun + 3.0:
-        if bench.board.tick % 10 == 0:
+        if (bench.board.tick - first) % 10 == 0:
             by(bench, command)
         bench.run(TICK_S)
         if goes_astray(bench, command):
@@ -68,10 +69,14 @@ def stopped_after_s(
     raise AssertionError("never stopped")
 
 
-def on_the_wrong_switch(frame: str) -> Bench:
+def on_the_wrong_switch(frame: str, delta_period_s: float = 0.04) -> Bench:
     """It stands on position, and the robot has been driven 3 m from its origin."""
     board = BoardSettings(
-        running=True, control="position", frame=frame, initial_pose=BoardPose(3000.0, 0.0, 0.0)
+        running=True,
+        control="position",
+        frame=frame,
+        initial_pose=BoardPose(3000.0, 0.0, 0.0),
+        delta_period_s=delta_period_s,
     )
     return started(board, control="velocity")
 

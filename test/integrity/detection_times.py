@@ -24,12 +24,15 @@ from session_bench import STOP, TICK_S, Bench
 
 from omnibot_driver.simulator.omnibot import BoardSettings
 
-PHASES = 8
+PERIODS_S = 0.04, 0.1
+"""Of the displacements."""
 
 
-def robot(**settings: object) -> Callable[[], Bench]:
+def robot(**settings: object) -> Callable[[float], Bench]:
     """One that stands and runs."""
-    return lambda: started(BoardSettings(running=True, **settings))  # type: ignore[arg-type]
+    return lambda period_s: started(
+        BoardSettings(running=True, delta_period_s=period_s, **settings)  # type: ignore[arg-type]
+    )
 
 
 def gripped_after_s(bench: Bench, command: Triple, motion: Triple) -> float:
@@ -50,31 +53,37 @@ def gripped_after_s(bench: Bench, command: Triple, motion: Triple) -> float:
 
 
 def row(
-    what: str, command: Triple, time_s: Callable[[Bench], float], make: Callable[[], Bench]
+    what: str,
+    command: Triple,
+    time_s: Callable[[Bench], float],
+    make: Callable[[float], Bench],
 ) -> None:
     """Print one, over all phases."""
-    times = []
-    for phase in range(PHASES):
-        bench = make()
-        bench.run(phase * TICK_S)
-        times.append(time_s(bench))
+    shown = []
+    for period_s in PERIODS_S:
+        times = []
+        for phase in range(round(period_s / TICK_S)):
+            bench = make(period_s)
+            bench.run(phase * TICK_S)
+            times.append(time_s(bench))
+        shown.append(f"{min(times):.2f} s to {max(times):.2f} s")
     x, y, yaw = command
     commanded = f"{yaw:g} rad/s" if yaw else f"{x or y:g} m/s" if x or y else "nothing"
-    print(f"| {what} | {commanded} | {min(times):.2f} s to {max(times):.2f} s |")
+    print(f"| {what} | {commanded} | {' | '.join(shown)} |", flush=True)
 
 
 def main() -> None:
     """All rows."""
-    print("| the robot | commanded | stopped after |\n|---|---|---|")
+    print("| the robot | commanded | stopped after | with `delta_period: 0.1` |\n|---|---|---|---|")
     row(
         "the board's switch stands on position, 3 m from its origin",
         SLOWLY,
         lambda bench: stopped_after_s(bench, SLOWLY),
-        lambda: on_the_wrong_switch("earth"),
+        lambda period_s: on_the_wrong_switch("earth", period_s),
     )
-    for scale in (1.6, 2.38):
+    for scale in (1.5, 1.6, 2.38):
         for speed in (0.05, 0.1, 0.2, 0.5):
-            if scale * speed - speed > 0.05:
+            if scale * speed - speed > 0.0499:
                 forward = (speed, 0.0, 0.0)
                 row(
                     f"is {scale:g} times as fast (`linear_scale`)",
@@ -89,13 +98,13 @@ def main() -> None:
         lambda bench: stopped_after_s(bench, forward, by_wheels),
         robot(linear_scale=70 / 2.38),
     )
-    for rate in (0.15, 0.5):
+    for scale, rate in ((1.6, 0.3), (1.6, 0.5), (2.38, 0.15), (2.38, 0.5)):
         turn = (0.0, 0.0, rate)
         row(
-            "turns 2.38 times as fast (`angular_scale`)",
+            f"turns {scale:g} times as fast (`angular_scale`)",
             turn,
             lambda bench, turn=turn: stopped_after_s(bench, turn),  # type: ignore[misc]
-            robot(angular_scale=500 / 2.38),
+            robot(angular_scale=500 / scale),
         )
     for what, wiring in (
         ("the leads of motors A and B are swapped", (2, 1, 3)),

@@ -4,7 +4,8 @@
 
 PYTHONPATH=test/core .venv/bin/python test/integrity/no_false_trips.py --hours 10
 
-``--first`` is the seed of the first robot. Ends with 1 when one was stopped.
+``--first`` is the seed of the first robot, ``--period`` the seconds of a displacement. Ends with 1
+when one was stopped.
 """
 
 import argparse
@@ -21,11 +22,12 @@ def main() -> int:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--hours", type=float, default=10.0)
     arguments.add_argument("--first", type=int, default=0)
+    arguments.add_argument("--period", type=float, default=0.04)
     chosen = arguments.parse_args()
     robots = round(3600 * chosen.hours / SECONDS_EACH)
     total, begun = Outcome(), time.monotonic()
     for seed in range(chosen.first, chosen.first + robots):
-        outcome = RoughDrive(seed).go(SECONDS_EACH)
+        outcome = RoughDrive(seed, chosen.period).go(SECONDS_EACH)
         total.add(outcome)
         for trip in outcome.trips:
             print(trip, flush=True)

@@ -54,7 +54,7 @@ class Outcome:
         self.happened += other.happened
 
 
-def some_robot(seed: int) -> BoardSettings:
+def some_robot(seed: int, delta_period_s: float) -> BoardSettings:
     """A robot that obeys as well as such robots do."""
     random = Random(f"robot {seed}")
     motors = [
@@ -79,6 +79,7 @@ def some_robot(seed: int) -> BoardSettings:
     return BoardSettings(
         seed=seed,
         running=True,
+        delta_period_s=delta_period_s,
         frame=random.choice(("earth", "earth", "body", "wheel_counts")),
         slip=SLIP,
         slope_pwm=random.uniform(-STEEPEST_PWM, STEEPEST_PWM),
@@ -92,11 +93,11 @@ def some_robot(seed: int) -> BoardSettings:
 class RoughDrive(Bench):
     """A bench whose line is late both ways, with a commander and with people around."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, delta_period_s: float = 0.04) -> None:
         self._random = random = Random(f"drive {seed}")
         self._fastest_mps = random.choice((0.3, 0.5, 0.5, 0.8))
         super().__init__(
-            some_robot(seed),
+            some_robot(seed, delta_period_s),
             limits=SpeedLimits(
                 linear_mps=self._fastest_mps,
                 angular_radps=random.choice((0.5, 1.5)),

@@ -6,10 +6,13 @@ import pytest
 from rough_drive import RoughDrive
 
 
+@pytest.mark.parametrize("delta_period_s", [0.04, 0.1])
 @pytest.mark.parametrize("seed", range(4))
-def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(seed: int) -> None:
+def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
+    seed: int, delta_period_s: float
+) -> None:
     """Slip, slope, bumps, a late line, and people who push, hold and carry it."""
-    outcome = RoughDrive(seed).go(60.0)
+    outcome = RoughDrive(seed, delta_period_s).go(60.0)
     assert outcome.trips == []
     assert outcome.happened.total() > 0
 

@@ -16,14 +16,17 @@ from omnibot_driver.core.motion_monitor.set_point_history import Velocity
 
 STRETCH: Final = 1.2
 """Part of a set-point that may be reached: scales are set by hand, controllers overshoot."""
-NOISE_MPS: Final = 0.02
+NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
 """Encoder counts, rounding, a slope that a slow controller gives way to."""
 SIDEWAYS: Final = 0.1
-"""Part of a speed that may go in any direction: the heading is uncertain, wheels are not alike, a
-robot that stops overshoots. Of a yaw rate too."""
+"""Part of a speed that may go in any direction: the heading is uncertain, wheels are not alike. Of
+a yaw rate too. Independent of the noise, so the two combine by their squares."""
+OVERSHOOT: Final = 0.15
+"""Part of a change by which a robot goes beyond its new set-point, in any direction, when it leaves
+another one that is not rest."""
 SKEW_RADPS_PER_MPS: Final = 0.1
-SKEW_MPS_PER_RADPS: Final = 0.02
+SKEW_MPS_PER_RADPS: Final = 0.03
 """Turning of a robot that drives, and the reverse, by wheels that differ by some per cent."""
 CHANGING_RADPS_PER_MPS: Final = 0.4
 """The same while its speed changes, by wheels that do not speed up alike."""
@@ -45,10 +48,12 @@ def outside(
     the length of the linear velocity counts.
     """
     current_x, current_y, _ = explained[0]
-    fastest = change = left = right = 0.0
+    fastest = change = leaving = left = right = 0.0
     for x, y, yaw in explained:
         fastest = max(fastest, math.hypot(x, y))
         change = max(change, math.hypot(x - current_x, y - current_y))
+        if x or y:
+            leaving = max(leaving, math.hypot(x - current_x, y - current_y))
         if yaw > left:
             left = yaw
         elif -yaw > right:
@@ -57,8 +62,9 @@ def outside(
     if heading_known and fastest:
         way_mps = _outside_hull(motion, explained)
     turn_radps, fastest_turn = max(rate - STRETCH * left, -rate - STRETCH * right), max(left, right)
-    way_mps -= NOISE_MPS + SIDEWAYS * max(fastest, change) + SKEW_MPS_PER_RADPS * fastest_turn
-    turn_radps -= NOISE_RADPS + SIDEWAYS * fastest_turn
+    way_mps -= max(math.hypot(NOISE_MPS, SIDEWAYS * fastest), NOISE_MPS + OVERSHOOT * leaving)
+    way_mps -= SKEW_MPS_PER_RADPS * fastest_turn
+    turn_radps -= math.hypot(NOISE_RADPS, SIDEWAYS * fastest_turn)
     turn_radps -= SKEW_RADPS_PER_MPS * fastest + CHANGING_RADPS_PER_MPS * change
     return way_mps, turn_radps
 

@@ -11,16 +11,15 @@ from typing import Final
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.motion_monitor.envelope import on_the_way, outside
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, SetpointHistory
-from omnibot_driver.core.motion_monitor.wind_up import WindUp
+from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
 """A robot that is slower than all set-points of this time is held by something."""
-UNEXPLAINED_M: Final = 0.0035
-UNEXPLAINED_RAD: Final = 0.016
+UNEXPLAINED_M: Final = 0.003
+UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
 """Part of these limits that one displacement adds at the most: it takes three in a row, or two long
 ones."""
-LONG_S: Final = 0.06
 
 
 class FollowingError:
@@ -73,7 +72,7 @@ class FollowingError:
             self._wind_up.follow(motion, seconds, newest, heading_known=heading_known)
         elif self._stands and self.exceeded:
             self._wind_up.carry(motion, seconds)
-        elif self._wind_up.way_m and self._wind_up.pay(way_mps, turn_radps, seconds):
+        elif self._wind_up.pay(way_mps, turn_radps, seconds):
             self._way_m = self._turn_rad = 0.0
         else:
             part = LARGEST_PART_OF_A_LONG_ONE if seconds > LONG_S else LARGEST_PART

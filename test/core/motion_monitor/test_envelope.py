@@ -72,7 +72,7 @@ def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> No
     way_mps, turn_radps = outside(
         away, [(0.1 * math.cos(angle), 0.1 * math.sin(angle), 0.0)], heading_known=True
     )
-    assert way_mps == pytest.approx(0.3 - NOISE_MPS - 0.01, rel=0.03)
+    assert way_mps == pytest.approx(0.3 - math.hypot(NOISE_MPS, 0.01), rel=0.03)
     assert turn_radps < 0.0
 
 
@@ -123,11 +123,11 @@ def test_the_history_does_not_grow_without_end() -> None:
 
 
 def test_a_held_robot_winds_up_by_what_it_loses() -> None:
-    """Up to what an integrator holds; one that moves as commanded unwinds in the end."""
+    """By 1.2 times that, up to what an integrator holds; one that moves as commanded unwinds."""
     wind_up = WindUp()
     for _ in range(10):
         wind_up.follow(AT_REST, 0.04, [FORWARD], heading_known=True)
-    assert wind_up.way_m == pytest.approx(0.16)
+    assert wind_up.way_m == pytest.approx(0.192)
     for _ in range(100):
         wind_up.follow(AT_REST, 0.04, [FORWARD], heading_known=True)
     assert wind_up.way_m == MOST_M
@@ -141,6 +141,18 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.04, [FORWARD, AT_REST], heading_known=True)
     assert wind_up.way_m == 0.0
+
+
+def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
+    """It may be the one in which the robot turned round; a second one counts for both."""
+    wind_up = WindUp()
+    wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
+    assert wind_up.way_m == 0.0
+    wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
+    assert wind_up.way_m == pytest.approx(0.096)
+    wind_up.pay(0.1, 0.0, 0.1)
+    wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
+    assert wind_up.way_m == pytest.approx(0.086)
 
 
 def test_what_is_made_good_is_paid_for() -> None:
