@@ -107,11 +107,11 @@ def test_nothing_is_known_before_the_first_set_point() -> None:
     assert not history.known(0.0)
     history.add(AT_REST, 10.0)
     assert not history.known(10.5)
-    assert history.known(10.7)
+    assert history.known(10.9)
     history.add(None, 20.0)
     history.add(FORWARD, 30.0)
     assert not history.known(30.5)
-    assert history.explained(30.7) == [plain(FORWARD)]
+    assert history.explained(30.9) == [plain(FORWARD)]
 
 
 def test_the_history_does_not_grow_without_end() -> None:
