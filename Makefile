@@ -9,7 +9,7 @@ HAS_WHEELS := import re, sys, sysconfig; \
 PYTHON ?= $(shell for python in python3.12 python3.13 python3.11 python3; do \
   $$python -c '$(HAS_WHEELS)' 2>/dev/null && break; done; echo $$python)
 
-# Whose demo: a name of `python -m omnibot_driver.simulator --help`.
+# Whose demo or report: a name of `python -m omnibot_driver.simulator --help`.
 BOARD ?= omnibot
 
 SITE_PACKAGES := import sysconfig; print(sysconfig.get_path("purelib"))
@@ -49,14 +49,15 @@ docs: $(VENV)/.docs  ## write what is generated, and build the documents as a si
 pictures: $(VENV)/.test  ## make the pictures of README and documents anew (5 minutes)
 	@$(PY) test/pictures
 
-integrity: $(VENV)/.test  ## measure damaged lines, both ways (20 minutes), into docs/integrity.md
-	$(PY) test/integrity/report.py; inbound=$$?; $(PY) test/integrity/outbound.py && exit $$inbound
+integrity: $(VENV)/.test  ## measure damaged lines of BOARD, both ways (20 minutes), into docs/integrity.md
+	$(PY) test/integrity/report.py --board $(BOARD) || inbound=$$?; \
+	  $(PY) test/integrity/outbound.py --board $(BOARD) && exit $${inbound:-0}
 
 bench: $(VENV)/.test  ## measure speed against a floor (11 minutes), into docs/performance.md
-	$(PY) test/bench/report.py
+	$(PY) test/bench/report.py --board $(BOARD)
 
 faults: $(VENV)/.test  ## break everything, with the real node (25 minutes), into docs/safety.md
-	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py
+	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py --board $(BOARD)
 
 soak: $(VENV)/.test  ## random faults for MINUTES (10)
 	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py --minutes $(or $(MINUTES),10)

@@ -58,6 +58,9 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
 def main() -> int:
     """Run, print, write."""
     arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument(
+        "--board", choices=("omnibot",), default="omnibot", help="that this is measured on"
+    )
     arguments.add_argument("--quick", action="store_true")
     chosen = arguments.parse_args()
     figures, sections = measure(quick=chosen.quick)

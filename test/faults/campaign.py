@@ -208,6 +208,9 @@ def _walk(seed: int, steps: int, rig: Rig) -> None:
 def main() -> int:
     """Run, print, write."""
     arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument(
+        "--board", choices=("omnibot",), default="omnibot", help="that this is measured on"
+    )
     arguments.add_argument("--minutes", type=float, help="a soak of random walks only")
     arguments.add_argument("--losses", action="store_true", help="stops on a lossy line only")
     arguments.add_argument("--busy", action="store_true", help="a busy computer only")

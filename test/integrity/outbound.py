@@ -181,6 +181,9 @@ def _others(scores: Scores) -> Iterator[str]:
 def main() -> int:
     """Run, print, write."""
     arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument(
+        "--board", choices=("omnibot",), default="omnibot", help="that this is measured on"
+    )
     arguments.add_argument("--share", type=float, default=1.0)
     arguments.add_argument("--scripts", type=int, default=SCRIPTS)
     arguments.add_argument("--scene", action="append", choices=SCENES, default=[])

@@ -92,6 +92,9 @@ def main() -> int:
     """Run, print, write."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--seconds", type=float, default=60.0)
+    arguments.add_argument(
+        "--board", choices=("omnibot",), default="omnibot", help="that this is measured on"
+    )
     arguments.add_argument("--seeds", type=int, default=10)
     arguments.add_argument("--first", type=int, default=400)
     chosen = arguments.parse_args()
