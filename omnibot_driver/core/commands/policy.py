@@ -20,6 +20,8 @@ STOPPING_S: Final = 1.0
 """Stop is wanted for at least so long..."""
 UNPROVED_S: Final = 5.0
 """... and for so long at most while nothing shows that the robot stands."""
+ROUNDING_S: Final = 1e-6
+"""So much later it is over for certain, however the times are rounded."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +109,7 @@ class CommandPolicy:
         """What to write now, possibly nothing. It counts as written."""
         if self.current is not None and now >= self._expires_at:
             self.halt(now)
-        if self._stopping_since is not None and now >= self._stopped_at:
+        if self._stopping_since is not None and now - self._stopping_since >= self._stopping_s:
             self._stopping_since = None
             self.unconfirmed = self.proof.owed
             self._actuator.apply(None, now)
@@ -119,11 +121,11 @@ class CommandPolicy:
         if self.current is not None:
             return min(self._actuator.wake_at, self._expires_at)
         if self._stopping_since is not None:
-            return min(self._actuator.wake_at, self._stopped_at)
+            ends_at = self._stopping_since + self._stopping_s + ROUNDING_S
+            return min(self._actuator.wake_at, ends_at)
         return self._actuator.wake_at
 
     @property
-    def _stopped_at(self) -> float:
-        """When Stop has been wanted for long enough."""
-        assert self._stopping_since is not None
-        return self._stopping_since + (STOPPING_S if self.proof.proved else UNPROVED_S)
+    def _stopping_s(self) -> float:
+        """How long Stop is wanted."""
+        return STOPPING_S if self.proof.proved else UNPROVED_S
