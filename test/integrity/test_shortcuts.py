@@ -22,6 +22,7 @@ from omnibot_driver.core.omnibot import (
     ImuFrame,
     OmniBot,
     OmniBotSettings,
+    board,
     decoder,
     encode,
     trellis,
@@ -32,6 +33,8 @@ from omnibot_driver.core.omnibot.fast_path import Walk, take_run
 from omnibot_driver.core.omnibot.frames import Frame, decode_measured, measure
 from omnibot_driver.core.omnibot.gaps import BYTE_S, InterFrameGaps
 from omnibot_driver.core.omnibot.lower_bound import least_costs
+from omnibot_driver.core.omnibot.single_imu import take_single
+from omnibot_driver.core.omnibot.translation import Translation
 
 SECONDS = 6.0
 Outcome = list[tuple[list[Frame], list[int], DecoderStatistics, bytes | None]]
@@ -47,11 +50,12 @@ def outcome(chunks: Chunks, *, quick: bool) -> Outcome:
             patch.setattr(decoder, "take_run", lambda _held, at, context, *_: (at, context))
             patch.setattr(trellis, "least_costs", lambda data: [0.0] * (2 * len(data) + 3))
             patch.setattr(trellis, "STEP", inf)
-        tested = FrameDecoder()
+        tested, translation = FrameDecoder(), Translation(OmniBotSettings())
         found: Outcome = []
         for data, now in chunks:
-            if quick and (lone := tested.take_single(data, now)) is not None:
-                frames, skipped = [lone], [0]
+            translation.singles_to_come = 1
+            if quick and take_single(data, now, tested, translation):
+                frames, skipped = [tested.context.imu], [0]
             else:
                 frames, skipped = tested.feed(data, now), tested.skipped
             found.append((frames, skipped, replace(tested.statistics), tested.begun))
@@ -104,21 +108,21 @@ def test_readings_come_out_alike(
     chunks = chunks_of(scenario, fault, "whole bursts", 2)
 
     def told() -> list[object]:
-        board = OmniBot(OmniBotSettings())
+        tested = OmniBot(OmniBotSettings())
         found: list[object] = []
         for number, (data, now) in enumerate(chunks):
             if number % 97 == 13:
-                board.start()
+                tested.start()
             if number % 89 == 17:
-                board.silence()
+                tested.silence()
             if number % 31 == 5:
                 with suppress(RequestRefused):
-                    board.pause()
-            found.append((board.receive(data, now), board.edge, board.mode, board.figures))
+                    tested.pause()
+            found.append((tested.receive(data, now), tested.edge, tested.mode, tested.figures))
         return found
 
     quick = told()
-    monkeypatch.setattr(FrameDecoder, "take_single", lambda *_: None)
+    monkeypatch.setattr(board, "take_single", lambda *_: None)
     assert quick == told()
 
 
@@ -133,9 +137,9 @@ def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(FrameDecoder, "feed", count)
     chunks = chunks_of("driving", "none, starting anywhere", "whole bursts", 1)
-    board = OmniBot(OmniBotSettings())
+    tested = OmniBot(OmniBotSettings())
     for data, now in chunks:
-        board.receive(data, now)
+        tested.receive(data, now)
     assert len(fed) < 0.5 * len(chunks)
 
 
@@ -151,8 +155,8 @@ def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(decoder.Expectation, "weigh", count)
     chunks = chunks_of("driving", "none, starting anywhere", "whole bursts", 1)
     found = outcome(chunks, quick=True)
-    imus = sum(type(frame) is decoder.ImuFrame for frames, *_ in found for frame in frames)
-    assert weighed.count(decoder.ImuFrame) < 0.1 * imus
+    imus = sum(type(frame) is ImuFrame for frames, *_ in found for frame in frames)
+    assert weighed.count(ImuFrame) < 0.1 * imus
 
 
 def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:

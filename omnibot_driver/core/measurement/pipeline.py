@@ -92,7 +92,8 @@ class MeasurementPipeline:
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
         """What is sure of the IMU by these, which came in at ``now``; the rest is for ``flush``.
 
-        A reading does not overtake one of another kind.
+        A reading does not overtake one of another kind. Most reads of any board with an IMU bring
+        one reading of it and nothing else: that is measured without the lists that more need.
         """
         estimates: list[ImuEstimate] = []
         edge = self._board.edge

@@ -21,6 +21,7 @@ from omnibot_driver.core.omnibot.modes import Happening
 from omnibot_driver.core.omnibot.outbound import transmission
 from omnibot_driver.core.omnibot.schedule import TICK_S, Schedule
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
+from omnibot_driver.core.omnibot.single_imu import take_single
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.packets import NO_PACKETS, Packets, packed
 from omnibot_driver.core.readings import Reading, SampleBoundary
@@ -118,8 +119,8 @@ class OmniBot:
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """The readings that these bytes complete, in the order of the line."""
-        if self._translation.lone_to_come and (frame := self._decoder.take_single(data, now)):
-            return [self._translation.lone(frame, now)]
+        if single := take_single(data, now, self._decoder, self._translation):
+            return [single]
         found = self._decoder.feed(data, now)
         return self._translation.readings(found, self._decoder.skipped, now)
 

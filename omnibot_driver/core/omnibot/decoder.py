@@ -23,14 +23,12 @@ from typing import Final
 
 from omnibot_driver.core.omnibot import cost_model
 from omnibot_driver.core.omnibot.cost_model import NOTHING_KNOWN, Context, Expectation
-from omnibot_driver.core.omnibot.fast_path import Walk, goes_on, take_run, take_single
+from omnibot_driver.core.omnibot.fast_path import Walk, goes_on, take_run
 from omnibot_driver.core.omnibot.frames import (
-    IMU_LENGTH,
     INCOMPLETE,
     NO_FRAME,
     ByteOrder,
     Frame,
-    ImuFrame,
     PausedFrame,
     decode_measured,
     measure,
@@ -59,7 +57,12 @@ class DecoderStatistics:
 
 
 class FrameDecoder:
-    """Feed it what the line brings, in any chunking; it returns the frames that were in it."""
+    """Feed it what the line brings, in any chunking; it returns the frames that were in it.
+
+    ``single_imu`` takes frames past it, and keeps what is known here up to date: ``context`` (the
+    frames before the next one), ``expectation`` (what its content may be), ``pauses`` (where the
+    line was idle) and ``last_arrival_s``.
+    """
 
     def __init__(
         self,
@@ -75,12 +78,12 @@ class FrameDecoder:
         """All that came was understood, and pauses stand where they should."""
         self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
-        self._expectation = Expectation(accel_counts_per_g, schedule)
-        self._context = NOTHING_KNOWN
+        self.expectation = Expectation(accel_counts_per_g, schedule)
+        self.context = NOTHING_KNOWN
         self._held = bytearray()
         self._in_step = False
-        self._pauses = InterFrameGaps(byte_s)
-        self._last_arrival_s = -math.inf
+        self.pauses = InterFrameGaps(byte_s)
+        self.last_arrival_s = -math.inf
 
     def feed(self, data: bytes, now: float) -> list[Frame]:
         """The frames that are complete with these bytes, in the order of the line.
@@ -92,43 +95,25 @@ class FrameDecoder:
         if not data:
             return found
         self._arrived = len(data)
-        pause_s, self._last_arrival_s = now - self._last_arrival_s, now
+        pause_s, self.last_arrival_s = now - self.last_arrival_s, now
         if self.at_rest and self._take_whole(data, pause_s, found):
             return found
-        pauses = self._pauses
+        pauses = self.pauses
         if pause_s >= IDLE_S and len(data) <= TICK_BYTES:
-            self._context = self._context.damaged() if self._held else NOTHING_KNOWN
+            self.context = self.context.damaged() if self._held else NOTHING_KNOWN
         pauses.read(pause_s, len(data), len(self._held), now)
         self._held += data
         self._settle(found, closed=False)
         self.at_rest = pauses.sharp and pauses.between and self._in_step and not self._held
         return found
 
-    def take_single(self, data: bytes, now: float) -> ImuFrame | None:
-        """``feed`` for what comes most often: one IMU frame by itself, when a frame is due.
-
-        None, and nothing is changed, where anything at all is to be considered.
-        """
-        pause_s = now - self._last_arrival_s
-        if not self.at_rest or len(data) != IMU_LENGTH or pause_s > LATE_S:
-            return None
-        taken = take_single(data, self._context, self._expectation)
-        if taken is None:
-            return None
-        self._last_arrival_s = now
-        self.statistics.frames += 1
-        if not self._pauses.certain:
-            self._pauses.stood_between(pause_s, IMU_LENGTH)
-        frame, self._context = taken
-        return frame
-
     def flush(self, now: float) -> list[Frame]:
         """The line is closed, or was silent: what can still be told from what is held."""
-        self._last_arrival_s = now
+        self.last_arrival_s = now
         found: list[Frame] = []
         self.skipped = []
         self.at_rest = False
-        self._pauses.clear()
+        self.pauses.clear()
         self._close(found)
         return found
 
@@ -151,18 +136,18 @@ class FrameDecoder:
         if self._held:
             self._settle(found, closed=True)
             self._drop(len(self._held))
-        self._context = NOTHING_KNOWN
+        self.context = NOTHING_KNOWN
 
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
         """Take all that came, if frames were due and they are calm from the first to the last."""
         if pause_s > LATE_S or len(data) > TICK_BYTES:
             return False
-        walk, order = Walk(self._context), self._pose_byte_order
-        end, context = take_run(data, 0, self._context, self._expectation, order, walk)
+        walk, order = Walk(self.context), self._pose_byte_order
+        end, context = take_run(data, 0, self.context, self.expectation, order, walk)
         if end < len(data):
             return False
         self._take(walk, len(walk.frames), context, found)
-        self._pauses.stood_between(pause_s, len(data))
+        self.pauses.stood_between(pause_s, len(data))
         return True
 
     def _settle(self, found: list[Frame], *, closed: bool) -> None:
@@ -181,8 +166,8 @@ class FrameDecoder:
 
     def _walk(self, found: list[Frame], closed: bool) -> bool:
         """In step: take the frames that nothing speaks against. Whether no doubt is left."""
-        held, gaps, expectation = self._held, self._pauses.gaps, self._expectation
-        order, context = self._pose_byte_order, self._context
+        held, gaps, expectation = self._held, self.pauses.gaps, self.expectation
+        order, context = self._pose_byte_order, self.context
         at, size, walk = 0, len(held), Walk(context)
         while at < size:
             paused = gaps and gaps[-1].first > at  # within what follows
@@ -192,15 +177,15 @@ class FrameDecoder:
                     break
             length = measure(held, at)
             end = at + length
-            silent = paused and self._pauses.silent_within(at, size)
+            silent = paused and self.pauses.silent_within(at, size)
             if length == INCOMPLETE and not (closed or silent):
                 break
             if length <= 0:
                 return self._believe_but_the_last(walk, found)
             if paused:
-                if self._pauses.undecided(held, at, end):
+                if self.pauses.undecided(held, at, end):
                     break
-                if self._pauses.against(held, at, end):
+                if self.pauses.against(held, at, end):
                     return self._believe_but_the_last(walk, found)
             frame = decode_measured(held[at:end], order)
             cost, after = expectation.weigh(frame, context)
@@ -210,8 +195,8 @@ class FrameDecoder:
                 return self._believe_but_the_last(walk, found)
             if end == size and not closed and cost_model.may_be_lent(frame, context):
                 parted = self._arrived < length  # what is sent at once begins after a pause
-                at_pace = self._pauses.at_pace  # else the next frame may have begun
-                if not self._pauses.sharp or (
+                at_pace = self.pauses.at_pace  # else the next frame may have begun
+                if not self.pauses.sharp or (
                     parted and (not at_pace or expectation.more_is_due(frame, context))
                 ):
                     break
@@ -225,7 +210,7 @@ class FrameDecoder:
         """Where it breaks, the last two frames are in doubt as well."""
         believed = len(walk.frames) - 2
         if believed > 0:
-            self._take(walk, believed, walk.known_after(believed, self._expectation), found)
+            self._take(walk, believed, walk.known_after(believed, self.expectation), found)
         return False
 
     def _take(self, walk: Walk, count: int, after: Context, found: list[Frame]) -> None:
@@ -235,23 +220,23 @@ class FrameDecoder:
         self.statistics.frames += count
         for number, frame, before in walk.lessons:
             if number < count:
-                self._expectation.learn(frame, before)
+                self.expectation.learn(frame, before)
         found += walk.frames[:count]
         self.skipped.append(self._dropped)
         if count > 1:
             self.skipped += [0] * (count - 1)
         self._dropped = 0
-        self._context = after
+        self.context = after
         end = walk.ends[count - 1]
-        if self._pauses.gaps:
-            self._pauses.compare(walk.ends[:count])
-            self._pauses.forget(end)
+        if self.pauses.gaps:
+            self.pauses.compare(walk.ends[:count])
+            self.pauses.forget(end)
         del self._held[:end]
         self._wait_for = 0
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
         """In doubt: take what is sure, drop what stays doubtful. Whether anything was settled."""
-        state = self._context, self._expectation, self._pauses, self._pose_byte_order
+        state = self.context, self.expectation, self.pauses, self._pose_byte_order
         pieces = read(stretch, *state, in_step=self._in_step, closed=closed)
         half = len(stretch) // 2 if len(stretch) == DOUBT_BYTES else 0
         at = 0
@@ -268,7 +253,7 @@ class FrameDecoder:
         if half and not at:
             at = min(half, pieces[0].start) if pieces else half
             self._drop(at)
-            self._pauses.doubt()
+            self.pauses.doubt()
         return at > 0
 
     def _settled(
@@ -308,7 +293,7 @@ class FrameDecoder:
         self._dropped += count
         self.statistics.faults += self._in_step
         self._in_step = False
-        self._context = self._context.damaged()
-        self._pauses.forget(count)
+        self.context = self.context.damaged()
+        self.pauses.forget(count)
         del self._held[:count]
         self._wait_for = 0

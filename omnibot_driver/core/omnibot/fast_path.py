@@ -3,7 +3,8 @@
 """The commonest frames, quickly: those that nothing at all speaks against, and shocks that go on.
 
 It takes what the decoder's own loop would take with the evidence ``weigh`` finds, and nothing else:
-a test holds one against the other. What costs anything else is left to that loop.
+a test holds one against the other. What costs anything else is left to that loop. An IMU frame that
+comes by itself has a quicker way still (``single_imu``).
 """
 
 import struct
@@ -36,8 +37,6 @@ from omnibot_driver.core.omnibot.frames import (
 
 _FIRST, _IMU_KIND = IMU_HEADER
 _DELTA_KIND, _POSE_KIND = DELTA_HEADER[1], POSE_HEADER[1]
-_LONE_IMU: Final = struct.Struct(">H6h").unpack
-_LONE_HEADER: Final = int.from_bytes(IMU_HEADER, "big")
 _IMU: Final = struct.Struct(">6h").unpack_from
 _DELTA: Final = struct.Struct(">3hB").unpack_from
 _POSE: Final = {
@@ -46,7 +45,7 @@ _POSE: Final = {
 }
 
 # A frozen object is made in a third of the time from one of the same slots that is not frozen yet.
-_Imu, _Delta, _Pose = (
+UnfrozenImu, UnfrozenDelta, UnfrozenPose = (
     type(kind.__name__, (), {"__slots__": vars(kind)["__slots__"]})
     for kind in (ImuFrame, DeltaFrame, PoseFrame)
 )
@@ -88,39 +87,6 @@ class Walk:
         for frame in self.frames[at:count]:
             _, context = expectation.weigh(frame, context)
         return context
-
-
-def take_single(
-    data: bytes, context: Context, expectation: Expectation
-) -> tuple[ImuFrame, Context] | None:
-    """``take_run`` where one IMU frame is all there is: the frame, and what is known then.
-
-    It came as a whole, so its last byte is its own.
-    """
-    header, x, y, z, u, v, w = _LONE_IMU(data)
-    last, seq, pose, imus, deltas, _, turned = context
-    if header != _LONE_HEADER or last is None:
-        return None
-    lightest, heaviest, far, fast = expectation.calm
-    px, py, pz = last.accel
-    pu, pv, pw = last.gyro
-    if not (
-        lightest < x * x + y * y + z * z < heaviest
-        and -far < x - px < far
-        and -far < y - py < far
-        and -far < z - pz < far
-        and -fast < u - pu < fast
-        and -fast < v - pv < fast
-        and -fast < w - pw < fast
-    ):
-        return None
-    frame: Any = _Imu()
-    frame.accel = x, y, z
-    frame.gyro = u, v, w
-    frame.__class__ = ImuFrame
-    if not imus & 3:
-        expectation.learn(frame, last)
-    return frame, tuple.__new__(Context, (frame, seq, pose, imus + 1, deltas, False, turned))
 
 
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
@@ -183,7 +149,7 @@ def take_run(
                 break
             px, py, pz = x, y, z
             pu, pv, pw = u, v, w
-            frame = _Imu()
+            frame = UnfrozenImu()
             frame.accel = x, y, z
             frame.gyro = u, v, w
             frame.__class__ = ImuFrame
@@ -207,7 +173,7 @@ def take_run(
                 or (end == size and count in LENT)
             ):
                 break
-            frame = _Delta()
+            frame = UnfrozenDelta()
             frame.dx, frame.dy = dx, dy
             frame.dtheta, frame.seq = dtheta, count
             frame.__class__ = DeltaFrame
@@ -230,7 +196,7 @@ def take_run(
                 or (end == size and count in LENT)
             ):
                 break
-            frame = _Pose()
+            frame = UnfrozenPose()
             frame.x, frame.y, frame.theta, frame.seq = x, y, theta, count
             frame.__class__ = PoseFrame
             pose, deltas, turned = frame, 0, 0

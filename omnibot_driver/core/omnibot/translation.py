@@ -40,9 +40,10 @@ POSE_LSB_RAD: Final = 1e-3
 
 
 class Translation:
-    """What is made of the frames of a line; what comes most often, in ``lone``, at the least cost.
+    """What is made of the frames of a line.
 
-    ``settings`` may be replaced at any time, but for ``delta_period_s``.
+    ``settings`` may be replaced at any time, but for ``delta_period_s``. ``singles_to_come``: IMU
+    frames that ``single_imu`` may take without a word; ``heard_s``: when the last frame came.
     """
 
     def __init__(self, settings: OmniBotSettings) -> None:
@@ -59,16 +60,9 @@ class Translation:
         self._sequence.reconnect()
         self._paused_count: int | None = None
         self._imus = 0
-        self.lone_to_come = self._most_alone = 0
-        """IMU frames that may come alone and not be told on, and how many there were to be."""
-        self._heard_s = -math.inf
-
-    def lone(self, frame: ImuFrame, now: float) -> ImuReading:
-        """``readings`` of an IMU frame that came alone, while such are to come."""
-        self.lone_to_come -= 1
-        self._heard_s = now
-        scale = self.settings.imu
-        return ImuReading(scale.specific_force(frame.accel), scale.angular_velocity(frame.gyro))
+        self.singles_to_come = self._most_singles = 0
+        """How many are left, and how many there were."""
+        self.heard_s = -math.inf
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
         """Of frames that one read brought, each after so many bytes that made none.
@@ -76,7 +70,7 @@ class Translation:
         What a read brings at once did not come at once: each frame has a time of its own.
         """
         self._catch_up()
-        before_s, self._heard_s = self._heard_s, now
+        before_s, self.heard_s = self.heard_s, now
         lengths = [LENGTH.get(type(frame), 0) for frame in found]
         left = sum(skipped) + sum(lengths)
         readings = []
@@ -85,7 +79,7 @@ class Translation:
             came_s = max(before_s, now - left / self._schedule.bytes_per_s)
             readings.append(self._read(frame, came_s, before))
         usual = self._paused_count is None and not any(skipped)
-        self.lone_to_come = self._most_alone = self.modes.imus_to_come - 1 if usual else 0
+        self.singles_to_come = self._most_singles = self.modes.imus_to_come - 1 if usual else 0
         return readings
 
     def apply(self, happening: Happening) -> None:
@@ -94,13 +88,13 @@ class Translation:
         self.modes.apply(happening)
 
     def _catch_up(self) -> None:
-        """Modes and rhythm are told of the frames that came alone."""
-        alone = self._most_alone - self.lone_to_come
-        self.lone_to_come = self._most_alone = 0
-        if alone:
-            self.modes.hear_imus(alone)
-            self._rhythm.hear_imus(alone)
-            self._imus += alone
+        """Tell modes and rhythm of the frames that came by themselves."""
+        singles = self._most_singles - self.singles_to_come
+        self.singles_to_come = self._most_singles = 0
+        if singles:
+            self.modes.hear_imus(singles)
+            self._rhythm.hear_imus(singles)
+            self._imus += singles
 
     def _read(self, frame: Frame, now: float, skipped: int) -> Reading:
         self.modes.hear(frame)

@@ -123,7 +123,10 @@ class DeviceClock:
         return stamps
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """``stamps`` of one that came alone, when due; None, and nothing is changed, otherwise."""
+        """``stamps`` of one that came alone, when due; None, and nothing is changed, otherwise.
+
+        Most reads of any board with an IMU are such, and need no count of what else they bring.
+        """
         if reading.lost:
             return None
         stamp_s = self._due(self._tick + 1, now, edge, 1)

@@ -1,0 +1,72 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The quick way of what comes most often: one IMU frame by itself, from its bytes to its reading.
+
+It is decoder and translation in one, for a read that neither has anything to decide about. It says
+what they would say and leaves them in the state that they would be in: a test holds one against the
+other. It knows no other frame, and no evidence but that of a calm frame in its place.
+"""
+
+import struct
+from typing import Any, Final
+
+from omnibot_driver.core.omnibot.cost_model import Context
+from omnibot_driver.core.omnibot.decoder import FrameDecoder
+from omnibot_driver.core.omnibot.fast_path import UnfrozenImu
+from omnibot_driver.core.omnibot.frames import IMU_HEADER, IMU_LENGTH, ImuFrame
+from omnibot_driver.core.omnibot.gaps import LATE_S
+from omnibot_driver.core.omnibot.translation import Translation
+from omnibot_driver.core.readings import ImuReading
+
+_WORDS: Final = struct.Struct(">H6h").unpack
+_HEADER: Final = int.from_bytes(IMU_HEADER, "big")
+
+
+def take_single(
+    data: bytes, now: float, decoder: FrameDecoder, translation: Translation
+) -> ImuReading | None:
+    """The reading of these bytes, if they are one calm IMU frame and one was due.
+
+    None, and nothing is changed, where anything else is to be considered. The frame came as a
+    whole, so its last byte is its own.
+    """
+    pause_s = now - decoder.last_arrival_s
+    if (
+        not translation.singles_to_come
+        or not decoder.at_rest
+        or len(data) != IMU_LENGTH
+        or pause_s > LATE_S
+    ):
+        return None
+    header, x, y, z, u, v, w = _WORDS(data)
+    last, seq, pose, imus, deltas, _, turned = decoder.context
+    if header != _HEADER or last is None:
+        return None
+    expectation = decoder.expectation
+    lightest, heaviest, far, fast = expectation.calm
+    px, py, pz = last.accel
+    pu, pv, pw = last.gyro
+    if not (
+        lightest < x * x + y * y + z * z < heaviest
+        and -far < x - px < far
+        and -far < y - py < far
+        and -far < z - pz < far
+        and -fast < u - pu < fast
+        and -fast < v - pv < fast
+        and -fast < w - pw < fast
+    ):
+        return None
+    frame: Any = UnfrozenImu()
+    frame.accel = accel = x, y, z
+    frame.gyro = gyro = u, v, w
+    frame.__class__ = ImuFrame
+    if not imus & 3:
+        expectation.learn(frame, last)
+    decoder.context = tuple.__new__(Context, (frame, seq, pose, imus + 1, deltas, False, turned))
+    decoder.last_arrival_s = translation.heard_s = now
+    decoder.statistics.frames += 1
+    if not decoder.pauses.certain:
+        decoder.pauses.stood_between(pause_s, IMU_LENGTH)
+    translation.singles_to_come -= 1
+    scale = translation.settings.imu
+    return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro))
