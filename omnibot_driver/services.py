@@ -15,8 +15,9 @@ from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver import calibration
 from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.reporter import DISCONNECTED
 from omnibot_driver.core.requests import Request, RequestDone
-from omnibot_driver.core.session import DISCONNECTED, Session
+from omnibot_driver.core.session import Session
 from omnibot_driver.core.traits import Traits
 from omnibot_driver.link import Link
 from omnibot_driver.replay import Replay

@@ -5,56 +5,35 @@
 The shell around it calls an input, then takes ``take_output`` to the port and ``take_events`` to
 whoever listens, and calls ``tick`` when ``wake_at`` has come. Not thread-safe, reads no clock, does
 not log: whatever a user should hear of is an event.
+
+It knows in which order its parts have their turn, and keeps next to nothing itself: ``liveness``
+when the board was heard, ``safety`` what stops the robot, ``interlocks`` what is refused,
+``reporter`` what there is to tell. Must not know bytes or threads.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Final
 
 from omnibot_driver.core.board import Board, Mode
-from omnibot_driver.core.commands.interlocks import why_not_calibrate, why_not_drive
-from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.interlocks import Interlocks
 from omnibot_driver.core.commands.pipeline import Command, CommandPipeline
-from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.commands.shaping import ControlMethod
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.events import Event, Notice, StateChanged
+from omnibot_driver.core.events import Event
 from omnibot_driver.core.geometry.se2 import Pose, Signs
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.imu.bias_correction import ImuCorrection, ImuEstimate
-from omnibot_driver.core.measurement.outlier_filter import MotionLimits, Refused
-from omnibot_driver.core.measurement.pipeline import Measured, MeasurementPipeline
-from omnibot_driver.core.mode_manager import CLOSED, ModeManager, Phase
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.liveness import Liveness
+from omnibot_driver.core.measurement.outlier_filter import Refused
+from omnibot_driver.core.measurement.pipeline import MeasurementPipeline
+from omnibot_driver.core.mode_manager import CLOSED, ModeManager
 from omnibot_driver.core.packets import NO_PACKETS, Packets
-from omnibot_driver.core.readings import (
-    DisplacementReading,
-    PausedReading,
-    PoseReading,
-    Reading,
-    Vector3,
-)
+from omnibot_driver.core.readings import PausedReading, Reading, Vector3
+from omnibot_driver.core.reporter import Reporter
 from omnibot_driver.core.reporting.figures import SessionFigures
-from omnibot_driver.core.reporting.notices import HEADING_ASSUMED, Notices, why_silent
 from omnibot_driver.core.requests import OnExit, Request
-
-TELL_EVERY_S: Final = 0.1
-"""News need not be looked for with every read."""
-DISCONNECTED: Final = "disconnected"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SessionSettings:
-    """What may change while the session runs."""
-
-    limits: SpeedLimits
-    commands: CommandSettings
-    odometry: OdometrySettings
-    motion: MotionLimits = field(default_factory=MotionLimits)
-    imu: ImuCorrection = field(default_factory=ImuCorrection)
-    motion_monitor: bool = True
-    """Whether a robot that does not move as commanded is stopped."""
+from omnibot_driver.core.safety import SafetyStops
+from omnibot_driver.core.settings import SessionSettings
 
 
 class Session:
@@ -74,49 +53,38 @@ class Session:
         control: ControlMethod = "velocity",
         obeys: bool = True,
     ) -> None:
-        self._board, self._traits = board, board.traits
-        self._mode_manager = ModeManager(board, run=run)
-        self._measurement = MeasurementPipeline(
-            board, settings.odometry, settings.motion, settings.imu, axis_signs
+        self._board = board
+        modes = self._mode_manager = ModeManager(board, run=run)
+        measurement = self._measurement = MeasurementPipeline(board, settings, axis_signs)
+        self._odometry = measurement.odometry
+        commanding = self._commanding = CommandPipeline(
+            board, self._odometry, settings, axis_signs, control, obeys=obeys
         )
-        self._odometry, self._imu = self._measurement.odometry, self._measurement.inertial
-        self._commanding = CommandPipeline(
-            board,
-            self._odometry,
-            settings.limits,
-            settings.commands,
-            axis_signs,
-            control,
-            obeys=obeys,
-            monitored=settings.motion_monitor,
-        )
-        self._commands = self._commanding.policy
-        self._heard_at = self._came_at = -math.inf
-        self._silent = self._leaving = False
+        self._commands = commanding.policy
+        self._calibration = measurement.inertial.calibration
+        liveness = self._liveness = Liveness(board.traits)
+        self._interlocks = Interlocks(board, modes, commanding, self._calibration, liveness)
+        reporter = self._reporter = Reporter(board, modes, measurement, commanding)
+        self._safety = SafetyStops(board, modes, measurement, commanding, liveness, reporter)
         self._last: Reading | None = None
-        self._tell_at = -math.inf
-        self._notices_due = Notices()
-        self._overruns = 0
-        self._events: list[Event] = []
-        self.shown = (self.state, self.estop_active)
-        """As of the last ``take_events``: nothing that is only passed through amid an input."""
-        self._beneath: tuple[Phase, Mode, bool] | None = None
-        """What that is made of, which is quicker to look at."""
+        """Of those that were heard and not processed yet."""
 
     # What is so
 
     @property
     def state(self) -> str:
         """The public name of the link's and the board's state."""
-        if self._closed:
-            return DISCONNECTED
-        resetting = self._mode_manager.phase is Phase.RESETTING
-        return str((Mode.UNKNOWN if resetting else self._board.mode).value)
+        return self._reporter.state
 
     @property
     def estop_active(self) -> bool:
         """The driver's own latch."""
         return self._commands.latched
+
+    @property
+    def shown(self) -> tuple[str, bool]:
+        """Both of these, as of the last ``take_events``."""
+        return self._reporter.shown
 
     @property
     def refused(self) -> Refused:
@@ -125,35 +93,24 @@ class Session:
 
     def figures(self, now: float) -> SessionFigures:
         """All that is counted and measured."""
-        return SessionFigures(
-            state=self.state,
-            tally=replace(self._measurement.tally),
-            board=self._board.figures,
-            refused=self.refused,
-            skew_ppm=self._measurement.skew_ppm,
-            commands=self._commanding.figures(now),
-            imu=self._imu.figures,
-        )
+        return self._reporter.figures(now)
 
     @property
     def gyro_bias(self) -> Vector3:
         """What is taken off the gyro's readings, in rad/s."""
-        return self._imu.calibration.bias
+        return self._calibration.bias
 
     @property
     def wake_at(self) -> float:
         """When ``tick`` must be called at the latest; infinity when nothing is due."""
         if self._mode_manager.phase is CLOSED:
             return math.inf
-        silent_at = math.inf if self._silent else self._heard_at + self._traits.silence_s
-        unheard_at = self._heard_at + self._traits.unheard_s if self._commands.current else math.inf
         return min(
-            silent_at,
-            unheard_at,
+            self._liveness.wake_at(driven=self._commands.current is not None),
             self._board.wake_at,
             self._mode_manager.wake_at,
             self._commands.wake_at,
-            self._imu.calibration.wake_at,
+            self._calibration.wake_at,
         )
 
     # What happens
@@ -163,12 +120,11 @@ class Session:
 
         ``board``: new settings of the board's own, in which the present command is said as well.
         """
-        self._notify(self._commanding.configure(settings.limits, settings.commands, now))
-        self._commanding.monitor(settings.motion_monitor)
+        self._reporter.notify(self._commanding.configure(settings, now))
         if board is not None:
             self._board.settings = board
-            self._notify(self._commanding.check_anew(now))
-        self._measurement.configure(settings.odometry, settings.motion, settings.imu)
+            self._reporter.notify(self._commanding.check_anew(now))
+        self._measurement.configure(settings)
 
     def opened(self, now: float) -> None:
         """The port is open."""
@@ -176,21 +132,23 @@ class Session:
         self._commanding.begin(now)
         self._commands.connect(now)
         self._measurement.restart()
-        self._silent, self._heard_at, self._came_at = False, now, -math.inf
+        self._liveness.begin(now)
         self._mode_manager.opened(now)
 
     def closed(self, now: float) -> None:
         """The port is gone."""
-        self._events += self._take_in(self._board.flush(now), now)
+        if readings := self._board.flush(now):
+            self._last = readings[-1]
+        self._reporter.events += self._measurement.hear(readings, now)
         self.process(now)
-        self._react(self._measurement.release(), now)
+        self._safety.react(self._measurement.release(), now)
         self._mode_manager.closed()
-        self._imu.calibration.give_up("the port was lost meanwhile; call again once it is back")
+        self._calibration.give_up("the port was lost meanwhile; call again once it is back")
         self._commands.discard(now)
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
         """Bytes came in at ``now``."""
-        self._events += self.hear(data, now, channel)
+        self._reporter.events += self.hear(data, now, channel)
         self.process(now)
 
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
@@ -199,23 +157,24 @@ class Session:
         Whoever commands in between is as one who came before the bytes. That must not be where they
         change the mode, so there nothing waits; nor does it where anything else is asked for.
         """
-        self._came_at = now
+        self._liveness.came_at = now
         before = self._board.mode
-        estimates = self._take_in(self._board.receive(data, now, channel), now)
+        if readings := self._board.receive(data, now, channel):
+            self._liveness.heard_at, self._last = now, readings[-1]
+        estimates = self._measurement.hear(readings, now)
         after = self._board.mode
         if after is before:
             return estimates
-        self._events += estimates
-        self._tell_at = now
+        self._reporter.events += estimates
+        self._reporter.news_at = now
         self.process(now)
         if after.running and not before.running:
-            self._commands.proof.begin()
-            self._commands.halt(now)
+            self._safety.set_out(now)
         return []
 
     def overran(self, count: int) -> None:
         """So often the port has lost bytes since it was opened: they never came to us."""
-        self._overruns = count
+        self._reporter.overruns = count
 
     def process(self, now: float) -> bool:
         """What comes of the bytes that were heard last. False: nothing to write or to tell."""
@@ -223,55 +182,35 @@ class Session:
         if last is None:
             return True
         if (
-            now < self._tell_at
+            now < self._reporter.news_at
             and now < self._board.wake_at
             and not self._measurement.undigested
-            and not self._events
+            and not self._reporter.events
             and self._mode_manager.at_rest
         ):
             return False
         if self._measurement.undigested:
             measured = self._measurement.flush()
-            self._notify(
-                self._commanding.count_refused(self._measurement.refused_displacements, now)
-            )
-            self._react(measured, now)
-        if now >= self._tell_at:
-            self._tell(now)
+            refused = self._measurement.refused_displacements
+            if news := self._commanding.count_refused(refused, now):
+                self._reporter.notify(news)
+            self._safety.react(measured, now)
+        if now >= self._reporter.news_at:
+            self._reporter.look_for_news(now)
         if self._board.mode.running and not isinstance(last, PausedReading):
             self._mode_manager.heard_data(now)
         return True
 
     def tick(self, now: float) -> None:
         """Time passed."""
-        if self._commands.current and now - self._heard_at >= self._traits.unheard_s:
-            self._commands.halt(now)
-        if not self._silent and now - self._heard_at >= self._traits.silence_s:
-            self._silent = True
-            self._react(self._measurement.release(), now)
-            self._notify(
-                [why_silent(self._traits.silence_s, bytes_came=self._came_at > self._heard_at)]
-            )
-            if self._board.mode is not Mode.UNKNOWN:
-                self._board.silence()
-                self._measurement.restart()
-                self._commands.proof.begin()
-                self._commands.halt(now)
-                self._mode_manager.heard_nothing(now)
+        self._safety.tick(now)
         self._mode_manager.tick(now)
-        self._imu.calibration.tick(now)
+        self._calibration.tick(now)
 
     def stood_still(self, seconds: float, now: float) -> None:
         """This process, or its watchdog, did not run for so long: no command is current."""
-        if not self._closed:
-            self._heard_at = now  # the silence was ours
-            self._commands.halt(now)
-            self._notify(
-                [
-                    f"the driver stood still for {seconds:.1f} s: the robot is stopped"
-                    " until a new command comes"
-                ]
-            )
+        if self._mode_manager.phase is not CLOSED:
+            self._safety.stalled(seconds, now)
 
     # What is wanted
 
@@ -292,8 +231,8 @@ class Session:
 
     def request(self, request: Request, token: object, now: float) -> None:
         """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""
-        if self._leaving:
-            raise RequestRefused("the driver is shutting down")
+        if reason := self._interlocks.why_not_request():
+            raise RequestRefused(reason)
         self.process(now)  # what came before is no answer
         self._mode_manager.request(request, token, now)
         if request is Request.START:
@@ -303,39 +242,23 @@ class Session:
 
     def calibrate_gyro(self, token: object, now: float) -> None:
         """Find the gyro's bias; answered by a RequestDone. Raises RequestRefused at once."""
-        calibration, phase = self._imu.calibration, self._mode_manager.phase
-        if reason := why_not_calibrate(
-            phase, self._board.mode, self._commands.current, measuring=calibration.measuring
-        ):
+        if reason := self._interlocks.why_not_calibrate():
             raise RequestRefused(reason)
-        calibration.measure(token, now)
+        self._calibration.measure(token, now)
 
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
         """Latch or release the e-stop; returns what is so now, in a sentence."""
-        if active:
-            if not self.estop_active:
-                self._notify([f"e-stop latched by {by}"])
-            self._commands.latch(now)
-            if self._closed:
-                return "e-stop latched; the port is not open: the stop is sent as soon as it is"
-            if self._board.mode is Mode.UNKNOWN:
-                return "e-stop latched; nothing comes from the board: nobody knows if it hears us"
-            return "e-stop latched"
-        if not self.estop_active:
-            return "the e-stop was not latched"
-        self._commanding.release(now)
-        self._notify([f"e-stop released by {by}"])
-        return "e-stop released; the robot stands still until a new command comes"
+        return self._safety.estop(active, now, by=by)
 
     def reset_odometry(self, now: float) -> None:
         """The odometry frame begins where the robot stands; a goal in the old one is dropped."""
         self.process(now)
-        self._events += self._odometry.reset()
-        self._notify(self._commanding.check_goal([], now))
+        self._reporter.events += self._odometry.reset()
+        self._reporter.notify(self._commanding.check_goal([], now))
 
     def leave(self, now: float) -> None:
         """The driver ends: nothing is obeyed any more, and Stop is repeated."""
-        self._leaving = True
+        self._interlocks.leaving = True
         self._commands.halt(now)
 
     def fall_silent(self, now: float) -> bool:
@@ -383,88 +306,17 @@ class Session:
             packets += due
         if self._commands.unconfirmed:
             self._commands.unconfirmed = False
-            measured = self._commands.proof.measured
-            self._notify(self._notices_due.unconfirmed(self._board.mode, measured=measured))
+            self._reporter.unconfirmed()
         return packets
 
     def take_events(self) -> list[Event]:
         """What happened since the last call, in order."""
-        for answers in (self._mode_manager.answers, self._imu.calibration.answers):
-            if answers:
-                self._events += answers
-                answers.clear()
-        beneath = (self._mode_manager.phase, self._board.mode, self._commands.latched)
-        if beneath != self._beneath:
-            self._beneath = beneath
-            shown = (self.state, self.estop_active)
-            if shown != self.shown:
-                self.shown = shown
-                self._events.append(StateChanged(*shown))
-        events, self._events = self._events, []
-        return events
-
-    @property
-    def _closed(self) -> bool:
-        return self._mode_manager.phase is CLOSED
-
-    def _take_in(self, readings: list[Reading], now: float) -> list[ImuEstimate]:
-        if readings:
-            self._heard_at, self._silent, self._last = now, False, readings[-1]
-        return self._measurement.hear(readings, now)
-
-    def _react(self, measured: list[Measured], now: float) -> None:
-        for reading, estimates in measured:
-            self._events += estimates
-            if isinstance(reading, DisplacementReading):
-                self._notify(self._commanding.look(reading, estimates, now))
-                if reading.restarted:
-                    self._commands.halt(now)
-            elif isinstance(reading, PoseReading):
-                if reading.restarted:
-                    self._commands.halt(now)
-            elif isinstance(reading, PausedReading):
-                self._commanding.begin(now)
-                self._commands.proof.paused()
-                if self._board.mode.running:  # again, within one read
-                    self._commands.halt(now)
-                self._mode_manager.heard_paused(now, continues=reading.continues)
-        if self._commands.current is not None:
-            self._notify(self._commanding.check_goal([], now))
-
-    def _tell(self, now: float) -> None:
-        self._tell_at = now + TELL_EVERY_S
-        bulletin, measuring, advice = self._notices_due, self._measurement, self._board.advice
-        news = bulletin.counted(
-            measuring.tally.lost_displacements, self._overruns, measuring.refused, now
-        )
-        news += bulletin.standing(self._imu.advice)
-        if advice is not None:
-            news += bulletin.once(advice)
-        if self._odometry.heading_assumed:
-            news += bulletin.once(HEADING_ASSUMED)
-        self._notify(news)
-
-    def _notify(self, sentences: Sequence[str]) -> None:
-        if sentences:
-            self._events += map(Notice, sentences)
+        return self._reporter.take()
 
     def _command(self, wish: Command, now: float) -> None:
-        if self._leaving:
-            raise CommandRefused("motion command refused: the driver is shutting down")
         motion, expires_at = wish
-        unheard = now - self._heard_at >= self._traits.unheard_s and not motion.is_zero
-        if reason := why_not_drive(
-            self._mode_manager.phase,
-            self._board.mode,
-            latched=self._commands.latched,
-            unheard_s=self._traits.unheard_s if unheard else 0.0,
-            interlock=self._commanding.interlock.arrive(
-                now, self._commands.settings.timeout_s, stands=motion.is_zero
-            ),
-        ):
+        if reason := self._interlocks.why_not_drive(motion, now):
             raise CommandRefused(f"motion command refused: {reason}")
         self._commands.command(motion, now, expires_at=expires_at)
         if not motion.is_zero:
-            self._imu.calibration.give_up(
-                "a motion command came in; stop the sender, then call again"
-            )
+            self._calibration.give_up("a motion command came in; stop the sender, then call again")

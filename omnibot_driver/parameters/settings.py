@@ -18,7 +18,7 @@ from omnibot_driver.core.measurement.outlier_filter import MotionLimits
 from omnibot_driver.core.odometry.covariance import OdometryNoise
 from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.readings import Vector3
-from omnibot_driver.core.session import SessionSettings
+from omnibot_driver.core.settings import SessionSettings
 
 
 def session_settings(values: Mapping[str, Any], wheels: Kinematics) -> SessionSettings:

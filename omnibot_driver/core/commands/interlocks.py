@@ -5,44 +5,68 @@
 Each answer is a sentence, empty when nothing is in the way. Knows modes and phases.
 """
 
-from omnibot_driver.core.board import Mode
+from omnibot_driver.core.board import Board, Mode
+from omnibot_driver.core.commands.pipeline import CommandPipeline
 from omnibot_driver.core.commands.set_points import Setpoint
-from omnibot_driver.core.mode_manager import Phase
+from omnibot_driver.core.imu.gyro_calibration import GyroCalibration
+from omnibot_driver.core.liveness import Liveness
+from omnibot_driver.core.mode_manager import ModeManager, Phase
 
 
-def why_not_drive(
-    phase: Phase, mode: Mode, *, latched: bool, unheard_s: float, interlock: str
-) -> str:
-    """``unheard_s``: for so long nothing was heard from the board; 0 where that does not matter.
+class Interlocks:
+    """``leaving``: the driver is shutting down, and obeys nothing any more."""
 
-    ``interlock``: why the motion monitor refuses motion, empty where it does not.
-    """
-    if latched:
-        return "the e-stop is latched; release it with the service ~/estop (data: false)"
-    if phase is not Phase.SETTLED:
-        hint = "; the service ~/start makes it run" if phase is Phase.PAUSING else ""
-        return f"the board is {phase.value}{hint}"
-    if not mode.running:
-        return f"the board is {mode.value}; the service ~/start makes it run"
-    if unheard_s:
-        return f"nothing was heard from the board for {unheard_s:g} s"
-    return interlock
+    def __init__(
+        self,
+        board: Board,
+        mode_manager: ModeManager,
+        commanding: CommandPipeline,
+        calibration: GyroCalibration,
+        liveness: Liveness,
+    ) -> None:
+        self._board, self._mode_manager = board, mode_manager
+        self._policy, self._interlock = commanding.policy, commanding.interlock
+        self._calibration, self._liveness = calibration, liveness
+        self.leaving = False
 
+    def why_not_request(self) -> str:
+        """Why nothing is asked of the board."""
+        return "the driver is shutting down" if self.leaving else ""
 
-def why_not_calibrate(
-    phase: Phase, mode: Mode, current: Setpoint | None, *, measuring: bool
-) -> str:
-    """``current``: what is commanded; ``measuring``: a calibration is under way."""
-    if phase is Phase.CLOSED:
-        return "the port is not open; connect the board, then call again"
-    if mode is Mode.UNKNOWN:
-        return "nothing was understood from the board: check its power and cable, then call again"
-    if not mode.running:
-        return f"the board is {mode.value}; call ~/start, then call again"
-    if measuring:
-        return "a calibration is under way; wait for its answer, then call again"
-    if current is not None and not current.is_zero:
-        return (
-            f"the robot is commanded by {current.authority.value}; stop the sender, then call again"
-        )
-    return ""
+    def why_not_drive(self, motion: Setpoint, now: float) -> str:
+        """Why this motion is refused. To be asked once for each, as the motion monitor counts."""
+        if self.leaving:
+            return self.why_not_request()
+        stands, phase, mode = motion.is_zero, self._mode_manager.phase, self._board.mode
+        tripped = self._interlock.arrive(now, self._policy.settings.timeout_s, stands=stands)
+        if self._policy.latched:
+            return "the e-stop is latched; release it with the service ~/estop (data: false)"
+        if phase is not Phase.SETTLED:
+            hint = "; the service ~/start makes it run" if phase is Phase.PAUSING else ""
+            return f"the board is {phase.value}{hint}"
+        if not mode.running:
+            return f"the board is {mode.value}; the service ~/start makes it run"
+        unheard_s = self._liveness.unheard_s
+        if not stands and now - self._liveness.heard_at >= unheard_s:
+            return f"nothing was heard from the board for {unheard_s:g} s"
+        return tripped
+
+    def why_not_calibrate(self) -> str:
+        """Why the gyro's bias cannot be measured."""
+        phase, mode, current = self._mode_manager.phase, self._board.mode, self._policy.current
+        if phase is Phase.CLOSED:
+            return "the port is not open; connect the board, then call again"
+        if mode is Mode.UNKNOWN:
+            return (
+                "nothing was understood from the board: check its power and cable, then call again"
+            )
+        if not mode.running:
+            return f"the board is {mode.value}; call ~/start, then call again"
+        if self._calibration.measuring:
+            return "a calibration is under way; wait for its answer, then call again"
+        if current is not None and not current.is_zero:
+            return (
+                f"the robot is commanded by {current.authority.value}; stop the sender, then call"
+                " again"
+            )
+        return ""

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from typing import Final
 
 from omnibot_driver.core.board import Board
-from omnibot_driver.core.commands.limits import SpeedLimits, require_timely
+from omnibot_driver.core.commands.limits import require_timely
 from omnibot_driver.core.commands.motion_interlock import MotionInterlock
-from omnibot_driver.core.commands.policy import CommandPolicy, CommandSettings
+from omnibot_driver.core.commands.policy import CommandPolicy
 from omnibot_driver.core.commands.set_point_stream import PACE_S
 from omnibot_driver.core.commands.set_points import GoalSetpoint, Setpoint
 from omnibot_driver.core.commands.shaping import CommandShaper, ControlMethod
@@ -28,6 +28,7 @@ from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
 from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import DisplacementReading
 from omnibot_driver.core.reporting.figures import CommandFigures
+from omnibot_driver.core.settings import SessionSettings
 
 Command = tuple[Setpoint, float]
 """A motion that may be commanded, and when it expires."""
@@ -43,30 +44,35 @@ class CommandPipeline:
         self,
         board: Board,
         odometry: Odometry,
-        limits: SpeedLimits,
-        commands: CommandSettings,
+        settings: SessionSettings,
         axis_signs: Signs,
         control: ControlMethod,
         *,
         obeys: bool,
-        monitored: bool,
     ) -> None:
         proof = StopProof()
         self._actuator = board.actuator(proof)
-        self.policy = CommandPolicy(commands, self._actuator, proof)
+        self.policy = CommandPolicy(settings.commands, self._actuator, proof)
         self._odometry = odometry
-        self._shaper = CommandShaper(board, self._actuator, odometry, limits, axis_signs, control)
+        self._shaper = CommandShaper(
+            board, self._actuator, odometry, settings.limits, axis_signs, control
+        )
         self.interlock = MotionInterlock()
         self._board, self._axis_signs = board, axis_signs
         self._monitor = MotionMonitor()
         self._obeys = obeys
-        self.monitored = monitored
+        self.monitored = settings.motion_monitor
 
-    def configure(self, limits: SpeedLimits, commands: CommandSettings, now: float) -> list[str]:
+    def configure(self, settings: SessionSettings, now: float) -> list[str]:
         """New settings, from the next command and frame on; sentences for the user.
 
         What was commanded under looser ones ends.
         """
+        if settings.motion_monitor is not self.monitored:
+            self.monitored = settings.motion_monitor
+            self._monitor.begin()
+            self.interlock.start()
+        limits, commands = settings.limits, settings.commands
         stricter = commands.timeout_s < self.policy.settings.timeout_s or limits.stricter_than(
             self._shaper.limits
         )
@@ -88,13 +94,6 @@ class CommandPipeline:
             self.policy.halt(now)
             return [f"robot stopped, the current command does not fit the new scale: {error}"]
         return []
-
-    def monitor(self, monitored: bool) -> None:
-        """Stop a robot that does not move as commanded, or let it drive."""
-        if monitored is not self.monitored:
-            self.monitored = monitored
-            self._monitor.begin()
-            self.interlock.start()
 
     def figures(self, now: float) -> CommandFigures:
         """Who commands, and how."""

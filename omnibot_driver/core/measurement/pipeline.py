@@ -12,15 +12,10 @@ from collections.abc import Sequence
 from omnibot_driver.core.board import Board
 from omnibot_driver.core.events import Extra
 from omnibot_driver.core.geometry.se2 import Signs
-from omnibot_driver.core.imu.bias_correction import BiasCorrector, ImuCorrection, ImuEstimate
-from omnibot_driver.core.measurement.outlier_filter import (
-    MotionLimits,
-    OutlierFilter,
-    Refused,
-    Stamped,
-)
+from omnibot_driver.core.imu.bias_correction import BiasCorrector, ImuEstimate
+from omnibot_driver.core.measurement.outlier_filter import OutlierFilter, Refused, Stamped
 from omnibot_driver.core.measurement.statistics import StreamStatistics
-from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
 from omnibot_driver.core.readings import (
     DisplacementReading,
     ExtraReading,
@@ -28,6 +23,7 @@ from omnibot_driver.core.readings import (
     PoseReading,
     Reading,
 )
+from omnibot_driver.core.settings import SessionSettings
 from omnibot_driver.core.timing.arrival_clock import ArrivalClock
 from omnibot_driver.core.timing.device_clock import DeviceClock
 
@@ -39,33 +35,24 @@ Measured = tuple[Reading, Sequence[Estimate]]
 class MeasurementPipeline:
     """Everything between what a board says and what is told of it."""
 
-    def __init__(
-        self,
-        board: Board,
-        odometry: OdometrySettings,
-        motion: MotionLimits,
-        imu: ImuCorrection,
-        axis_signs: Signs,
-    ) -> None:
-        self.odometry = Odometry(odometry, axis_signs)
-        self.inertial = BiasCorrector(board, imu)
+    def __init__(self, board: Board, settings: SessionSettings, axis_signs: Signs) -> None:
+        self.odometry = Odometry(settings.odometry, axis_signs)
+        self.inertial = BiasCorrector(board, settings.imu)
         self._tally = StreamStatistics()
         self._board = board
         period_s = board.traits.imu_period_s
         self._clock = DeviceClock(period_s) if period_s else ArrivalClock()
-        self._outliers = OutlierFilter(motion, period_s or 0.0)
+        self._outliers = OutlierFilter(settings.motion, period_s or 0.0)
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
         """Of each read the readings, and how old the newest was."""
         self.undigested: list[Stamped] = []
         """What is heard, but for ``flush``."""
 
-    def configure(
-        self, odometry: OdometrySettings, motion: MotionLimits, imu: ImuCorrection
-    ) -> None:
+    def configure(self, settings: SessionSettings) -> None:
         """New settings, from the next reading on."""
-        self.odometry.configure(odometry)
-        self._outliers.limits = motion
-        self.inertial.configure(imu)
+        self.odometry.configure(settings.odometry)
+        self._outliers.limits = settings.motion
+        self.inertial.configure(settings.imu)
 
     @property
     def refused(self) -> Refused:

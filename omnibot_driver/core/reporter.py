@@ -1,0 +1,113 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a session has to tell: events in their order, notices when they are due, state and figures.
+
+It looks at every part of a session and changes none. Must not know who listens.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from omnibot_driver.core.board import Board, Mode
+from omnibot_driver.core.commands.pipeline import CommandPipeline
+from omnibot_driver.core.events import Event, Notice, StateChanged
+from omnibot_driver.core.measurement.pipeline import MeasurementPipeline
+from omnibot_driver.core.mode_manager import CLOSED, ModeManager, Phase
+from omnibot_driver.core.reporting.figures import SessionFigures
+from omnibot_driver.core.reporting.notices import HEADING_ASSUMED, Notices, why_silent
+
+NEWS_EVERY_S: Final = 0.1
+"""News need not be looked for with every read."""
+DISCONNECTED: Final = "disconnected"
+
+
+class Reporter:
+    """``events``: what happened since they were taken; ``news_at``: when to look for news next.
+
+    ``overruns``: how often the port has lost bytes since it was opened. ``shown``: the public state
+    and the e-stop as of the last ``take``, so nothing that is only passed through amid an input.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        mode_manager: ModeManager,
+        measurement: MeasurementPipeline,
+        commanding: CommandPipeline,
+    ) -> None:
+        self._board, self._mode_manager = board, mode_manager
+        self._measurement, self._commanding = measurement, commanding
+        self._policy, self._calibration = commanding.policy, measurement.inertial.calibration
+        self._notices = Notices()
+        self.events: list[Event] = []
+        self.news_at = -math.inf
+        self.overruns = 0
+        self.shown = (self.state, self._policy.latched)
+        self._beneath: tuple[Phase, Mode, bool] | None = None
+        """What ``shown`` is made of, which is quicker to look at."""
+
+    @property
+    def state(self) -> str:
+        """The public name of the link's and the board's state."""
+        if self._mode_manager.phase is CLOSED:
+            return DISCONNECTED
+        resetting = self._mode_manager.phase is Phase.RESETTING
+        return str((Mode.UNKNOWN if resetting else self._board.mode).value)
+
+    def figures(self, now: float) -> SessionFigures:
+        """All that is counted and measured."""
+        return SessionFigures(
+            state=self.state,
+            tally=replace(self._measurement.tally),
+            board=self._board.figures,
+            refused=self._measurement.refused,
+            skew_ppm=self._measurement.skew_ppm,
+            commands=self._commanding.figures(now),
+            imu=self._measurement.inertial.figures,
+        )
+
+    def notify(self, sentences: Sequence[str]) -> None:
+        """Something a user should be told, sentence by sentence."""
+        if sentences:
+            self.events += map(Notice, sentences)
+
+    def look_for_news(self, now: float) -> None:
+        """What a user should be told of by what was counted and seen."""
+        self.news_at = now + NEWS_EVERY_S
+        notices, measuring, advice = self._notices, self._measurement, self._board.advice
+        news = notices.counted(
+            measuring.tally.lost_displacements, self.overruns, measuring.refused, now
+        )
+        news += notices.standing(measuring.inertial.advice)
+        if advice is not None:
+            news += notices.once(advice)
+        if measuring.odometry.heading_assumed:
+            news += notices.once(HEADING_ASSUMED)
+        self.notify(news)
+
+    def silent(self, silence_s: float, *, bytes_came: bool) -> None:
+        """Nothing was understood for so long."""
+        self.notify([why_silent(silence_s, bytes_came=bytes_came)])
+
+    def unconfirmed(self) -> None:
+        """Stop was repeated for its whole time, and nothing showed that the robot stands."""
+        measured = self._policy.proof.measured
+        self.notify(self._notices.unconfirmed(self._board.mode, measured=measured))
+
+    def take(self) -> list[Event]:
+        """What happened since the last call, in order."""
+        for answers in (self._mode_manager.answers, self._calibration.answers):
+            if answers:
+                self.events += answers
+                answers.clear()
+        beneath = (self._mode_manager.phase, self._board.mode, self._policy.latched)
+        if beneath != self._beneath:
+            self._beneath = beneath
+            shown = (self.state, self._policy.latched)
+            if shown != self.shown:
+                self.shown = shown
+                self.events.append(StateChanged(*shown))
+        events, self.events = self.events, []
+        return events

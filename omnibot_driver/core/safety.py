@@ -1,0 +1,106 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What stops the robot at once, whoever commands it: the e-stop, and what its board shows.
+
+A board that restarts, is paused or is not heard, and a stall of this process, end the command that
+is carried out. Composes what is measured, commanded and wanted of the board, where one of these has
+to follow from another. Must not know bytes, nor who commands. A command that expires is the command
+policy's, a robot that does not obey the motion monitor's.
+"""
+
+from omnibot_driver.core.board import Board, Mode
+from omnibot_driver.core.commands.pipeline import CommandPipeline
+from omnibot_driver.core.liveness import Liveness
+from omnibot_driver.core.measurement.pipeline import Measured, MeasurementPipeline
+from omnibot_driver.core.mode_manager import CLOSED, ModeManager
+from omnibot_driver.core.readings import DisplacementReading, PausedReading, PoseReading
+from omnibot_driver.core.reporter import Reporter
+
+
+class SafetyStops:
+    """What is to be told of each goes to ``reporter``."""
+
+    def __init__(
+        self,
+        board: Board,
+        mode_manager: ModeManager,
+        measurement: MeasurementPipeline,
+        commanding: CommandPipeline,
+        liveness: Liveness,
+        reporter: Reporter,
+    ) -> None:
+        self._board, self._mode_manager = board, mode_manager
+        self._measurement, self._commanding = measurement, commanding
+        self._policy = commanding.policy
+        self._liveness, self._reporter = liveness, reporter
+
+    def react(self, measured: list[Measured], now: float) -> None:
+        """To what was measured, in its order."""
+        notify, commanding = self._reporter.notify, self._commanding
+        for reading, estimates in measured:
+            self._reporter.events += estimates
+            if isinstance(reading, DisplacementReading):
+                notify(commanding.look(reading, estimates, now))
+                if reading.restarted:
+                    self._policy.halt(now)
+            elif isinstance(reading, PoseReading):
+                if reading.restarted:
+                    self._policy.halt(now)
+            elif isinstance(reading, PausedReading):
+                commanding.begin(now)
+                self._policy.proof.paused()
+                if self._board.mode.running:  # again, within one read
+                    self._policy.halt(now)
+                self._mode_manager.heard_paused(now, continues=reading.continues)
+        if self._policy.current is not None:
+            notify(commanding.check_goal([], now))
+
+    def estop(self, active: bool, now: float, *, by: str) -> str:
+        """Latch or release the e-stop; returns what is so now, in a sentence."""
+        latched = self._policy.latched
+        if active:
+            if not latched:
+                self._reporter.notify([f"e-stop latched by {by}"])
+            self._policy.latch(now)
+            if self._mode_manager.phase is CLOSED:
+                return "e-stop latched; the port is not open: the stop is sent as soon as it is"
+            if self._board.mode is Mode.UNKNOWN:
+                return "e-stop latched; nothing comes from the board: nobody knows if it hears us"
+            return "e-stop latched"
+        if not latched:
+            return "the e-stop was not latched"
+        self._commanding.release(now)
+        self._reporter.notify([f"e-stop released by {by}"])
+        return "e-stop released; the robot stands still until a new command comes"
+
+    def set_out(self, now: float) -> None:
+        """The board runs (again): it may still carry out an old command."""
+        self._policy.proof.begin()
+        self._policy.halt(now)
+
+    def tick(self, now: float) -> None:
+        """To the board's silence: a short one ends a command, a long one all belief."""
+        if self._policy.current and self._liveness.unheard(now):
+            self._policy.halt(now)
+        if not self._liveness.fell_silent(now):
+            return
+        self.react(self._measurement.release(), now)
+        self._reporter.silent(
+            self._liveness.silence_s, bytes_came=self._liveness.came_at > self._liveness.heard_at
+        )
+        if self._board.mode is not Mode.UNKNOWN:
+            self._board.silence()
+            self._measurement.restart()
+            self.set_out(now)
+            self._mode_manager.heard_nothing(now)
+
+    def stalled(self, seconds: float, now: float) -> None:
+        """To a stall of this process: for so long nobody looked after the robot."""
+        self._liveness.stalled(now)
+        self._policy.halt(now)
+        self._reporter.notify(
+            [
+                f"the driver stood still for {seconds:.1f} s: the robot is stopped"
+                " until a new command comes"
+            ]
+        )

@@ -1,0 +1,24 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What may be set otherwise while a session runs: values only, the same for every board."""
+
+from dataclasses import dataclass, field
+
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.policy import CommandSettings
+from omnibot_driver.core.imu.bias_correction import ImuCorrection
+from omnibot_driver.core.measurement.outlier_filter import MotionLimits
+from omnibot_driver.core.odometry.estimator import OdometrySettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionSettings:
+    """What may change while the session runs."""
+
+    limits: SpeedLimits
+    commands: CommandSettings
+    odometry: OdometrySettings
+    motion: MotionLimits = field(default_factory=MotionLimits)
+    imu: ImuCorrection = field(default_factory=ImuCorrection)
+    motion_monitor: bool = True
+    """Whether a robot that does not move as commanded is stopped."""

@@ -1,0 +1,77 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""When a board was heard last: a silence is found once, and a stall of this process is none."""
+
+import math
+
+import pytest
+
+from omnibot_driver.core.liveness import Liveness
+from omnibot_driver.core.traits import Traits
+
+UNHEARD_S, SILENCE_S = 0.5, 2.0
+
+
+@pytest.fixture
+def liveness() -> Liveness:
+    """Of a line that was opened at 10 s."""
+    made = Liveness(
+        Traits(
+            imu_period_s=None,
+            authorities=frozenset(),
+            requests=frozenset(),
+            unheard_s=UNHEARD_S,
+            silence_s=SILENCE_S,
+        )
+    )
+    made.begin(10.0)
+    return made
+
+
+def test_a_silence_is_found_once(liveness: Liveness) -> None:
+    """From the limit on."""
+    assert [liveness.fell_silent(now) for now in (11.9, 12.0, 12.1, 99.0)] == [
+        False,
+        True,
+        False,
+        False,
+    ]
+
+
+def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
+    """And is counted from that reading on."""
+    assert liveness.fell_silent(12.0)
+    liveness.heard_at = 20.0
+    assert not liveness.fell_silent(21.9)
+    assert liveness.fell_silent(22.0)
+
+
+def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
+    """However long it was."""
+    assert liveness.fell_silent(12.0)
+    liveness.begin(12.0)
+    assert liveness.wake_at(driven=False) == 14.0
+
+
+def test_a_stall_is_no_silence_of_the_board(liveness: Liveness) -> None:
+    """The board has its whole time again."""
+    liveness.stalled(50.0)
+    assert not liveness.unheard(50.4)
+    assert not liveness.fell_silent(51.9)
+    assert liveness.fell_silent(52.0)
+
+
+def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None:
+    """Nothing was heard, so there is nothing to find again."""
+    assert liveness.fell_silent(12.0)
+    liveness.stalled(50.0)
+    assert not liveness.fell_silent(99.0)
+    assert liveness.wake_at(driven=False) == math.inf
+
+
+def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
+    """A command is to be ended long before all belief is."""
+    assert liveness.wake_at(driven=False) == 12.0
+    assert liveness.wake_at(driven=True) == 10.5
+    assert liveness.unheard(10.5)
+    assert not liveness.unheard(10.4)
