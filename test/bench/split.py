@@ -51,7 +51,7 @@ def timed(owner: type, name: str, stage: str) -> None:
 timed(SerialPort, "read", "read")
 timed(FrameDecoder, "feed", "decode")
 timed(Session, "hear", "measure (clock, plausibility, odometry, IMU)")
-timed(Session, "heed", "measure (clock, plausibility, odometry, IMU)")
+timed(Session, "process", "measure (clock, plausibility, odometry, IMU)")
 timed(Publishing, "deliver", "convert (stamps, serialising)")
 timed(Publisher, "publish", "publish")
 timed(threading.Thread, "run", "the rest of the reader (lock, commands due, state)")
