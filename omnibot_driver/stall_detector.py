@@ -15,9 +15,11 @@ STANDSTILL_S: Final = 0.4
 """A thread that ought to pass ten times a second has not for so long. It is less than the guard's
 limit: whenever the guard steps in, this is noticed as well."""
 SETTLE_S: Final = 0.25
-"""What comes so soon after a standstill had been waiting, whatever the sender's clock says."""
+"""What comes so soon after a standstill had been waiting, whatever the sender's clock says. What
+was sent so soon after it may have been sent a little before: a sender's clock is known roughly."""
 LATEST_S: Final = 10.0
-"""Nothing is retransmitted so late: what seems to be from before has a sender whose clock is."""
+"""Nothing is under way for longer, retransmissions included. What seems to have been sent earlier
+has a sender whose clock is wrong."""
 
 
 def boot_time_s() -> float:
@@ -54,9 +56,10 @@ class StallDetector:
         """The watchdog's thread runs; ``wall_ns`` is the time of day."""
         if self._begun:
             self._begun = False
+            if now >= self._over_at + LATEST_S:  # else commands of the last one are still under way
+                self._from_ns = wall_ns - _ns(now - self._passed_at + LATEST_S)
             self._over_at = now
-            self._from_ns = wall_ns - round((now - self._passed_at) * 1e9)
-            self._until_ns = wall_ns
+            self._until_ns = wall_ns + _ns(SETTLE_S)
         self._passed_at = now
 
     def outlived_by(self, sent_ns: int, now: float) -> bool:
@@ -66,3 +69,7 @@ class StallDetector:
         if self._begun or now - self._passed_at >= STANDSTILL_S or now < self._over_at + SETTLE_S:
             return False
         return now >= self._over_at + LATEST_S or not self._from_ns <= sent_ns <= self._until_ns
+
+
+def _ns(seconds: float) -> int:
+    return round(seconds * 1e9)

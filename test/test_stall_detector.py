@@ -55,6 +55,49 @@ def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
     assert not standstill.outlived_by(wall_ns(103.5), 103.5)
 
 
+def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
+    """Ran until ``begin``, and again from ``end`` on."""
+    standstill.passed(begin, wall_ns(begin))
+    standstill.begun(end)
+    standstill.passed(end, wall_ns(end))
+
+
+def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
+    """A computer that is this busy stalls the driver again before a retransmission brings it."""
+    standstill = resumed(3.0)
+    stalls_again(standstill, 103.4, 103.9)
+    stalls_again(standstill, 105.5, 106.2)
+    standstill.passed(106.6, wall_ns(106.6))
+    for sent in (102.99, 103.3, 103.6, 106.1):
+        assert not standstill.outlived_by(wall_ns(sent), 106.6), sent
+    assert standstill.outlived_by(wall_ns(106.55), 106.6)
+    standstill.passed(116.2, wall_ns(116.2))
+    assert standstill.outlived_by(wall_ns(106.1), 116.2)
+
+
+def test_a_standstill_long_ago_is_forgotten() -> None:
+    """What was sent then has come, or never will."""
+    standstill = resumed(3.0)
+    stalls_again(standstill, 200.0, 201.0)
+    standstill.passed(201.3, wall_ns(201.3))
+    assert not standstill.outlived_by(wall_ns(200.5), 201.3)
+    assert standstill.outlived_by(wall_ns(102.0), 201.3)
+
+
+def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() -> None:
+    """It lay in a queue when the driver stalled, and is taken long after the end."""
+    standstill = resumed(3.0)
+    standstill.passed(103.4, wall_ns(103.4))
+    assert not standstill.outlived_by(wall_ns(99.9), 103.4)
+
+
+def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
+    """Its sender's clock is not known more precisely than its fastest message."""
+    standstill = resumed(3.0)
+    standstill.passed(103.4, wall_ns(103.4))
+    assert not standstill.outlived_by(wall_ns(103.001), 103.4)
+
+
 def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
     """However late a retransmission brings it; later than ten seconds none does."""
     standstill = resumed(5.0)
