@@ -100,7 +100,8 @@ def imports(file: Path) -> Iterator[str]:
 def third_party(files: Iterable[Path]) -> set[str]:
     """Return the rosdep keys of what the files import from outside Python and this repository."""
     files = list(files)
-    own = {PACKAGE} | {file.stem for file in files}  # tests import their helpers by bare name
+    own = {PACKAGE}  # tests import their helpers by bare name
+    own |= {file.stem for file in files} | {"toys"}
     own |= FROM_PIP
     top_level = {name.partition(".")[0] for file in files for name in imports(file)}
     return {ROSDEP_KEYS.get(name, name) for name in top_level - sys.stdlib_module_names - own}
