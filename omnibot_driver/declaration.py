@@ -60,7 +60,7 @@ def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, p
         )
     if unread:
         nearest = [
-            f"{name} (the nearest that is: {parameters.nearest(name, table.calibrated)})"
+            f"{name} (the nearest that is: {parameters.nearest(name, table.calibrated or [name])})"
             for name in unread
         ]
         node.get_logger().warning(

@@ -11,6 +11,7 @@ one thing after the other, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``.
 """
 
 import contextlib
+import errno
 import os
 import select
 import signal
@@ -26,6 +27,9 @@ LIMIT_S = 0.5
 """Without a heartbeat for so long the driver hangs."""
 TIMES = 20
 PACE_S = 0.05
+
+GONE = (errno.EBADF, errno.EIO, errno.ENODEV, errno.ENXIO, errno.EPIPE)
+"""Errors of a line that takes nothing any more."""
 
 DRIVER = 0
 
@@ -66,10 +70,9 @@ def speak(last_words: Words, until: list[int]) -> None:
                     os.write(line, data)
             except BlockingIOError:
                 drop_what_waits(line)
-            except ConnectionRefusedError:
-                pass  # a datagram that nothing listened for; the next one may be heard
-            except OSError:
-                lines.discard(line)  # gone
+            except OSError as error:
+                if error.errno in GONE:
+                    lines.discard(line)  # else a datagram was lost; the next one may be heard
         if not lines or select.select(until, [], [], PACE_S)[0]:
             return
 

@@ -328,7 +328,8 @@ class Link:
                 self._write(self._session.shutdown_sequence(self._on_exit, time.monotonic()))
             else:  # Stop, right behind whatever is out of the kernel's reach
                 port.write_if_room(self._session.broken_off())
-            stopped = self._stands if self._closing.is_set() else comes_back
+            lines = len(port.descriptors or ())  # of several, some may be there to be stopped
+            stopped = self._stands if self._closing.is_set() else comes_back and lines < 2
             keeper, self._port, self._keeper = self._keeper, None, None
             self._session.closed(time.monotonic())
             self._settle()

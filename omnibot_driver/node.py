@@ -59,7 +59,7 @@ class OmniBotDriver(Node):
             parameters.session_settings(self._values, self._profile.kinematics(self._values)),
             run=self._values.get("auto_start", True),
             axis_signs=tuple(self._values["axis_signs"]),
-            control=self._values.get("control_method", "velocity"),
+            control=self._values.get("control_method"),
             obeys=not is_recording(port),
         )
         settings = self._message_settings()

@@ -39,7 +39,7 @@ from omnibot_driver.core.settings import SessionSettings
 class Session:
     """``run``: whether the board is to be started whenever it is there; ``axis_signs``: 1 or -1 for
     x, y and yaw where the board's body axes are not REP-103's, for commands and odometry alike;
-    ``control``: where the board's switch stands, which no board tells; ``obeys``: whether the robot
+    ``control``: where the board's switch stands, which no board tells; None where it has none; ``obeys``: whether the robot
     can be expected to do what it is told here, which a recorded one was not.
     """
 
@@ -50,7 +50,7 @@ class Session:
         *,
         run: bool,
         axis_signs: Signs = (1, 1, 1),
-        control: ControlMethod = "velocity",
+        control: ControlMethod | None = "velocity",
         obeys: bool = True,
     ) -> None:
         self._board = board
@@ -296,14 +296,15 @@ class Session:
         """What to write now; it counts as written."""
         if self._mode_manager.phase is CLOSED:
             return NO_PACKETS
-        packets = self._board.due(now) if now >= self._board.wake_at else NO_PACKETS
+        packets = NO_PACKETS
         if self._mode_manager.output:
-            said = self._mode_manager.take_output()
-            self._commanding.wrote(said, now)
-            packets += said
+            packets = self._mode_manager.take_output()
+            self._commanding.wrote(packets, now)
         if due := self._commands.due(now):
             self._commanding.said(now)
             packets += due
+        if now >= self._board.wake_at:
+            packets += self._board.due(now)
         if self._commands.unconfirmed:
             self._commands.unconfirmed = False
             self._reporter.unconfirmed()

@@ -121,6 +121,9 @@ def table(
         },
         **(changed or {}),
     }
+    common = {row.name for rows in COMMON.values() for row in rows}
+    if unknown := {*without, *changes} - common:
+        raise ValueError(f"these are no common parameters: {', '.join(sorted(unknown))}")
     sections = {
         title: tuple(
             replace(row, **changes.get(row.name, {}))

@@ -187,8 +187,9 @@ def _write_whole(descriptor: int, data: bytes) -> None:
         data = data[written:]
         if not data:
             return
-        left_s = max(0.0, until - time.monotonic())
-        if not select.select([], [descriptor], [], left_s)[1]:
+        room = select.poll()
+        room.register(descriptor, select.POLLOUT)
+        if not room.poll(max(0.0, 1e3 * (until - time.monotonic()))):
             raise TimeoutError(f"it takes no more bytes for {WRITE_TIMEOUT_S:g} s")
 
 

@@ -8,7 +8,7 @@ A line that is lost or takes nothing keeps none of the others from being read or
 import contextlib
 import os
 import select
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.packets import Packet, Packets
@@ -18,19 +18,25 @@ from omnibot_driver.transports import READ_TIMEOUT_S, Transport
 class Several:
     """A ``Transport`` of lines of one channel each that can be waited for together."""
 
-    def __init__(self, openers: Sequence[Callable[[], Transport]]) -> None:
+    def __init__(self, openers: Sequence[Callable[[], Transport]], stop: Packets = ()) -> None:
+        """``stop``: what those that are open are told while another cannot be opened."""
         self._lines: list[Transport] = []
-        self._wakes, self._wake = os.pipe()
-        self._arrivals = select.poll()
-        self._arrivals.register(self._wakes, select.POLLIN)
         self._channels: dict[int, int] = {}
+        self._ready: list[int] = []
+        self._wakes = self._wake = -1
+        self._arrivals = select.poll()
         try:
+            self._wakes, self._wake = os.pipe()
+            self._arrivals.register(self._wakes, select.POLLIN)
             for opener in openers:
                 self._add(opener())
-        except LinkError:
+        except BaseException as error:
+            with contextlib.suppress(LinkError):
+                self.write(stop)
             self.close()
+            if isinstance(error, OSError):
+                raise LinkError(f"cannot open a line: {error.strerror or error}") from error
             raise
-        self._ready: list[int] = []
 
     @property
     def descriptors(self) -> tuple[int, ...] | None:
@@ -64,20 +70,18 @@ class Several:
     def write(self, packets: Packets) -> None:
         """To each line what is its own."""
         failed: LinkError | None = None
-        for channel, line in enumerate(self._lines):
-            if own := tuple((0, data) for other, data in packets if other == channel):
-                try:
-                    line.write(own)
-                except LinkError as error:
-                    failed = failed or error
+        for line, own in self._shared_out(packets):
+            try:
+                line.write(own)
+            except LinkError as error:
+                failed = failed or error
         if failed is not None:
             raise failed
 
     def write_if_room(self, packets: Packets) -> None:
         """To each line what is its own."""
-        for channel, line in enumerate(self._lines):
-            if own := tuple((0, data) for other, data in packets if other == channel):
-                line.write_if_room(own)
+        for line, own in self._shared_out(packets):
+            line.write_if_room(own)
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread."""
@@ -92,6 +96,13 @@ class Several:
             if descriptor >= 0:
                 os.close(descriptor)
         self._lines, self._wakes, self._wake = [], -1, -1
+
+    def _shared_out(self, packets: Packets) -> Iterator[tuple[Transport, Packets]]:
+        """To each line that is open its own, the first to be written to first."""
+        for channel in dict.fromkeys(channel for channel, _ in packets):
+            if channel < len(self._lines):
+                own = tuple((0, data) for other, data in packets if other == channel)
+                yield self._lines[channel], own
 
     def _add(self, line: Transport) -> None:
         self._lines.append(line)

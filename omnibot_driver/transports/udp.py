@@ -2,11 +2,14 @@
 
 """Datagrams to one host: ``udp://host:port``, each further channel one port higher.
 
-A packet is one datagram. Only what comes from the address that is written to is heard. Nothing is
-lost in silence: a host whose port is closed answers that, and it is a LinkError.
+A packet is one datagram. Only what comes from the address that is written to is heard. A host that
+is away, or where nothing listens, is silent like a board without power: it may be back with the
+next datagram, so the sockets stay open.
 """
 
 import contextlib
+import errno
+import math
 import os
 import select
 import socket
@@ -20,6 +23,8 @@ from omnibot_driver.transports import READ_TIMEOUT_S, WRITE_TIMEOUT_S
 
 SCHEME: Final = "udp://"
 LARGEST: Final = 65_536
+NOBODY: Final = (errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.EHOSTDOWN)
+"""What the network says of a datagram that reached nobody."""
 
 
 class UdpPorts:
@@ -29,23 +34,23 @@ class UdpPorts:
     overruns = None
 
     def __init__(self, url: str, channels: int = 1) -> None:
-        self._url = url
         self._host, self._port = _place(url, channels)
         self._sockets: list[socket.socket] = []
-        self._wakes, self._wake = os.pipe()
+        self._wakes = self._wake = -1
         try:
-            for number in range(channels):
-                self._sockets.append(self._connected(self._port + number))
-        except OSError as error:
+            self._wakes, self._wake = os.pipe()
+            self._connect(channels)
+        except (OSError, ValueError) as error:  # a name that cannot be one is a ValueError
             self.close()
+            reason = getattr(error, "strerror", None) or error
             raise LinkError(
-                f"cannot reach {url}: {error.strerror or error}; check the parameter `port` and"
-                " the network"
+                f"cannot reach {url}: {reason}; check the parameter `port` and the network"
             ) from error
         self._arrivals = select.poll()
         self._channels = {ours.fileno(): number for number, ours in enumerate(self._sockets)}
         for descriptor in (self._wakes, *self._channels):
             self._arrivals.register(descriptor, select.POLLIN)
+        self._ready: list[int] = []
 
     @property
     def descriptors(self) -> tuple[int, ...] | None:
@@ -53,19 +58,22 @@ class UdpPorts:
         return tuple(ours.fileno() for ours in self._sockets)
 
     def read(self) -> Packet:
-        """One datagram."""
-        for ready, _ in self._arrivals.poll(1e3 * READ_TIMEOUT_S):
-            if ready == self._wakes:
-                os.read(ready, 1000)
-                break
-            channel = self._channels[ready]
-            try:
-                return channel, self._sockets[channel].recv(LARGEST)
-            except BlockingIOError:
-                continue
-            except OSError as error:
-                raise self._lost(channel, error) from error
-        return 0, b""
+        """One datagram; the channels take turns."""
+        if not self._ready:
+            self._ready = [ready for ready, _ in self._arrivals.poll(1e3 * READ_TIMEOUT_S)]
+        if not self._ready:
+            return 0, b""
+        ready = self._ready.pop()
+        if ready == self._wakes:
+            os.read(ready, 1000)
+            return 0, b""
+        channel = self._channels[ready]
+        try:
+            return channel, self._sockets[channel].recv(LARGEST)
+        except OSError as error:
+            if _is_silence(error):
+                return 0, b""
+            raise self._lost(channel, error) from error
 
     def write(self, packets: Packets) -> None:
         """Each a datagram."""
@@ -75,7 +83,8 @@ class UdpPorts:
             try:
                 self._send(channel, data, until)
             except OSError as error:
-                failed = failed or self._lost(channel, error)
+                if not _is_silence(error):
+                    failed = failed or self._lost(channel, error)
         if failed is not None:
             raise failed
 
@@ -83,7 +92,7 @@ class UdpPorts:
         """Those that are taken at once."""
         for channel, data in packets:
             with contextlib.suppress(OSError):
-                self._sockets[channel].send(data)
+                self._send(channel, data, until=-math.inf)
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread."""
@@ -99,38 +108,43 @@ class UdpPorts:
                 os.close(descriptor)
         self._sockets, self._wakes, self._wake = [], -1, -1
 
-    def _connected(self, port: int) -> socket.socket:
-        family, kind, protocol, _, address = socket.getaddrinfo(
-            self._host, port, type=socket.SOCK_DGRAM
+    def _connect(self, channels: int) -> None:
+        """All to one address, whatever others the name has."""
+        family, kind, protocol, _, (address, _, *rest) = socket.getaddrinfo(
+            self._host, self._port, type=socket.SOCK_DGRAM
         )[0]
-        ours = socket.socket(family, kind, protocol)
-        try:
-            ours.connect(address)
-        except OSError:
-            ours.close()
-            raise
-        ours.setblocking(False)
-        return ours
+        for number in range(channels):
+            ours = socket.socket(family, kind, protocol)
+            self._sockets.append(ours)
+            ours.connect((address, self._port + number, *rest))
+            ours.setblocking(False)
 
     def _send(self, channel: int, data: bytes, until: float) -> None:
+        ours = self._sockets[channel]
+        may_be_stale = True
         while True:
             try:
-                self._sockets[channel].send(data)
+                ours.send(data)
             except BlockingIOError:
-                left_s = max(0.0, until - time.monotonic())
-                if not select.select([], [self._sockets[channel]], [], left_s)[1]:
+                room = select.poll()
+                room.register(ours, select.POLLOUT)
+                if not room.poll(max(0.0, 1e3 * (until - time.monotonic()))):
                     raise TimeoutError(f"it takes nothing for {WRITE_TIMEOUT_S:g} s") from None
+            except OSError as error:
+                if not (may_be_stale and _is_silence(error)):
+                    raise
+                may_be_stale = False  # of a datagram before; this one was not sent
             else:
                 return
 
     def _lost(self, channel: int, error: OSError) -> LinkError:
         place = f"{SCHEME}{self._host}:{self._port + channel}"
-        if isinstance(error, ConnectionRefusedError):
-            return LinkError(
-                f"nothing listens at {place}: start the controller there, or check the parameter"
-                " `port`"
-            )
         return LinkError(f"lost {place}: {error.strerror or error}; check the network")
+
+
+def _is_silence(error: OSError) -> bool:
+    """Whether nothing was there to hear or to be heard, as when a controller is restarted."""
+    return isinstance(error, BlockingIOError) or error.errno in NOBODY
 
 
 def _place(url: str, channels: int) -> tuple[str, int]:
@@ -138,7 +152,8 @@ def _place(url: str, channels: int) -> tuple[str, int]:
         parts = urlsplit(url)
         host, port = parts.hostname, parts.port
         fits = port is not None and port > 0 and port + channels <= 65_536
-        if parts.scheme == "udp" and host and port and fits and not (parts.path or parts.query):
+        more = parts.path or parts.query or parts.fragment or parts.username is not None
+        if parts.scheme == "udp" and host and port and fits and not more:
             return host, port
     except ValueError:
         pass

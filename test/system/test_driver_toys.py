@@ -5,7 +5,9 @@
 Nothing of the driver knows them but through the profile that a name leads to.
 """
 
+import os
 import signal
+import tty
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -178,7 +180,30 @@ def test_one_of_two_lines_that_is_missing_is_named(start_driver: Start, stack: E
     driver.wait_for_line("/dev/no-such-port does not exist")
 
 
-def test_a_host_that_does_not_answer_is_named(start_driver: Start, stack: ExitStack) -> None:
+def test_a_host_that_does_not_answer_is_told(start_driver: Start) -> None:
     """Nothing listens there."""
     driver = start_driver("udp://127.0.0.1:9", before=TOYS, board="request_board")
-    driver.wait_for_line("nothing listens at udp://127.0.0.1:")
+    driver.wait_for_line("nothing comes from the board for 1.5 s")
+
+
+def test_a_line_that_is_lost_leaves_the_robot_standing(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """The guard repeats the stop on the line that is there."""
+    toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
+    far, near = os.openpty()
+    stack.callback(os.close, near)
+    tty.setraw(near)
+    toy.ports["sense_port"] = os.ttyname(near)
+    driver = start_toy(start_driver, toy)
+    probe: Probe = probe_of(driver)
+    talker = probe.node.create_timer(0.1, lambda: os.write(far, b"d 0 0\n"))
+    probe.wait_for_state("nominal")
+    with driven(probe, toy):
+        with toy.served.lock:
+            mark = len(toy.served.board.heard)
+        probe.remove(talker)
+        os.close(far)
+        driver.wait_for_line("lost .* while")
+        toy.wait_for(lambda robot: robot.heard[mark:].count(b"v 0 0") >= 20)
+        toy.comes_to_a_stand()

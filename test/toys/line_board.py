@@ -27,6 +27,7 @@ from omnibot_driver.transports.several import Several
 
 PERIOD_S = 0.4
 WHEELS = DifferentialKinematics(wheel_radius_m=0.1, track_m=0.4)
+STOP = packed(b"v 0 0\n")
 LINE = re.compile(rb"d (-?\d+) (-?\d+)")
 
 
@@ -63,7 +64,7 @@ class LineBoard(Board):
         return packed(b"\n") + self.stop()
 
     def stop(self) -> Packets:
-        return packed(b"v 0 0\n")
+        return STOP
 
     def encode(self, order: Order) -> Packets:
         rates: tuple[float, ...] = (0.0, 0.0)
@@ -103,7 +104,7 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Transport]:
     paths = values["port"], values["sense_port"]
-    return partial(Several, [partial(SerialPort, path, 115200) for path in paths])
+    return partial(Several, [partial(SerialPort, path, 115200) for path in paths], STOP)
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:

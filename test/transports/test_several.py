@@ -100,9 +100,13 @@ def test_a_read_that_waits_can_be_ended(lines: Several) -> None:
 
 
 def test_where_one_cannot_be_opened_none_is_kept(ends: Ends) -> None:
-    """The sentence is of the one that cannot."""
+    """The sentence is of the one that cannot; the other one is stopped."""
+    before = len(os.listdir("/proc/self/fd"))
+    paths = ends.paths[0], "/dev/no-such"
     with pytest.raises(LinkError, match="/dev/no-such does not exist"):
-        Several([partial(SerialPort, path, 115200) for path in (ends.paths[0], "/dev/no-such")])
+        Several([partial(SerialPort, path, 115200) for path in paths], ((0, b"stop"), (1, b"x")))
+    assert os.read(ends.far[0], 99) == b"stop"
+    assert len(os.listdir("/proc/self/fd")) == before
     with contextlib.closing(SerialPort(ends.paths[0], 115200)):
         pass
 

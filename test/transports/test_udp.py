@@ -2,6 +2,7 @@
 
 """Datagrams on the loopback: a packet each way is one datagram of its channel."""
 
+import os
 import socket
 import threading
 import time
@@ -87,20 +88,30 @@ def test_what_comes_from_another_address_is_not_heard(host: Host, transport: Udp
     assert next_packet(transport) == (0, b"true")
 
 
-def talk(transport: UdpPorts) -> None:
-    for _ in range(100):
-        transport.write(((0, b"hello"), (1, b"halt")))
-        transport.read()
-
-
-def test_a_port_where_nothing_listens_is_named_with_what_to_do(
+def test_a_host_that_is_away_is_silent_and_hears_the_first_datagram_when_it_is_back(
     host: Host, transport: UdpPorts
 ) -> None:
-    """The other one is still written to."""
+    """What the network says of the one before is no reason not to send this one."""
+    address = host.ports[0].getsockname()
     host.ports[0].close()
-    with pytest.raises(LinkError, match=rf"listens at {host.url}: start the controller"):
-        talk(transport)
+    transport.write(((0, b"hello"), (1, b"halt")))
     assert host.ports[1].recv(99) == b"halt"
+    with socket.socket(type=socket.SOCK_DGRAM) as again:
+        again.bind(address)
+        again.settimeout(PATIENCE_S)
+        transport.write(((0, b"stop"),))
+        assert again.recv(99) == b"stop"
+    assert transport.read() == (0, b"")
+
+
+def test_the_channels_take_turns(host: Host, transport: UdpPorts) -> None:
+    """One that never ceases starves no other."""
+    transport.write(((0, b"hello"), (1, b"hello")))
+    drivers = [port.recvfrom(99)[1] for port in host.ports]
+    for _ in range(9):
+        host.ports[0].sendto(b"again", drivers[0])
+    host.ports[1].sendto(b"once", drivers[1])
+    assert (1, b"once") in [next_packet(transport) for _ in range(3)]
 
 
 def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
@@ -111,7 +122,7 @@ def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
 
 @pytest.mark.parametrize(
     "url",
-    ["udp://", "udp://host", "udp://:5000", "udp://h:5000/x", "tcp://h:5000", "udp://h:65535"],
+    ["udp://", "udp://host", "udp://:5000", "udp://h:5000/x", "tcp://h:5000", "udp://h:65535", "udp://u@h:5000"],
 )
 def test_a_url_that_means_no_place_is_refused(url: str) -> None:
     """With the form that it must have; the stop port is one higher."""
@@ -119,7 +130,10 @@ def test_a_url_that_means_no_place_is_refused(url: str) -> None:
         UdpPorts(url, 2)
 
 
-def test_a_host_that_is_not_known_is_refused() -> None:
-    """Whatever the resolver says of it."""
+@pytest.mark.parametrize("name", ["no-such-host.invalid", "robot..local", 64 * "a"])
+def test_a_host_that_is_not_known_is_refused(name: str) -> None:
+    """Whatever the resolver says of it; no descriptor stays open."""
+    before = len(os.listdir("/proc/self/fd"))
     with pytest.raises(LinkError, match="check the parameter `port`"):
-        UdpPorts("udp://no-such-host.invalid:5000", 2)
+        UdpPorts(f"udp://{name}:5000", 2)
+    assert len(os.listdir("/proc/self/fd")) == before

@@ -46,7 +46,7 @@ class CommandPipeline:
         odometry: Odometry,
         settings: SessionSettings,
         axis_signs: Signs,
-        control: ControlMethod,
+        control: ControlMethod | None,
         *,
         obeys: bool,
     ) -> None:

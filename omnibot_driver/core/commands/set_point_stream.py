@@ -75,9 +75,8 @@ class SetpointStream:
 
     def wrote(self, packets: Packets, now: float) -> None:
         """Some begin with Stop. What others left of a motion frame is completed: say it again."""
-        (channel, stop), *_ = self._stop
-        first, data = packets[0]
-        if first == channel and data.startswith(stop):
+        first = dict(reversed(packets))
+        if all(first.get(channel, b"").startswith(stop) for channel, stop in self._stop):
             self._note_stop(now)
             if self._standing is not EMERGENCY_STOP:
                 self._urgent = False

@@ -38,7 +38,7 @@ class CommandShaper:
         odometry: Odometry,
         limits: SpeedLimits,
         axis_signs: Signs,
-        control: ControlMethod,
+        control: ControlMethod | None,
     ) -> None:
         self.limits = limits
         self._board, self._actuator, self._odometry = board, actuator, odometry
@@ -81,7 +81,7 @@ class CommandShaper:
 
     def pose(self, goal: Pose) -> Setpoint:
         """Drive to a pose in the odometry frame and stay there."""
-        if self._control != "position":
+        if self._control == "velocity":
             raise self._at_odds(Authority.POSE)
         require_finite("cmd_pose", (goal.x_m, goal.y_m, goal.yaw_rad))
         place = self._odometry.in_board_frame(goal)
