@@ -195,10 +195,12 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     link = link_to(board.path, listener, ours)
     link.start()
     listener.wait_for(lambda: ours.state == "nominal")
-    link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
     drive = partial(link.command, Session.command_twist, BodyTwist(0.2, 0.0, 0.0))
-    drive([time.time_ns()])
-    assert board.wait_for(lambda b: b.driven, PATIENCE_S)
+    for _ in range(20):  # a machine that hangs is another standstill
+        if obeyed(lambda: drive([time.time_ns()])) and board.wait_for(lambda b: b.driven, 0.3):
+            break
+    else:
+        raise AssertionError("it does not drive")
     hold, held = threading.Event(), threading.Event()
 
     def hang(_session: Session, _now: float) -> None:
@@ -236,13 +238,14 @@ def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.M
     listener.wait_for(lambda: ours.state == "nominal")
     drive = partial(link.command, Session.command_twist, BodyTwist(0.3, 0.0, 0.0))
     for _ in range(20):  # a machine that hangs is another standstill
-        drive([time.time_ns()])
-        if board.wait_for(lambda b: b.commands[-1].kind == "velocity", 0.3):
+        fresh = obeyed(lambda: drive([time.time_ns()]))
+        if fresh and board.wait_for(lambda b: b.commands[-1].kind == "velocity", 0.3):
             break
-    assert board.board.commands[-1].kind == "velocity"
+    else:
+        raise AssertionError("it does not drive")
     suspended_s = 3600.0
     assert board.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
-    listener.wait_for(lambda: any("for 3600." in str(event) for event in listener.events))
+    listener.wait_for(lambda: any("for 36" in str(event) for event in listener.events))
     with pytest.raises(CommandRefused, match="waited"):
         drive([time.time_ns() - 1_000_000_000])  # while it was suspended, by a clock that went on
     listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
