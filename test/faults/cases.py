@@ -287,7 +287,8 @@ def second_driver(rig: Rig) -> None:
         rig.findings.expect(
             str(rig.driver.process.pid) in said, f"the owner's pid is not in: {said}"
         )
-        rig.findings.expect(rig.line.board.driven, "the first driver was disturbed")
+        driven = rig.wait_for_board(lambda line: line.board.driven)
+        rig.findings.expect(driven, "the first driver was disturbed")
         rig.hand.leave()
         rig.expect_still(rig.line.tick, "with a second driver waiting")
 

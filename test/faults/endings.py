@@ -31,7 +31,7 @@ IN_THE_READER: Final = """
 import omnibot_driver.node as node
 from omnibot_driver.core.session import Session
 def end(self, message):
-    def hear(self, data, now):
+    def hear(self, data, now, channel):
         raise ZeroDivisionError("a defect in the reader")
     Session.hear = hear
 node.OmniBotDriver._on_estop_topic = end

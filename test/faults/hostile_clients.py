@@ -163,7 +163,7 @@ def guard_killed(rig: Rig) -> None:
     (first,) = rig.driver.guards()
     os.kill(first, signal.SIGKILL)
     assert rig.wait_for_board(lambda _: rig.driver.guards() not in ([], [first])), "no new guard"
-    rig.findings.expect(rig.line.board.driven, "the robot was stopped")
+    assert rig.wait_for_board(lambda line: line.board.driven), "the robot was stopped"
     rig.hand.leave()
     rig.expect_still(rig.line.tick, "with a new guard")
 
