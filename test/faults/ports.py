@@ -18,6 +18,7 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
+from driver_process import PATIENCE_S
 from terminal import fill
 
 from omnibot_driver.simulator.common.board import Packet
@@ -34,15 +35,26 @@ class Terminal(PtyBoard):
 
     deaf = False
 
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._heard_all = threading.Event()
+
     def _receive(self, timeout_s: float) -> Iterable[Packet]:
         if self.deaf:
             time.sleep(timeout_s)  # in its place: the pause of a board's tick
             return []
-        return super()._receive(timeout_s)
+        heard = list(super()._receive(timeout_s))
+        if not heard:
+            self._heard_all.set()
+        return heard
 
     @contextmanager
     def full(self, old: bytes) -> Iterator[None]:
-        """Deaf for so long that the kernel's buffer is full of these words."""
+        """Deaf for so long that the kernel's buffer is full of these words.
+
+        They are 20 kB. At the end the board has heard them all: how long that takes says how busy
+        this process is.
+        """
         self.deaf = True
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         fill(near, old)
@@ -50,7 +62,9 @@ class Terminal(PtyBoard):
             yield
         finally:
             os.close(near)
+            self._heard_all.clear()
             self.deaf = False
+            assert self.wait_for(lambda _: self._heard_all.is_set(), PATIENCE_S)
 
     @contextmanager
     def kept_full(self, old: bytes) -> Iterator[None]:
