@@ -51,7 +51,7 @@ class MotionInterlock:
             self._commanded_at = now
         if self.until is Until.RELEASE and (stands or silent):
             self.until = Until.NOTHING
-        return "" if stands else self.reason(timeout_s)
+        return "" if stands or self.until is Until.NOTHING else self.reason(timeout_s)
 
     def reason(self, timeout_s: float) -> str:
         """Why motion is refused, and what to do; empty while it is allowed."""
