@@ -329,7 +329,7 @@ def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
         if isinstance(node, ast.Import)
         for alias in node.names
     }
-    assert imported == {"contextlib", "os", "select", "signal", "sys", "termios"}
+    assert imported == {"contextlib", "errno", "os", "select", "signal", "sys", "termios"}
     assert not any(isinstance(node, ast.ImportFrom) for node in ast.walk(tree))
 
 

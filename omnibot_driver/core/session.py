@@ -39,8 +39,9 @@ from omnibot_driver.core.settings import SessionSettings
 class Session:
     """``run``: whether the board is to be started whenever it is there; ``axis_signs``: 1 or -1 for
     x, y and yaw where the board's body axes are not REP-103's, for commands and odometry alike;
-    ``control``: where the board's switch stands, which no board tells; None where it has none; ``obeys``: whether the robot
-    can be expected to do what it is told here, which a recorded one was not.
+    ``control``: where the board's switch stands, which no board tells; None where it has none;
+    ``obeys``: whether the robot can be expected to do what it is told here, which a recorded one
+    was not.
     """
 
     def __init__(

@@ -61,7 +61,7 @@ class Moves:
             return math.inf
         if isinstance(wanted, Stop | EmergencyStop) or wanted.is_zero:
             return self._halt_at
-        return self._board.answered_by
+        return self._board.answered_by if self._board.has_polled else math.inf
 
     def due(self, now: float) -> Packets:
         wanted = self._wanted
@@ -94,6 +94,7 @@ class RequestBoard(Board):
     def connect(self) -> None:
         self.mode, self.answered_by, self._poll_at = Mode.UNKNOWN, -math.inf, -math.inf
         self._seen_at: float | None = None
+        self.has_polled = False
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         self.answered_by = -math.inf
@@ -109,7 +110,7 @@ class RequestBoard(Board):
         self.mode = Mode.UNKNOWN
 
     def ask(self, words: bytes, now: float) -> Packets:
-        self.answered_by = now + ANSWER_S
+        self.answered_by, self.has_polled = now + ANSWER_S, words == b"WHERE"
         return packed(words)
 
     @property

@@ -122,7 +122,15 @@ def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
 
 @pytest.mark.parametrize(
     "url",
-    ["udp://", "udp://host", "udp://:5000", "udp://h:5000/x", "tcp://h:5000", "udp://h:65535", "udp://u@h:5000"],
+    [
+        "udp://",
+        "udp://host",
+        "udp://:5000",
+        "udp://h:5000/x",
+        "tcp://h:5000",
+        "udp://h:65535",
+        "udp://u@h:5000",
+    ],
 )
 def test_a_url_that_means_no_place_is_refused(url: str) -> None:
     """With the form that it must have; the stop port is one higher."""
