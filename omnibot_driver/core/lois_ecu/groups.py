@@ -1,0 +1,293 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From lines to reports of several lines: groups behind a marker, and records up to their end.
+
+A group comes out whole or not at all. A lost line makes it too short, one that stands twice or does
+not belong makes it too long or cuts it. So a group is known to be whole when something else follows
+it. It comes out with its last line already where that line does not repeat the one before (no line
+can stand twice then) and the values go on from the last group. Else it waits for the next line,
+or for ``QUIET_S`` without one.
+
+0x12 is two kinds of group, told apart by their length: ticks of 3 lines, and in the public firmware
+6 of odometry right behind them. Knows lines and arrival times, no characters.
+"""
+
+import math
+from dataclasses import dataclass
+from operator import eq
+from typing import Final
+
+from omnibot_driver.core.lois_ecu.lines import MARKER, Line, signed, to_float, unsigned_pair
+from omnibot_driver.core.lois_ecu.messages import (
+    HEADING_END,
+    HEADING_PADDING,
+    RECORD_END,
+    BoardOdometry,
+    Code,
+    GpsPosition,
+    Record,
+    RecordKind,
+    Report,
+    Ticks,
+    single_report,
+)
+from omnibot_driver.core.lois_ecu.plausibility import (
+    ClockUnit,
+    Gate,
+    TicksGate,
+    in_range,
+    odometry_gate,
+    wrapped,
+)
+
+QUIET_S: Final = 0.05
+"""Lines of a group follow each other within 1.2 ms, and a reader hands them over within this."""
+
+_LENGTHS: Final = {
+    Code.GPS_POSITION: (2,),
+    Code.TICKS: (3, 6),
+    Code.ODOMETRY: (6,),
+}
+_LONGEST: Final = 7
+_RECORD_CODES: Final = (Code.RECORD_RPM, Code.RECORD_TORQUE, Code.RECORD_HEADING)
+
+GroupReport = Ticks | BoardOdometry | GpsPosition
+
+
+@dataclass(slots=True)
+class GroupStatistics:
+    """Counts since they were made.
+
+    ``damaged_groups``: groups and records that were dropped; ``implausible``: groups that were
+    whole and cannot be true; ``unknown_lines``: right lines that say nothing.
+    """
+
+    damaged_groups: int = 0
+    implausible: int = 0
+    unknown_lines: int = 0
+
+
+class Assembler:
+    """``add`` each line, ``damage`` where characters were no line, ``rest`` while nothing comes."""
+
+    def __init__(self) -> None:
+        self.statistics = GroupStatistics()
+        self._ticks_gate = TicksGate()
+        self._odometry_gates: dict[bool, Gate[BoardOdometry]] = {
+            False: odometry_gate(),
+            True: odometry_gate(),
+        }
+        self._expected: tuple[RecordKind, int, int] | None = None
+        self._record: list[int] = []
+        self._record_code: int | None = None
+        self._record_damaged = False
+        self._code: int | None = None
+        self._payloads: list[int] = []
+        self._done = False
+        self._astray = False
+        self._after_ticks = False
+        self._appends = True
+        """Whether this board has odometry follow its ticks, as far as is known."""
+        self._at = -math.inf
+
+    @property
+    def clock_unit(self) -> ClockUnit | None:
+        """Of ``Ticks.time_counts``; None while unknown."""
+        return self._ticks_gate.unit
+
+    @property
+    def resolves_at(self) -> float:
+        """When a group that is held comes out if nothing follows it; infinity without one."""
+        return self._at + QUIET_S if self._code is not None and not self._done else math.inf
+
+    def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
+        """A record of so many samples was asked for; one that was not is dropped."""
+        self._expected = kind, left, right
+        self._begin_record(None)
+
+    def forget(self) -> None:
+        """The counters begin anew: a reset."""
+        self._ticks_gate.forget()
+        for gate in self._odometry_gates.values():
+            gate.forget()
+
+    def add(self, line: Line, now: float) -> list[Report]:
+        """The reports that this line completes."""
+        code, payload = line.command, line.payload
+        if code in _LENGTHS:
+            found = self._break_record()
+            if payload == MARKER:
+                found += self._end(now)
+                self._code, self._payloads, self._done, self._astray = code, [], False, False
+                self._at = now
+                return found
+            return found + self._value(code, payload, now)
+        found = self._end(now)
+        if code in _RECORD_CODES:
+            return found + self._sample(code, payload)
+        found += self._break_record()
+        self._astray = self._after_ticks = False
+        report = single_report(line)
+        if report is None:
+            self.statistics.unknown_lines += 1
+            return found
+        return [*found, report]
+
+    def damage(self) -> None:
+        """Characters between two lines were no line."""
+        if self._code is not None and not self._done:
+            self._drop()
+        if self._record_code is not None:
+            self._record_damaged = True
+
+    def rest(self, now: float) -> list[Report]:
+        """Nothing came until now."""
+        return self._end(now) if now >= self.resolves_at else []
+
+    def finish(self, now: float) -> list[Report]:
+        """The line is closed."""
+        return self._end(now) + self._break_record()
+
+    # Groups
+
+    def _value(self, code: int, payload: int, now: float) -> list[Report]:
+        if code != self._code:
+            found = self._end(now)
+            if not self._astray:
+                self.statistics.damaged_groups += 1
+            self._astray, self._after_ticks = True, code == Code.TICKS
+            return found
+        self._at = now
+        if self._done:  # it was longer than it seemed
+            self._drop()
+            return []
+        if len(self._payloads) < _LONGEST:
+            self._payloads.append(payload)
+        if len(self._payloads) not in _LENGTHS[Code(code)]:
+            return []
+        repeated = any(map(eq, self._payloads, self._payloads[1:]))
+        if repeated or (self._after_ticks and self._appends and len(self._payloads) == 3):
+            return []
+        group = _group(code, self._payloads)
+        if group is None or not in_range(group) or not self._goes_on(group, now):
+            return []
+        self._done = True
+        return self._believed(group, now)
+
+    def _end(self, now: float) -> list[Report]:
+        """What was begun is over."""
+        code = self._code
+        if code is None:
+            return []
+        self._code = None
+        was_after_ticks, self._after_ticks = self._after_ticks, False
+        if code == Code.TICKS:
+            self._after_ticks = 0 < len(self._payloads) < 4 and not was_after_ticks
+        if self._done:
+            return []
+        group = _group(code, self._payloads)
+        if group is None:
+            self.statistics.damaged_groups += 1
+            return []
+        if isinstance(group, Ticks) and was_after_ticks:
+            if self._appends and not self._ticks_gate.would_pass(group, self._at):
+                self.statistics.damaged_groups += 1  # more likely half an odometry
+                return []
+            self._appends = False
+        if not in_range(group):
+            self.statistics.implausible += 1
+            return []
+        return self._believed(group, self._at)
+
+    def _drop(self) -> None:
+        self.statistics.damaged_groups += 1
+        self._after_ticks = self._code == Code.TICKS and not self._after_ticks
+        self._code, self._astray = None, True
+
+    def _goes_on(self, group: GroupReport, now: float) -> bool:
+        match group:
+            case Ticks():
+                return self._ticks_gate.would_pass(group, now)
+            case BoardOdometry():
+                return self._odometry_gates[group.appended].would_pass(group, now)
+        return False  # one fix says little of the next
+
+    def _believed(self, group: GroupReport, now: float) -> list[Report]:
+        match group:
+            case Ticks():
+                passes = self._ticks_gate.passes(group, now)
+            case BoardOdometry():
+                passes = self._odometry_gates[group.appended].passes(group, now)
+            case _:
+                passes = True
+        if not passes:
+            self.statistics.implausible += 1
+            return []
+        self._appends |= isinstance(group, BoardOdometry) and group.appended
+        return [group]
+
+    # Records
+
+    def _begin_record(self, code: int | None) -> None:
+        self._record, self._record_code, self._record_damaged = [], code, False
+
+    def _break_record(self) -> list[Report]:
+        """Something else came before its end."""
+        if self._record_code is not None:
+            self.statistics.damaged_groups += 1
+            self._begin_record(None)
+        return []
+
+    def _sample(self, code: int, payload: int) -> list[Report]:
+        if self._record_code is None:
+            self._begin_record(code)
+        self._record_damaged |= code != self._record_code
+        if payload != (HEADING_END if code == Code.RECORD_HEADING else RECORD_END):
+            if self._expected is None or len(self._record) >= max(self._expected[1:]):
+                self._record_damaged = True
+            else:
+                self._record.append(payload)
+            return []
+        record = None if self._record_damaged else self._whole_record(code)
+        self._begin_record(None)
+        if record is None:
+            self.statistics.damaged_groups += 1
+            return []
+        self._expected = None
+        return [record]
+
+    def _whole_record(self, code: int) -> Record | None:
+        if self._expected is None:
+            return None
+        kind, left, right = self._expected
+        if (kind is RecordKind.HEADING) != (code == Code.RECORD_HEADING):
+            return None
+        if kind is RecordKind.RPM and code == Code.RECORD_TORQUE:
+            return None
+        pairs = [unsigned_pair(payload) for payload in self._record]
+        if kind is RecordKind.HEADING:
+            headings = [signed(word) for pair in pairs for word in pair]
+            padding = headings[left:]
+            if len(headings) != left + left % 2 or padding not in ([], [HEADING_PADDING]):
+                return None
+            if not all(-180 <= heading < 360 for heading in headings[:left]):
+                return None
+            return Record(kind, tuple(headings[:left]), ())
+        if len(pairs) != max(left, right):
+            return None
+        lefts, rights = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+        return Record(kind, tuple(lefts[:left]), tuple(rights[:right]))
+
+
+def _group(code: int, payloads: list[int]) -> GroupReport | None:
+    if len(payloads) not in _LENGTHS[Code(code)]:
+        return None
+    if len(payloads) == 3:
+        time_counts, left, right = payloads
+        return Ticks(time_counts, wrapped(left), wrapped(right))
+    numbers = [to_float(payload) for payload in payloads]
+    if code == Code.GPS_POSITION:
+        return GpsPosition(*numbers)
+    x_m, y_m, yaw_rad, dx_mps, dy_mps, yaw_rate_radps = numbers
+    appended = code == Code.TICKS
+    return BoardOdometry(x_m, y_m, yaw_rad, dx_mps, dy_mps, yaw_rate_radps, appended)

@@ -1,0 +1,105 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""One line of the protocol: a command byte and 32 bits of payload, as ASCII hex with a checksum.
+
+``:<command><payload><checksum>\\n``, 14 characters. The checksum is the XOR of the first eleven
+characters. The board can be set to expect lines without it (12 characters); it sends it always.
+This module knows the layout only, not what a command means.
+"""
+
+import re
+import struct
+from functools import reduce
+from operator import xor
+from typing import Final
+
+from omnibot_driver.core.errors import FrameError
+from omnibot_driver.core.values import value
+
+BEGIN: Final = b":"
+END: Final = b"\n"
+LENGTH: Final = 14
+LENGTH_WITHOUT_SUM: Final = 12
+MARKER: Final = 0xFFFFFFFF
+"""Payload of the line that begins a group."""
+
+_SUMMED: Final = 11
+_HEX: Final = re.compile(rb":[0-9a-fA-F]+\n").fullmatch
+_FLOAT: Final = struct.Struct(">f")
+_WORD: Final = struct.Struct(">I")
+
+
+@value(frozen=True, slots=True)
+class Line:
+    """``command`` 0..255, ``payload`` 0..2³²-1."""
+
+    command: int
+    payload: int
+
+
+def checksum(text: bytes) -> int:
+    """XOR of the characters of a line before its checksum."""
+    return reduce(xor, text[:_SUMMED], 0)
+
+
+def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
+    """The characters of one line. Raises FrameError when a value does not fit."""
+    if not (0 <= command <= 0xFF and 0 <= payload <= MARKER):
+        raise FrameError(f"command {command} with payload {payload} does not fit a line")
+    text = b":%02x%08x" % (command, payload)
+    return b"%s%02x\n" % (text, checksum(text)) if with_sum else text + END
+
+
+def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
+    """The line that these characters are, from ``:`` to the line feed; None if they are none.
+
+    A carriage return before the line feed is accepted. Without ``sum_required`` a line may also
+    have no checksum; a checksum that is there must be right in any case.
+    """
+    if text.endswith(b"\r\n"):
+        text = text[:-2] + END
+    if not _HEX(text):
+        return None
+    if len(text) == LENGTH:
+        if int(text[_SUMMED:-1], 16) != checksum(text):
+            return None
+    elif sum_required or len(text) != LENGTH_WITHOUT_SUM:
+        return None
+    return Line(int(text[1:3], 16), int(text[3:_SUMMED], 16))
+
+
+def from_pair(left: int, right: int) -> int:
+    """Payload of two words, each signed or unsigned. Raises FrameError when one does not fit."""
+    if not (-0x8000 <= left <= 0xFFFF and -0x8000 <= right <= 0xFFFF):
+        raise FrameError(f"{left} and {right} do not fit two words of 16 bits")
+    return (left & 0xFFFF) << 16 | right & 0xFFFF
+
+
+def unsigned_pair(payload: int) -> tuple[int, int]:
+    """High and low word."""
+    return payload >> 16, payload & 0xFFFF
+
+
+def signed(word: int) -> int:
+    """A word of 16 bits in two's complement."""
+    return word - 0x10000 if word & 0x8000 else word
+
+
+def signed_pair(payload: int) -> tuple[int, int]:
+    """High and low word in two's complement."""
+    return signed(payload >> 16), signed(payload & 0xFFFF)
+
+
+def from_float(number: float) -> int:
+    """Payload of a float32. Raises FrameError when it is too large for one."""
+    try:
+        (payload,) = _WORD.unpack(_FLOAT.pack(number))
+    except OverflowError as error:
+        raise FrameError(f"{number} does not fit a float32") from error
+    return int(payload)
+
+
+def to_float(payload: int) -> float:
+    """A float32; may be NaN or infinite."""
+    (number,) = _FLOAT.unpack(_WORD.pack(payload))
+    return float(number)

@@ -1,0 +1,156 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Whether a group of lines that is whole can be true: its ranges, and the way from the one before.
+
+A group that is not reachable from the last one is kept aside. If the next one is reachable from it,
+the board has begun anew (a restart, a reset), and that next one is accepted. Knows values and
+arrival times, no lines.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Final, Generic, Literal, TypeVar
+
+from omnibot_driver.core.lois_ecu.messages import BoardOdometry, GpsPosition, Ticks
+
+FASTEST_TICKS_PER_S: Final = 300.0
+"""Five turns of a wheel with 60 ticks: six times what the firmware commands."""
+TICKS_MARGIN: Final = 30
+FASTEST_MPS: Final = 5.0
+FASTEST_RADPS: Final = 20.0
+POSE_MARGIN_M: Final = 0.5
+POSE_MARGIN_RAD: Final = 1.0
+FARTHEST: Final = 1e5
+"""Neither m nor rad of a robot on one charge."""
+LATEST_S: Final = 0.3
+"""A group may arrive so much later than it was sent."""
+SLOWEST_CLOCK: Final = 0.5
+"""Part of the time that the board's clock counts at least; it stands still while it sends."""
+SURE_AFTER: Final = 2
+"""So many further steps of a clock in one unit, and it has that unit."""
+LEARNT_FROM_S: Final = 0.15
+"""Arrival tells the length of shorter steps badly."""
+
+ClockUnit = Literal["ms", "ns"]
+
+_WRAP: Final = 1 << 32
+_HALF: Final = 1 << 31
+
+Group = TypeVar("Group")
+
+
+def wrapped(difference: int) -> int:
+    """Of two counters of 32 bits: -2³¹..2³¹-1."""
+    return (difference + _HALF) % _WRAP - _HALF
+
+
+class Gate(Generic[Group]):
+    """``reachable(before, after, duration_s)`` says whether one can follow the other."""
+
+    def __init__(self, reachable: Callable[[Group, Group, float], bool]) -> None:
+        self._reachable = reachable
+        self._last: tuple[Group, float] | None = None
+        self._aside: tuple[Group, float] | None = None
+
+    def passes(self, group: Group, now: float) -> bool:
+        """Whether to believe it."""
+        aside = self._aside
+        if self._last is not None and not self.would_pass(group, now):
+            if aside is None or not self._reachable(aside[0], group, now - aside[1]):
+                self._aside = group, now
+                return False
+            self._begins_anew()
+        self._last, self._aside = (group, now), None
+        return True
+
+    def would_pass(self, group: Group, now: float) -> bool:
+        """Whether it goes on from the last one that was believed. Changes nothing."""
+        last = self._last
+        return last is not None and self._reachable(last[0], group, now - last[1])
+
+    def forget(self) -> None:
+        """The next one is the first."""
+        self._last = self._aside = None
+        self._begins_anew()
+
+    def _begins_anew(self) -> None:
+        """What was learnt of the board's counters is worth nothing."""
+
+
+class TicksGate(Gate[Ticks]):
+    """Also learns the unit of the board's clock, and then holds the board to it."""
+
+    def __init__(self) -> None:
+        super().__init__(_ticks_follow)
+        self._fits: ClockUnit | None = None
+        self._steps = 0
+
+    def passes(self, group: Ticks, now: float) -> bool:
+        """Whether to believe it."""
+        last = self._last
+        passed = super().passes(group, now)
+        if passed and last is not None and now - last[1] > LEARNT_FROM_S:
+            fits = _unit_of(last[0], group, now - last[1])
+            self._steps = min(self._steps + 1, SURE_AFTER) if fits == self._fits else 0
+            self._fits = fits
+        return passed
+
+    def would_pass(self, group: Ticks, now: float) -> bool:
+        """Whether it goes on from the last one that was believed. Changes nothing."""
+        last, unit = self._last, self.unit
+        return super().would_pass(group, now) and (
+            last is None
+            or unit is None
+            or now - last[1] <= LEARNT_FROM_S
+            or _unit_of(last[0], group, now - last[1]) == unit
+        )
+
+    @property
+    def unit(self) -> ClockUnit | None:
+        """None while unknown."""
+        return self._fits if self._steps >= SURE_AFTER else None
+
+    def _begins_anew(self) -> None:
+        self._fits, self._steps = None, 0
+
+
+def _ticks_follow(before: Ticks, after: Ticks, duration_s: float) -> bool:
+    most = FASTEST_TICKS_PER_S * duration_s + TICKS_MARGIN
+    return (
+        before.time_counts != after.time_counts
+        and abs(wrapped(after.left - before.left)) <= most
+        and abs(wrapped(after.right - before.right)) <= most
+    )
+
+
+def _unit_of(before: Ticks, after: Ticks, duration_s: float) -> ClockUnit | None:
+    step = after.time_counts - before.time_counts
+    slowest_s = SLOWEST_CLOCK * (duration_s - LATEST_S)
+    if slowest_s <= step % _WRAP / 1e3 <= 1.05 * (duration_s + LATEST_S):
+        return "ms"
+    if abs(wrapped(step - round(duration_s * 1e9))) <= LATEST_S * 1e9:
+        return "ns"
+    return None
+
+
+def odometry_gate() -> Gate[BoardOdometry]:
+    """By pose; the velocities may be anything."""
+    return Gate(_odometry_follows)
+
+
+def _odometry_follows(before: BoardOdometry, after: BoardOdometry, duration_s: float) -> bool:
+    way_m = math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
+    return (
+        way_m <= FASTEST_MPS * duration_s + POSE_MARGIN_M
+        and abs(after.yaw_rad - before.yaw_rad) <= FASTEST_RADPS * duration_s + POSE_MARGIN_RAD
+    )
+
+
+def in_range(group: Ticks | BoardOdometry | GpsPosition) -> bool:
+    """Whether it can be true by itself; NaN is in no range, but velocities may be anything."""
+    match group:
+        case GpsPosition(latitude, longitude):
+            return abs(latitude) <= 90.0 and abs(longitude) <= 180.0
+        case BoardOdometry(x_m, y_m, yaw_rad):
+            return all(abs(number) <= FARTHEST for number in (x_m, y_m, yaw_rad))
+    return True

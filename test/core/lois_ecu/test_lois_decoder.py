@@ -1,0 +1,382 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The LOIS decoder on whole and damaged streams.
+
+Set ``LOIS_SEEDS`` to measure longer: ``LOIS_SEEDS=100 pytest -s -k byte_loss`` prints the figures.
+"""
+
+import os
+from collections import Counter
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lois_streams import Piece, decoded, lossy, pieces, reports
+
+from omnibot_driver.core.lois_ecu import (
+    BoardOdometry,
+    EStopButton,
+    GpsPosition,
+    Heading,
+    LoisDecoder,
+    Record,
+    RecordKind,
+    TerminalLine,
+    Ticks,
+    encode_report,
+)
+from omnibot_driver.core.lois_ecu.messages import Report
+
+SEEDS = int(os.environ.get("LOIS_SEEDS", "2"))
+
+ODOMETRY = [
+    BoardOdometry(0.1 * n, 0.2 * n, 0.3 * n, 0.25, 0.5, 0.75) for n in (1.25, 2.5, 3.75, 5.0)
+]
+TICKS = [Ticks(1000 + 400 * n, 10 * n + 7, 11 * n + 3) for n in range(4)]
+FIXES = [GpsPosition(48.0 + n, 12.0 + n) for n in range(4)]
+GROUPS: dict[str, list[Report]] = {"0x20": [*ODOMETRY], "0x12": [*TICKS], "0x0d": [*FIXES]}
+
+
+def rounded(found: list[Report]) -> list[bytes]:
+    """Comparable although floats were rounded on the wire."""
+    return [encode_report(report) for report in found]
+
+
+# Undamaged
+
+
+@pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
+def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> None:
+    """At once, byte by byte, and cut at random."""
+    said = reports(20.0, firmware=firmware)
+    sent = [report for _, report in said]
+    stream = pieces(said)
+    assert decoded(stream)[0] == sent
+    assert decoded([(at, bytes([byte])) for at, data in stream for byte in data])[0] == sent
+    random = Random(5)
+    for _ in range(5):
+        cut: list[Piece] = []
+        for at, data in stream:
+            middle = random.randrange(len(data))
+            cut += [(at, data[:middle]), (at, data[middle:])]
+        found, decoder = decoded(cut)
+        assert found == sent
+        assert decoder.statistics.faults == decoder.group_statistics.damaged_groups == 0
+
+
+def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() -> None:
+    """From the second on: the first could be anything."""
+    decoder = LoisDecoder()
+    for at, (ticks, odometry) in enumerate(zip(TICKS, ODOMETRY, strict=True)):
+        for group in (odometry, ticks):
+            data = encode_report(group)
+            found = decoder.feed(data[:-1], float(at))
+            assert at < 2 or not found
+            found = decoder.feed(data[-1:], float(at))
+            assert rounded(found) == ([data] if at else [])
+            if not at:
+                assert decoder.feed(b"", 0.1) == [group]
+
+
+def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -> None:
+    """One of them could stand twice."""
+    alike = encode_report(Ticks(1000, 5, 5))
+    decoder = LoisDecoder()
+    assert decoder.feed(encode_report(Ticks(600, 4, 3)), 0.0) == []
+    assert decoder.feed(b"", 0.04) == []
+    assert decoder.feed(b"", 0.06) == [Ticks(600, 4, 3)]
+    assert decoder.feed(alike, 0.4) == []
+    assert decoder.resolves_at == pytest.approx(0.45)
+    assert decoder.feed(encode_report(Heading(3)), 0.41) == [Ticks(1000, 5, 5), Heading(3)]
+    assert decoder.resolves_at == float("inf")
+
+
+# Damaged groups
+
+
+@pytest.mark.parametrize("name", GROUPS)
+@pytest.mark.parametrize("damage", ["lost", "doubled", "foreign", "cut", "foreign of its kind"])
+def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
+    """Whichever of its lines it is; the last one twice harms nothing.
+
+    A line of another group of odometry may pass for one of this, but no damage moves lines.
+    """
+    if (name, damage) == ("0x20", "foreign of its kind"):
+        return
+    groups = GROUPS[name]
+    whole = [encode_report(group) for group in groups]
+    lines = whole[2].splitlines(keepends=True)
+    foreign = encode_report(EStopButton(True))
+    if damage == "foreign of its kind":
+        foreign = encode_report(groups[0]).splitlines(keepends=True)[1]
+    for at in range(1, len(lines)):
+        harmed = list(lines)
+        if damage == "lost":
+            del harmed[at]
+        elif damage == "doubled":
+            harmed.insert(at, harmed[at])
+        elif damage == "cut":
+            harmed[at] = harmed[at][:5] + harmed[at][6:]
+        else:
+            harmed.insert(at, foreign)
+        decoder = LoisDecoder()
+        found: list[Report] = []
+        for step, data in enumerate([whole[0], whole[1], b"".join(harmed), whole[3]]):
+            found += decoder.feed(data, 0.4 * step)
+        found += decoder.flush(2.0)
+        found = [report for report in found if not isinstance(report, EStopButton)]
+        if damage == "doubled" and at == len(lines) - 1:
+            assert rounded(found) == [data for data in whole if data in rounded(found)]
+            continue
+        assert rounded(found) == [whole[0], whole[1], whole[3]], at
+        statistics = decoder.group_statistics
+        assert statistics.damaged_groups + statistics.implausible >= 1
+
+
+def test_a_doubled_marker_costs_nothing() -> None:
+    """The empty group before it is counted."""
+    marker, *values = encode_report(TICKS[0]).splitlines(keepends=True)
+    decoder = LoisDecoder()
+    found = decoder.feed(marker + marker + b"".join(values), 0.0) + decoder.flush(0.0)
+    assert found == [TICKS[0]]
+    assert decoder.group_statistics.damaged_groups == 1
+
+
+@pytest.mark.parametrize("lost", range(11))
+def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
+    """One group of the pair is dropped, the other and all later ones come out right."""
+    decoder = LoisDecoder()
+    found: list[Report] = []
+    sent: list[bytes] = []
+    for step, (ticks, odometry) in enumerate(zip(TICKS, ODOMETRY, strict=True)):
+        pose = (odometry.x_m, odometry.y_m, odometry.yaw_rad)
+        appended = BoardOdometry(*pose, 0.5, 0.25, 0.125, appended=True)
+        lines = (encode_report(ticks) + encode_report(appended)).splitlines(keepends=True)
+        sent += [encode_report(ticks), encode_report(appended)]
+        if step == 2:
+            del lines[lost]
+        found += decoder.feed(b"".join(lines), 0.4 * step)
+    found += decoder.flush(2.0)
+    missing = [said for said in sent if said not in rounded(found)]
+    assert all(said in sent for said in rounded(found))
+    assert missing == ([sent[4]] if lost < 4 else [sent[5]])
+
+
+@pytest.mark.parametrize("kind", RecordKind)
+def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKind) -> None:
+    """A lost, doubled, cut or foreign line anywhere in it."""
+    samples = tuple(range(20, 31))
+    record = Record(kind, samples, () if kind is RecordKind.HEADING else samples[:5])
+    whole = encode_report(record)
+    lines = whole.splitlines(keepends=True)
+    for at in range(len(lines)):
+        for harmed in (
+            lines[:at] + lines[at + 1 :],
+            lines[: at + 1] + lines[at:],
+            [*lines[:at], lines[at][1:], *lines[at + 1 :]],
+            [*lines[:at], encode_report(Heading(1)), *lines[at:]],
+        ):
+            decoder = LoisDecoder()
+            decoder.expect_record(kind, len(record.left), len(record.right))
+            found = decoder.feed(b"".join(harmed), 0.0)
+            decoder.expect_record(kind, len(record.left), len(record.right))
+            again = decoder.feed(whole, 1.0)
+            found = [report for report in found if isinstance(report, Record)]
+            if at == len(lines) - 1 and harmed == lines[: at + 1] + lines[at:]:
+                assert found == [record]  # its end stands twice: it is whole
+            elif found:
+                assert found == [record]  # the foreign line stood before it
+                assert at == 0
+            assert again == [record]
+
+
+def test_a_record_that_was_not_asked_for_is_dropped() -> None:
+    """Nothing says how long it should be."""
+    decoder = LoisDecoder()
+    assert decoder.feed(encode_report(Record(RecordKind.RPM, (11, 12), (13, 14))), 0.0) == []
+    assert decoder.group_statistics.damaged_groups == 1
+
+
+# What cannot be true
+
+
+def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
+    """So a restart of the board costs one group."""
+    decoder = LoisDecoder()
+    said = [
+        Ticks(400, 1000, 1001),
+        Ticks(800, 1010, 1011),
+        Ticks(1200, 1020, 90000),
+        Ticks(1600, 1030, 1031),
+        Ticks(410, 0, 1),
+        Ticks(810, 10, 11),
+        Ticks(1210, 20, 21),
+    ]
+    found: list[Report] = []
+    for step, ticks in enumerate(said):
+        found += decoder.feed(encode_report(ticks), 0.4 * step)
+    found += decoder.flush(9.0)
+    assert found == [said[0], said[1], said[3], said[5], said[6]]
+    assert decoder.group_statistics.implausible == 2
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b":050000000239\n",
+        b":0e00183b3b66\n",
+        b":0f000d2c2b67\n",
+        b":100000016a6e\n",
+        b":990000000032\n",
+    ],
+)
+def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
+    """Out of its range, or of an unknown kind; whatever its checksum, nothing comes out."""
+    total = 0
+    for character in line[:11]:
+        total ^= character
+    decoder = LoisDecoder()
+    assert decoder.feed(line[:11] + b"%02x\n" % total, 0.0) == []
+    assert decoder.group_statistics.unknown_lines == 1
+
+
+@pytest.mark.parametrize("unit", ["ms", "ns"])
+def test_the_unit_of_the_boards_clock_is_learnt(unit: str) -> None:
+    """The manual says ns, the public firmware sends ms."""
+    said = reports(4.0, firmware=unit == "ms")
+    _, decoder = decoded(pieces(said))
+    assert decoder.clock_unit == unit
+
+
+# Lines
+
+
+def test_a_line_that_lost_its_end_costs_no_other() -> None:
+    """The next colon begins a line."""
+    heading = encode_report(Heading(5))
+    decoder = LoisDecoder()
+    assert decoder.feed(b"x:\xff:12" + heading[:9] + heading, 0.0) == [Heading(5)]
+    assert decoder.statistics.faults == 1
+
+
+def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required() -> None:
+    """A checksum that is there must be right in any case."""
+    heading = encode_report(Heading(5))
+    for sum_required in (True, False):
+        decoder = LoisDecoder(sum_required=sum_required)
+        assert decoder.feed(heading[:12] + b"0\n", 0.0) == []
+        assert decoder.feed(heading[:11] + b"\n", 0.0) == ([] if sum_required else [Heading(5)])
+        assert decoder.feed(heading, 0.0) == [Heading(5)]
+
+
+def test_lines_of_a_sensor_come_out_where_they_are_expected() -> None:
+    """Elsewhere they are damage."""
+    data = b"$HEHDT,12.3,T*1F\r\n\xff\xfe\n" + encode_report(Heading(5))
+    decoder = LoisDecoder()
+    assert decoder.feed(data, 0.0) == [Heading(5)]
+    assert decoder.statistics.faults == 2
+    decoder.terminal = True
+    assert decoder.feed(data, 0.0) == [TerminalLine("$HEHDT,12.3,T*1F"), Heading(5)]
+    assert decoder.statistics.faults == 3
+
+
+# Bounds
+
+
+@given(st.lists(st.binary(max_size=600), max_size=8), st.booleans())
+def test_any_bytes_are_taken_in_any_chunks_with_equal_results(
+    chunks: list[bytes], terminal: bool
+) -> None:
+    """Nothing raises, and little is held."""
+    data = b"".join(chunks)
+    results = []
+    for cut in (chunks, [data], [bytes([byte]) for byte in data]):
+        decoder = LoisDecoder(sum_required=False)
+        decoder.terminal = terminal
+        found: list[Report] = []
+        for chunk in cut:
+            found += decoder.feed(chunk, 0.0)
+            assert len(decoder._held) < 256
+        found += decoder.flush(0.0)
+        results.append((found, decoder.statistics, decoder.group_statistics))
+    assert results[0] == results[1] == results[2]
+
+
+payloads = st.one_of(st.sampled_from([0, 0xFFFFFFFF, 0x016A016A]), st.integers(0, 2**32 - 1))
+codes = st.sampled_from([0x04, 0x05, 0x0C, 0x0D, 0x10, 0x12, 0x17, 0x20])
+
+
+@given(
+    st.lists(st.tuples(codes, payloads, st.integers(0, 13), st.integers(0, 9)), max_size=60),
+    st.sampled_from(RecordKind),
+)
+def test_any_lines_are_taken_in_any_chunks_with_equal_results(
+    lines: list[tuple[int, int, int, int]], kind: RecordKind
+) -> None:
+    """Right ones and cut ones in any order."""
+    data = b""
+    for code, payload, at, harm in lines:
+        line = b":%02x%08x" % (code, payload)
+        total = 0
+        for character in line:
+            total ^= character
+        line += b"%02x\n" % total
+        data += line if harm else line[:at] + line[at + 1 :]
+    results = []
+    for cut in ([data], [bytes([byte]) for byte in data]):
+        decoder = LoisDecoder()
+        decoder.expect_record(kind, 4, 3)
+        found: list[Report] = []
+        for chunk in cut:
+            found += decoder.feed(chunk, 0.0)
+        found += decoder.flush(0.0)
+        results.append((list(map(repr, found)), decoder.statistics, decoder.group_statistics))
+    assert results[0] == results[1]
+
+
+def test_a_record_without_end_is_not_kept() -> None:
+    """No more than was asked for."""
+    decoder = LoisDecoder()
+    decoder.expect_record(RecordKind.RPM, 10, 10)
+    decoder.feed(b":04000a000b3d\n" * 5000, 0.0)
+    assert len(decoder._assembler._record) == 10
+
+
+# Byte losses
+
+
+@pytest.mark.parametrize("chance", [1e-3, 1e-2])
+@pytest.mark.parametrize("sum_required", [True, False], ids=["with sum", "sum off"])
+@pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
+def test_no_value_is_wrong_at_byte_loss(chance: float, sum_required: bool, firmware: bool) -> None:
+    """Of ten minutes each seed; what comes out at 1e-2 is bounded from below by kind."""
+    sent, came, wrong = Counter[str](), Counter[str](), Counter[str]()
+    for seed in range(SEEDS):
+        said = reports(600.0, firmware=firmware)
+        stream = pieces(said)
+        if not sum_required:
+            stream = [
+                (at, b"".join(line[:11] + b"\n" for line in data.splitlines()))
+                for at, data in stream
+            ]
+        true = Counter(encode_report(report) for _, report in said)
+        found, _ = decoded(lossy(stream, chance, Random(seed)), sum_required=sum_required)
+        for _, report in said:
+            sent[_kind(report)] += 1
+        for report in found:
+            came[_kind(report)] += 1
+            wrong[_kind(report)] += encode_report(report) not in true
+    print(f"\nloss {chance:g}, sum {sum_required}, firmware {firmware}: wrong {dict(wrong)}")
+    print({kind: f"{came[kind] / sent[kind]:.3f} of {sent[kind]}" for kind in sent})
+    assert not any(wrong.values())
+    for kind in sent:
+        characters = {"BoardOdometry": 98, "appended": 98, "Ticks": 56, "GpsPosition": 42}
+        expected = (1 - chance) ** characters.get(kind, 14)
+        assert came[kind] > 0.85 * expected * sent[kind]
+
+
+def _kind(report: Report) -> str:
+    if isinstance(report, BoardOdometry) and report.appended:
+        return "appended"
+    return type(report).__name__
