@@ -1,0 +1,30 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The LOIS ECU in software, as its manual describes it or as its public firmware behaves.
+
+Shares no code with the driver: a misread manual must not cancel out. ``SimulatedLois`` is pure.
+"""
+
+from omnibot_driver.simulator.lois_ecu.board import Obeyed, SimulatedLois, TrueState
+from omnibot_driver.simulator.lois_ecu.settings import (
+    DOCUMENTED,
+    FIRMWARE,
+    QUIRKS,
+    Firmware,
+    LoisSettings,
+    MotorSettings,
+    Quirks,
+)
+
+__all__ = [
+    "DOCUMENTED",
+    "FIRMWARE",
+    "QUIRKS",
+    "Firmware",
+    "LoisSettings",
+    "MotorSettings",
+    "Obeyed",
+    "Quirks",
+    "SimulatedLois",
+    "TrueState",
+]

@@ -1,0 +1,142 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""One wheel as the board sees it: edges in, ticks and speed out, and the duty of its motor.
+
+Here are the firmware's quirks of counting and measuring. Knows no wire, and no other wheel.
+"""
+
+from math import copysign
+
+from omnibot_driver.simulator.lois_ecu.motors import Gains, SpeedController
+from omnibot_driver.simulator.lois_ecu.settings import Quirks
+
+TIMER_US = 100
+TIMER_COUNTS = 0x10000
+SHORTEST_US = 5000
+LIMIT_RPM = 50
+LIMIT_PERCENT = 100
+RECORD_DEPTH = 1024
+STALE_S = 0.25
+
+
+class WheelChannel:
+    """``corrections`` of the short and the long level; ``steps`` to a turn.
+
+    ticks: as 0x12 has them. rpm: as measured. duty_percent: as the controller wants it.
+    """
+
+    def __init__(
+        self, quirks: Quirks, steps: int, corrections: tuple[float, float], gains: Gains
+    ) -> None:
+        self._quirks, self._steps = quirks, steps
+        self.short_correction, self.long_correction = corrections
+        self.controller = SpeedController(gains)
+        self.ticks = 0
+        self.rpm = 0
+        self.exact_rpm = 0.0
+        self.duty_percent = 0
+        self.open_loop = False
+        self._target = self._next_target = 0
+        self._count = 0
+        self._ticked_s = 0.0
+        self.turned_ticks = 0
+        """Since the odometry took them; signed as the wheel turns."""
+        self.record: list[int] = []
+        self.record_left = 0
+
+    # What the encoder tells
+
+    def edge(self, at_s: float, is_long: bool, direction: int) -> None:
+        """One edge, when its interrupt is served."""
+        quirks = self._quirks
+        if not quirks.ticks_of_forward_targets:
+            self.ticks += direction
+        elif self._target > 0:
+            self.ticks += 1
+        elif self.duty_percent < 0 and (
+            quirks.duty_drags_target if self.open_loop else quirks.reverse_runs_fast
+        ):
+            self._target -= 1
+        self.turned_ticks += direction
+        count = int(at_s * 1e6) // TIMER_US % TIMER_COUNTS
+        passed_us = (count - self._count) % TIMER_COUNTS * TIMER_US
+        self._count, self._ticked_s = count, at_s
+        passed_us = int(passed_us * (self.long_correction if is_long else self.short_correction))
+        self.rpm, self.exact_rpm = 0, 0.0
+        measures = self._target != 0 or not quirks.sign_of_command
+        if passed_us > SHORTEST_US and measures:
+            exact = 60e6 / (passed_us * self._steps)
+            sign = self._target if quirks.sign_of_command else direction
+            self.exact_rpm = copysign(exact, sign)
+            self.rpm = int(copysign(int(exact), sign))
+        if self.record_left and passed_us > SHORTEST_US and len(self.record) < RECORD_DEPTH:
+            unit_us = 100 if quirks.records_in_100_us else 0.1
+            self._sample(min(int(passed_us / unit_us), 0xFFFF))
+
+    def settle(self, now_s: float) -> None:
+        """Time passes without edges: by the manual a wheel that stands has no speed."""
+        if not self._quirks.keeps_speed_of_stalled_wheel and now_s - self._ticked_s > STALE_S:
+            self.rpm, self.exact_rpm = 0, 0.0
+
+    # Records
+
+    def start_record(self, samples: int) -> None:
+        """Forget what was recorded."""
+        if not self._quirks.large_records_never_end:
+            samples = min(samples, RECORD_DEPTH)
+        self.record, self.record_left = [], samples
+
+    def torque(self) -> None:
+        """One reading of the current."""
+        if self.record_left and len(self.record) < RECORD_DEPTH:
+            self._sample(200 + 25 * abs(self.duty_percent))
+
+    def _sample(self, value: int) -> None:
+        self.record.append(value)
+        self.record_left -= 1
+
+    # What is commanded
+
+    def command_rpm(self, rpm: int) -> None:
+        """Closed loop."""
+        self.open_loop = False
+        if rpm == 0 or rpm * self._next_target < 0:
+            self._halt()
+        self._next_target = rpm
+
+    def command_duty(self, percent: int) -> None:
+        """Open loop; the RPM target stays what it was."""
+        self.open_loop = True
+        self.controller.restart()
+        self.duty_percent = max(-LIMIT_PERCENT, min(LIMIT_PERCENT, percent))
+
+    def release(self) -> None:
+        """The button: as if zero were commanded, in whichever mode."""
+        if self.open_loop:
+            self.duty_percent = 0
+        else:
+            self._halt()
+            self._next_target = 0
+
+    def reset(self) -> None:
+        """By the manual, of everything."""
+        self.ticks = 0
+        if not self._quirks.reset_clears_ticks_only:
+            self.command_duty(0)
+            self._halt()
+            self._next_target = 0
+
+    def control(self, dt_s: float) -> None:
+        """One step of the controller."""
+        if self.open_loop:
+            return
+        target = self._next_target if not self._quirks.reverse_runs_fast else self._target
+        if self._quirks.limits_rpm:
+            target = max(-LIMIT_RPM, min(LIMIT_RPM, target))
+        self.duty_percent = int(self.controller.step(float(self.rpm), float(target), dt_s))
+        self._target = self._next_target
+
+    def _halt(self) -> None:
+        self.duty_percent = self._target = self.rpm = 0
+        self.exact_rpm = 0.0
+        self.controller.restart()

@@ -1,0 +1,127 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A motor with its wheel and encoder, and the board's speed controller for it.
+
+Speeds in RPM, efforts in percent of duty. Knows time steps, not commands nor the wire.
+"""
+
+from dataclasses import dataclass, replace
+from math import copysign, exp, floor
+from random import Random
+
+from omnibot_driver.simulator.lois_ecu.settings import MotorSettings
+
+LOAD_CHANGES_S = 0.5
+
+
+class Motor:
+    """Advanced by ``dt_s``; ``held`` wheels do not turn."""
+
+    def __init__(self, settings: MotorSettings, load_percent: float, random: Random) -> None:
+        self.rpm = 0.0
+        self.held = False
+        self._settings = settings
+        self._step_s = self._part = 0.0
+        self._load_percent, self._random = load_percent, random
+        self._load = random.gauss(0.0, load_percent)
+
+    def advance(self, duty_percent: float, dt_s: float) -> float:
+        """Turns of the wheel in this time."""
+        if self.held:
+            self.rpm = 0.0
+            return 0.0
+        settings = self._settings
+        if not (duty_percent or self.rpm):
+            return 0.0
+        if dt_s != self._step_s:
+            self._step_s, self._part = dt_s, 1 - exp(-dt_s / settings.time_constant_s)
+        if self._load_percent:
+            keep = exp(-dt_s / LOAD_CHANGES_S)
+            change = self._random.gauss(0.0, self._load_percent)
+            self._load = keep * self._load + (1 - keep * keep) ** 0.5 * change
+        effort = abs(duty_percent) - settings.dead_zone_percent
+        if duty_percent and effort > 0:
+            effort = max(effort + self._load, 0.0)
+            final = copysign(effort * settings.rpm_per_percent, duty_percent)
+        else:
+            final = 0.0
+        before = self.rpm
+        self.rpm += (final - before) * self._part
+        if not final:
+            slower = max(abs(self.rpm) - settings.friction_rpm_per_s * dt_s, 0.0)
+            self.rpm = copysign(slower, self.rpm) if slower else 0.0
+        return (before + self.rpm) / 2 * dt_s / 60
+
+
+class Encoder:
+    """Edges of a disc whose marks are ``short`` of a whole period wide, the rest long."""
+
+    def __init__(self, steps: int, short: float) -> None:
+        self._periods = 0.0
+        self._per_turn = steps / 2
+        self._short = short
+
+    def turn(self, turns: float) -> tuple[float, bool, int] | None:
+        """The edge that was passed: when (as part of the step), if a long level ended, and in
+        which direction."""
+        before = self._periods
+        after = self._periods = before + turns * self._per_turn
+        level_before, level_after = self._level(before), self._level(after)
+        if level_before == level_after:
+            return None
+        forward = after > before
+        edge = level_after if forward else level_before
+        at = edge // 2 + (self._short if edge % 2 else 0.0)
+        is_long = (edge % 2 == 0) is forward
+        return (at - before) / (after - before), is_long, 1 if forward else -1
+
+    def _level(self, periods: float) -> int:
+        whole = floor(periods)
+        return 2 * whole + (1 if periods - whole >= self._short else 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """Of the manual's controller; feed_forward in percent per RPM, low_pass 0..1 for each step."""
+
+    kp: float
+    tn: float
+    td: float
+    feed_forward: float = 0.0
+    low_pass: float = 1.0
+
+
+class SpeedController:
+    """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), and what the firmware adds."""
+
+    def __init__(self, gains: Gains) -> None:
+        self.gains = gains
+        self.restart()
+
+    def change(self, **gains: float) -> None:
+        """New gains; begins anew."""
+        self.gains = replace(self.gains, **gains)
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget everything."""
+        self._sum = self._output = self._target = 0.0
+
+    def step(self, measured_rpm: float, target_rpm: float, dt_s: float) -> float:
+        """Duty in percent, -100..100; no power where nothing is wanted."""
+        if not target_rpm:
+            self.restart()
+            return 0.0
+        gains = self.gains
+        self._target += gains.low_pass * (target_rpm - self._target)
+        error = self._target - measured_rpm
+        gain = dt_s / max(gains.tn, 1e-3)
+        wanted = gains.kp * (error + self._sum + error * gain)
+        output = self._output + (wanted - self._output) * dt_s / (gains.td + dt_s)
+        duty = output + gains.feed_forward * self._target
+        if abs(duty) < 100.0 or duty * error < 0:
+            self._sum += error * gain
+            self._output = output
+        if duty * self._target < 0:
+            return 0.0
+        return max(-100.0, min(100.0, duty))

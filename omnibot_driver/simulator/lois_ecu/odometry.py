@@ -1,0 +1,84 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The board's own odometry, as the manual means it and as the firmware computes it.
+
+Knows wheels and their nominal geometry; must not know where the robot truly is.
+"""
+
+from math import cos, inf, nan, pi, sin
+
+TIMER_COUNTS = 0x10000
+COUNT_S = 1e-4
+
+
+class DocumentedOdometry:
+    """From signed ticks and measured speeds."""
+
+    def __init__(self, steps: int, radius_m: float, track_m: float) -> None:
+        self._tick_m = 2 * pi * radius_m / steps
+        self._rim_mps = 2 * pi * radius_m / 60
+        self._track_m = track_m
+        self.clear()
+
+    def clear(self) -> None:
+        """To the origin."""
+        self.pose = (0.0, 0.0, 0.0)
+        self.velocity = (0.0, 0.0, 0.0)
+
+    def move(self, left_ticks: int, right_ticks: int) -> None:
+        """By these."""
+        way = (left_ticks + right_ticks) * self._tick_m / 2
+        turn = (right_ticks - left_ticks) * self._tick_m / self._track_m
+        x, y, yaw = self.pose
+        middle = yaw + turn / 2
+        self.pose = (x + way * cos(middle), y + way * sin(middle), yaw + turn)
+
+    def measure(self, left_rpm: float, right_rpm: float) -> None:
+        """The velocity of now."""
+        speed = (left_rpm + right_rpm) / 2 * self._rim_mps
+        turning = (right_rpm - left_rpm) * self._rim_mps / self._track_m
+        yaw = self.pose[2]
+        self.velocity = (speed * cos(yaw), speed * sin(yaw), turning)
+
+
+class FirmwareOdometry(DocumentedOdometry):
+    """From the integer speeds that were measured last, at each tick of either wheel.
+
+    ``stands``: at equal speeds the position does not move. ``divides``: the velocity is the way
+    over the time since the last tick, which may be none.
+    """
+
+    def __init__(
+        self, steps: int, radius_m: float, track_m: float, *, stands: bool, divides: bool
+    ) -> None:
+        super().__init__(steps, radius_m, track_m)
+        self._stands, self._divides = stands, divides
+        self._count: int | None = None
+
+    def tick(self, at_s: float, left_rpm: int, right_rpm: int) -> None:
+        """One edge of either wheel, served at this time."""
+        count = int(at_s * 1e4) % TIMER_COUNTS
+        before, self._count = self._count, count
+        if before is None:
+            return
+        passed_s = (count - before) % TIMER_COUNTS * COUNT_S
+        left, right = left_rpm * self._rim_mps, right_rpm * self._rim_mps
+        turn = (right - left) / self._track_m * passed_s
+        way = (left + right) / 2 * passed_s
+        if left == right and self._stands:
+            way = 0.0
+        x, y, yaw = self.pose
+        middle = yaw + turn / 2
+        new = (x + way * cos(middle), y + way * sin(middle), yaw + turn)
+        if passed_s or self._divides:
+            rates = [
+                _quotient(after - old, passed_s) for after, old in zip(new, self.pose, strict=True)
+            ]
+            self.velocity = (rates[0], rates[1], rates[2])
+        self.pose = new
+
+
+def _quotient(way: float, time_s: float) -> float:
+    if time_s:
+        return way / time_s
+    return nan if not way else inf if way > 0 else -inf

@@ -1,0 +1,100 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Characters of the protocol as the board writes and reads them; from the manual, its own codec.
+
+A line is ``:``, two digits of command, eight of payload, two of checksum (XOR of all before) and a
+line feed. Knows no meaning of a command.
+"""
+
+import struct
+from collections.abc import Iterator
+from string import hexdigits
+
+LINE_CHARACTERS = 14
+CHECKED_CHARACTERS = 11
+
+
+def _sum_of(characters: str) -> int:
+    total = 0
+    for character in characters:
+        total ^= ord(character)
+    return total
+
+
+def line(command: int, payload: int) -> bytes:
+    """One line."""
+    body = f":{command & 0xFF:02x}{payload & 0xFFFFFFFF:08x}"
+    return f"{body}{_sum_of(body):02x}\n".encode("ascii")
+
+
+def words(command: int, high: int, low: int) -> bytes:
+    """One line of two words."""
+    return line(command, (high & 0xFFFF) * 0x10000 + (low & 0xFFFF))
+
+
+def bits_of(number: float) -> int:
+    """The bits of a float32; what is too large is infinite."""
+    try:
+        return int.from_bytes(struct.pack(">f", number), "big")
+    except OverflowError:
+        return 0x7F800000 if number > 0 else 0xFF800000
+
+
+def number_of(bits: int) -> float:
+    """The float32 of these bits."""
+    (number,) = struct.unpack(">f", bits.to_bytes(4, "big"))
+    return float(number)
+
+
+def sequence(command: int, payloads: list[int]) -> bytes:
+    """A line of ones, then these."""
+    return b"".join(line(command, payload) for payload in (0xFFFFFFFF, *payloads))
+
+
+class LineReader:
+    """What the board understands, character by character.
+
+    ``checks``: whether lines have a checksum. ``lenient``: digits that are none end their field
+    early, as C's strtol has it, instead of making the line wrong.
+    """
+
+    def __init__(self, *, lenient: bool) -> None:
+        self.checks = True
+        self._lenient = lenient
+        self._buffer: list[str] = []
+
+    def take(self, character: int) -> tuple[int, int] | None:
+        """Command and payload of the line that this character completes."""
+        letter = chr(character)
+        if letter == "\r":
+            return None
+        length = LINE_CHARACTERS if self.checks else LINE_CHARACTERS - 2
+        if letter == ":" or len(self._buffer) >= length:
+            self._buffer.clear()
+        self._buffer.append(letter)
+        if letter != "\n" or len(self._buffer) != length:
+            return None
+        text = "".join(self._buffer)
+        fields = text[1:3], text[3:7], text[7:11], text[11:-1]
+        if not self._lenient and not all(set(field) <= set(hexdigits) for field in fields):
+            return None
+        command, high, low, sent = map(_leading_hex, fields)
+        if self.checks and sent != _sum_of(text[:CHECKED_CHARACTERS]):
+            return None
+        return command, high * 0x10000 + low
+
+    def take_all(self, data: bytes) -> Iterator[tuple[int, int]]:
+        """Of many characters."""
+        for character in data:
+            found = self.take(character)
+            if found is not None:
+                yield found
+
+
+def _leading_hex(field: str) -> int:
+    digits = ""
+    for character in field:
+        if character not in hexdigits:
+            break
+        digits += character
+    return int(digits or "0", 16)

@@ -1,0 +1,75 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A simulated LOIS ECU and somebody who talks to it with the driver's codec, in simulated time."""
+
+from omnibot_driver.core.lois_ecu import (
+    BoardOdometry,
+    LoisDecoder,
+    SetRpm,
+    Setting,
+    Ticks,
+    WriteSetting,
+    encode_command,
+)
+from omnibot_driver.core.lois_ecu.messages import Command, Report
+from omnibot_driver.simulator.lois_ecu import FIRMWARE, LoisSettings, Quirks, SimulatedLois
+
+LOW_PASS = WriteSetting(Setting.RPM_LOW_PASS, 1.0)
+
+
+class Rig:
+    """``heard``: all reports with the time of their last byte."""
+
+    def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:
+        self.board = SimulatedLois(LoisSettings(quirks=quirks, **settings))  # type: ignore[arg-type]
+        self.decoder = LoisDecoder()
+        self.heard: list[tuple[float, Report]] = []
+
+    @property
+    def now(self) -> float:
+        """Simulated."""
+        return self.board.now_s
+
+    def run(self, seconds: float) -> list[Report]:
+        """What was reported meanwhile."""
+        found: list[Report] = []
+        for _ in range(round(seconds / self.board.tick_s)):
+            found += self.decoder.feed(self.board.step(), self.now)
+        found += self.decoder.feed(b"", self.now)
+        self.heard += [(self.now, report) for report in found]
+        return found
+
+    def say(self, *commands: Command) -> None:
+        """Until the board has obeyed: it may not hear at once."""
+        for command in commands:
+            data = encode_command(command, with_sum=self.board._reader.checks)
+            for _ in range(50):
+                before = len(self.board.commands)
+                self.board.receive(data)
+                self.run(0.03)
+                if len(self.board.commands) > before:
+                    break
+            else:
+                raise AssertionError(f"{command} was not obeyed")
+
+    def drive(self, left: int, right: int, seconds: float) -> list[Report]:
+        """At these RPM."""
+        self.say(SetRpm(left, right))
+        return self.run(seconds)
+
+    def booted(self) -> "Rig":
+        """With a low-pass, if it has one."""
+        self.run(2.1)
+        if self.board.settings.quirks.extra_settings:
+            self.say(LOW_PASS)
+        return self
+
+
+def ticks_in(reports: list[Report]) -> list[Ticks]:
+    """In their order."""
+    return [report for report in reports if isinstance(report, Ticks)]
+
+
+def odometry_in(reports: list[Report]) -> list[BoardOdometry]:
+    """In their order."""
+    return [report for report in reports if isinstance(report, BoardOdometry)]

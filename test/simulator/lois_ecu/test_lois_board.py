@@ -1,0 +1,228 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The simulated LOIS ECU: what it sends by itself, obeys, and does whatever its firmware is."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lois_rig import LOW_PASS, Rig, ticks_in
+
+from omnibot_driver.core.lois_ecu import (
+    PERIOD_OFF,
+    PERIOD_ONCE,
+    BoardOdometry,
+    DistributeBall,
+    EStopButton,
+    GpsDate,
+    GpsPosition,
+    GpsTime,
+    Heading,
+    SetDuty,
+    SetLed,
+    SetPeriod,
+    SetRpm,
+    SetTerminalMode,
+    Stream,
+    TerminalLine,
+    TerminalMode,
+    Ticks,
+    encode_command,
+)
+from omnibot_driver.simulator.lois_ecu import DOCUMENTED, FIRMWARE, Quirks, SimulatedLois
+
+BOTH = pytest.mark.parametrize("quirks", [DOCUMENTED, FIRMWARE], ids=["documented", "firmware"])
+
+
+@BOTH
+def test_it_sends_what_the_manual_lists_by_itself(quirks: Quirks) -> None:
+    """All but the date, about every 400 ms, 1 s and 1.2 s; nothing is damaged."""
+    rig = Rig(quirks)
+    heard = rig.run(22.0)
+    counts = dict.fromkeys((Ticks, Heading, BoardOdometry, GpsTime, GpsPosition, GpsDate), 0)
+    for report in heard:
+        counts[type(report)] += 1
+    assert 46 <= counts[Ticks] <= 56
+    assert 46 <= counts[Heading] <= 56
+    assert 18 <= counts[GpsTime] <= 23
+    assert 15 <= counts[GpsPosition] <= 19
+    assert counts[GpsDate] == 0
+    assert rig.decoder.statistics.faults == rig.decoder.group_statistics.damaged_groups == 0
+
+
+def test_periods_stretch_with_the_load() -> None:
+    """The public firmware's 400 ms are 422 ms."""
+    rig = Rig()
+    rig.run(3.0)
+    assert len(ticks_in(rig.run(42.2))) in range(98, 103)
+
+
+@BOTH
+def test_the_robot_stands_at_the_commanded_speed_after_a_while(quirks: Quirks) -> None:
+    """Both wheels near 20 RPM; it holds for ever."""
+    rig = Rig(quirks).booted()
+    rig.drive(20, 20, 10.0)
+    speeds = []
+    for _ in range(500):
+        rig.board.step()
+        speeds.append([motor.rpm for motor in rig.board.motors])
+    for wheel in zip(*speeds, strict=True):
+        assert sum(wheel) / len(wheel) == pytest.approx(20.5, abs=1.0)
+
+
+@BOTH
+def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
+    """Within half a second; neither is sooner."""
+    rig = Rig(quirks).booted()
+    for drive in (SetRpm(30, 30), SetRpm(-30, 30), SetDuty(45, 45), SetDuty(-45, 45)):
+        for stop in (SetRpm(0, 0), SetDuty(0, 0)):
+            rig.say(drive)
+            rig.run(5.0)
+            assert not rig.board.standing
+            rig.say(stop)
+            rig.run(0.5)
+            assert rig.board.standing, (drive, stop)
+            rig.say(SetRpm(0, 0))
+
+
+@BOTH
+def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
+    """Its release does not move the robot; a set-point does, pressed or not."""
+    rig = Rig(quirks).booted()
+    rig.drive(20, 20, 4.0)
+    rig.board.press(True)
+    assert EStopButton(True) in rig.run(1.0)
+    assert rig.board.standing
+    rig.board.press(False)
+    assert EStopButton(False) in rig.run(1.0)
+    assert rig.board.standing
+    rig.board.press(True)
+    rig.drive(20, 20, 3.0)
+    assert not rig.board.standing
+
+
+@BOTH
+def test_terminal_mode_passes_lines_of_a_sensor_and_silences_the_protocol(quirks: Quirks) -> None:
+    """Commands are still obeyed."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.decoder.terminal = True
+    rig.say(SetTerminalMode(TerminalMode.COMPASS))
+    heard = rig.run(1.0)
+    assert TerminalLine("$HEHDT,90.0,T*1E") in heard or any(
+        isinstance(report, TerminalLine) and report.text.startswith("$HEHDT,90") for report in heard
+    )
+    assert all(isinstance(report, TerminalLine) for report in heard)
+    rig.say(SetTerminalMode(TerminalMode.GPS))
+    assert any(
+        isinstance(report, TerminalLine) and report.text.startswith("$GPRMC")
+        for report in rig.run(2.5)
+    )
+    rig.say(SetTerminalMode(TerminalMode.HOST))
+    rig.run(0.5)
+    assert ticks_in(rig.run(1.0))
+
+
+@BOTH
+def test_without_checksum_it_takes_shorter_lines_alone(quirks: Quirks) -> None:
+    """What it sends keeps its checksum."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM))
+    rig.board.receive(b":0300000001\n" * 5)
+    rig.run(0.2)
+    assert rig.board.led
+    rig.board.receive(b":030000000039\n" * 5)
+    rig.run(0.2)
+    assert rig.board.led
+    assert ticks_in(rig.run(1.0))
+    rig.say(SetTerminalMode(TerminalMode.HOST))
+    rig.say(SetLed(False))
+    assert not rig.board.led
+
+
+@BOTH
+def test_junk_before_a_colon_and_a_carriage_return_are_harmless(quirks: Quirks) -> None:
+    """Either case of letters too."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    for line in (b"\xffx:030000000138\r\n", b":19000000003200:190000000032\n"):
+        for _ in range(4):
+            rig.board.receive(line)
+            rig.run(0.1)
+    assert rig.board.led
+    assert rig.board.balls >= 2
+    rig.say(DistributeBall())
+
+
+@BOTH
+def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
+    """By 0xfffe and 0xffff."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetPeriod(Stream.TICKS, PERIOD_OFF), SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))
+    heard = rig.run(3.0)
+    assert len([report for report in heard if isinstance(report, GpsDate)]) <= 1
+    assert not ticks_in(heard[5:])
+    rig.say(SetPeriod(Stream.TICKS, PERIOD_ONCE))
+    heard = rig.run(2.0)
+    assert len(ticks_in([report for _, report in rig.heard[-len(heard) - 3 :]])) <= 1
+
+
+def test_the_gps_moves_with_the_robot() -> None:
+    """x is east."""
+    rig = Rig(DOCUMENTED)
+    rig.drive(40, 40, 20.0)
+    fixes = [report for report in rig.run(3.0) if isinstance(report, GpsPosition)]
+    way = (fixes[-1].longitude_deg - 11.5) * 111195 * math.cos(math.radians(48.1))
+    assert way == pytest.approx(rig.board.truth.x_m, abs=0.7)
+    assert Heading(90) in rig.run(1.0) or rig.board.truth.yaw_rad != 0
+
+
+def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
+    """Ticks, odometry, periods and the low-pass are as at first."""
+    rig = Rig().booted()
+    rig.drive(20, 20, 4.0)
+    place = rig.board.truth
+    rig.board.reboot()
+    assert rig.run(1.9) == []
+    assert rig.board.standing
+    assert rig.board.truth.x_m >= place.x_m
+    assert ticks_in(rig.run(1.0))[-1].left == 0
+    rig.drive(20, 20, 2.0)
+    assert rig.board.standing
+
+
+def test_input_while_booting_is_kept_up_to_600_characters() -> None:
+    """The rest is lost."""
+    rig = Rig()
+    rig.board.receive(encode_command(LOW_PASS) * 50)
+    rig.run(2.3)
+    assert len(rig.board.commands) == 42
+    assert rig.board.lost_bytes == 100
+
+
+def test_planted_errors_are_in_the_truth_alone() -> None:
+    """The board believes in its nominal wheels."""
+    rig = Rig(DOCUMENTED, wheel_radius_scale=(1.05, 1.05))
+    rig.drive(20, 20, 10.0)
+    rig.say(SetRpm(0, 0))
+    rig.run(1.0)
+    truth, told = rig.board.truth, rig.board.odometry.pose
+    assert math.hypot(truth.x_m, truth.y_m) / math.hypot(*told[:2]) == pytest.approx(1.05, rel=0.01)
+
+
+@given(st.lists(st.binary(max_size=200), max_size=6))
+@settings(max_examples=30)
+def test_any_bytes_are_taken(chunks: list[bytes]) -> None:
+    """And the same bytes lead to the same answer."""
+    sent = []
+    for _ in range(2):
+        board = SimulatedLois()
+        out = b""
+        for chunk in chunks:
+            board.receive(chunk)
+            out += b"".join(board.step() for _ in range(5))
+        sent.append((out, board.truth))
+    assert sent[0] == sent[1]

@@ -1,0 +1,346 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Each way in which the public firmware departs from the manual: seen with it, unseen without."""
+
+import math
+from collections.abc import Callable
+from dataclasses import fields, replace
+from itertools import pairwise
+
+import pytest
+from lois_rig import Rig, odometry_in, ticks_in
+
+from omnibot_driver.core.lois_ecu import (
+    PERIOD_OFF,
+    EStopButton,
+    GpsPosition,
+    Heading,
+    Record,
+    RecordHeading,
+    RecordKind,
+    RecordRpm,
+    RecordTorque,
+    Reset,
+    SetDuty,
+    SetPeriod,
+    SetRpm,
+    SetTerminalMode,
+    Setting,
+    Stream,
+    TerminalMode,
+    Ticks,
+    WriteSetting,
+    encode_command,
+)
+from omnibot_driver.simulator.lois_ecu import DOCUMENTED, FIRMWARE, Quirks
+
+STRAIGHT = 20
+
+
+def with_sum(text: bytes) -> bytes:
+    """The XOR of its characters, and the end."""
+    total = 0
+    for character in text:
+        total ^= character
+    return text + b"%02x\n" % total
+
+
+def ticks_of_forward_targets(quirks: Quirks) -> bool:
+    """Reverse counts nothing."""
+    rig = Rig(quirks).booted()
+    rig.drive(-STRAIGHT, -STRAIGHT, 4.0)
+    return ticks_in(rig.run(1.0))[-1].left == 0
+
+
+def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
+    """Less than three quarters of a straight drive are in 0x20."""
+    rig = Rig(quirks).booted()
+    rig.drive(STRAIGHT, STRAIGHT, 10.0)
+    last, truth = odometry_in(rig.run(1.0))[-1], rig.board.truth
+    return math.hypot(last.x_m, last.y_m) < 0.75 * math.hypot(truth.x_m, truth.y_m)
+
+
+def velocity_may_be_nan(quirks: Quirks) -> bool:
+    """In some groups of a straight drive."""
+    rig = Rig(quirks).booted()
+    rig.say(SetPeriod(Stream.TICKS, 60))
+    rig.drive(40, 40, 30.0)
+    groups = odometry_in([report for _, report in rig.heard])
+    return any(not math.isfinite(group.dx_mps) for group in groups)
+
+
+def sign_of_command(quirks: Quirks) -> bool:
+    """After forward to backward, the odometry goes back while the wheels still roll forward."""
+    rig = Rig(quirks).booted()
+    rig.drive(30, 40, 6.0)
+    rig.say(SetRpm(-30, -40))
+    for _ in range(60):
+        rig.board.step()
+        if rig.board.channels[1].rpm < 0 < rig.board.motors[1].rpm:
+            return True
+    return False
+
+
+def keeps_speed_of_stalled_wheel(quirks: Quirks) -> bool:
+    """For ever."""
+    rig = Rig(quirks).booted()
+    rig.drive(20, 30, 6.0)
+    rig.board.hold(left=True, right=True)
+    rig.run(3.0)
+    return rig.board.channels[0].rpm > 0
+
+
+def duty_drags_target(quirks: Quirks) -> bool:
+    """After negative duty a positive one is integrated backwards."""
+    rig = Rig(quirks).booted()
+    rig.say(SetDuty(-40, -30))
+    rig.run(3.0)
+    rig.say(SetDuty(0, 0))
+    rig.run(1.0)
+    rig.say(SetDuty(30, 40))
+    rig.run(3.0)
+    return rig.board.motors[0].rpm > 5 and rig.board.channels[0].rpm < 0
+
+
+def reverse_runs_fast(quirks: Quirks) -> bool:
+    """By 1 RPM and more."""
+    rig = Rig(quirks).booted()
+    rig.drive(-30, -30, 12.0)
+    speeds = []
+    for _ in range(300):
+        rig.board.step()
+        speeds.append(-rig.board.motors[0].rpm)
+    return sum(speeds) / len(speeds) > 31.2
+
+
+def low_pass_starts_at_zero(quirks: Quirks) -> bool:
+    """RPM mode never moves until it is written."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.drive(30, 30, 5.0)
+    return rig.board.standing
+
+
+def extra_settings(quirks: Quirks) -> bool:
+    """Feed-forward alone turns the wheels at once."""
+    rig = Rig(replace(quirks, low_pass_starts_at_zero=False))
+    rig.run(2.1)
+    for setting in (Setting.LEFT_KP, Setting.RIGHT_KP):
+        rig.say(WriteSetting(setting, 0.0))
+    rig.say(WriteSetting(Setting.LEFT_FEED_FORWARD, 2.0))
+    rig.drive(30, 30, 1.0)
+    return rig.board.motors[0].rpm > 20
+
+
+def appends_odometry(quirks: Quirks) -> bool:
+    """0x12 has groups of six."""
+    return any(group.appended for group in odometry_in(Rig(quirks).run(4.0)))
+
+
+def clock_in_ms(quirks: Quirks) -> bool:
+    """Not in ns."""
+    rig = Rig(quirks)
+    rig.run(6.0)
+    return rig.decoder.clock_unit == "ms"
+
+
+def clock_stops_while_sending(quirks: Quirks) -> bool:
+    """So it runs slow, the more is sent."""
+    rig = Rig(quirks)
+    rig.run(3.0)
+    began, counts = rig.now, [ticks_in(rig.run(0.5))[-1].time_counts]
+    for _ in range(50):
+        counts += [ticks.time_counts for ticks in ticks_in(rig.run(0.5))]
+    passed = sum((after - before) % 2**32 for before, after in pairwise(counts))
+    return passed < 0.97 * (rig.now - began - 0.7) * (1e3 if quirks.clock_in_ms else 1e9)
+
+
+def deaf_while_sending(quirks: Quirks) -> bool:
+    """Of single lines 3 to 10 % are lost."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    for number in range(300):
+        rig.board.receive(encode_command(SetRpm(number, 0)))
+        rig.run(0.05 + number % 7 / 100)
+    obeyed = len(rig.board.commands)
+    assert obeyed > 260
+    return obeyed < 295
+
+
+def odometry_period_is_fixed(quirks: Quirks) -> bool:
+    """0x20 cannot be turned off."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetPeriod(Stream.ODOMETRY, PERIOD_OFF))
+    rig.run(0.5)
+    return any(not group.appended for group in odometry_in(rig.run(3.0)))
+
+
+def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
+    """Also where the mode stays what it was."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetTerminalMode(TerminalMode.HOST))
+    return rig.board.channels[0].short_correction < 1e-6
+
+
+def button_is_lost_in_terminal_mode(quirks: Quirks) -> bool:
+    """Nothing tells of it, not even afterwards."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetTerminalMode(TerminalMode.GPS))
+    rig.board.press(True)
+    heard = rig.run(1.0)
+    rig.say(SetTerminalMode(TerminalMode.HOST))
+    return EStopButton(True) not in heard + rig.run(1.0)
+
+
+def reset_clears_ticks_only(quirks: Quirks) -> bool:
+    """The odometry stays, and the robot drives on."""
+    rig = Rig(quirks).booted()
+    rig.drive(20, 30, 4.0)
+    rig.say(Reset())
+    assert rig.board.channels[0].ticks < 5
+    rig.run(1.0)
+    return rig.board.driven and abs(rig.board.odometry.pose[0]) > 0.1
+
+
+def gps_is_ignored(quirks: Quirks) -> bool:
+    """0/0."""
+    return GpsPosition(0.0, 0.0) in Rig(quirks).run(4.0)
+
+
+def headings_average_over_north(quirks: Quirks) -> bool:
+    """A robot that turns through north seems to look south."""
+    rig = Rig(quirks).booted()
+    rig.say(SetPeriod(Stream.HEADING, 40), SetPeriod(Stream.TICKS, PERIOD_OFF))
+    rig.drive(-20, 20, 12.0)
+    reports = [report for _, report in rig.heard if isinstance(report, Heading)]
+    leaps = [
+        abs((after.heading_deg - before.heading_deg + 180) % 360 - 180)
+        for before, after in pairwise(reports)
+    ]
+    return max(leaps[40:]) > 60
+
+
+def _record(rig: Rig, kind: RecordKind, count: int, seconds: float) -> Record | None:
+    made = {RecordKind.RPM: RecordRpm, RecordKind.TORQUE: RecordTorque}.get(kind)
+    rig.decoder.expect_record(kind, count, count if made else 0)
+    rig.say(made(count, count) if made else RecordHeading(count))
+    found = [report for report in rig.run(seconds) if isinstance(report, Record)]
+    return found[0] if found else None
+
+
+def records_in_100_us(quirks: Quirks) -> bool:
+    """At 20 RPM a tick takes 50 ms, which do not fit 16 bits of 100 ns."""
+    rig = Rig(quirks).booted()
+    rig.drive(20, 20, 5.0)
+    record = _record(rig, RecordKind.RPM, 20, 4.0)
+    assert record is not None
+    assert len(record.left) == len(record.right) == 20
+    return 450 < sum(record.left) / 20 < 550
+
+
+def torque_comes_as_rpm(quirks: Quirks) -> bool:
+    """Under 0x04."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.board.receive(encode_command(RecordTorque(5, 5)))
+    sent = b"".join(rig.board.step() for _ in range(300))
+    assert (b":1700" in sent) != (b":0400c8" in sent)
+    return b":0400c8" in sent
+
+
+def record_waits_for_one_more(quirks: Quirks) -> bool:
+    """The sample after the last one lets it go."""
+    rig = Rig(quirks, compass_period_s=1.0)
+    rig.run(2.5)
+    return _record(rig, RecordKind.HEADING, 3, 3.1) is None
+
+
+def large_records_never_end(quirks: Quirks) -> bool:
+    """1025 torque samples would be there after 93 s, or 205 s."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.board.receive(with_sum(b":1704010401"))
+    rig.run(0.1)
+    assert rig.board.commands[-1].command == 0x17
+    seconds = 1030 * (0.091 if quirks.fast_control else 0.2)
+    rig.decoder.expect_record(RecordKind.TORQUE, 1024, 1024)
+    return not any(isinstance(report, Record) for report in rig.run(seconds + 5.0))
+
+
+def lenient_hex(quirks: Quirks) -> bool:
+    """A payload with letters that are no digits, and a right checksum."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    for _ in range(5):
+        rig.board.receive(with_sum(b":020014zz14"))
+        rig.run(0.1)
+    return any(obeyed.payload == 0x00140000 for obeyed in rig.board.commands)
+
+
+def limits_rpm(quirks: Quirks) -> bool:
+    """At 50."""
+    rig = Rig(quirks).booted()
+    rig.drive(58, 58, 30.0)
+    return rig.board.motors[1].rpm < 53
+
+
+def fast_control(quirks: Quirks) -> bool:
+    """A set-point acts within 100 ms."""
+    delays = []
+    rig = Rig(quirks).booted()
+    for _ in range(12):
+        rig.say(SetDuty(0, 0))
+        rig.run(0.43)
+        rig.say(SetDuty(50, 50))
+        began = rig.board.commands[-1].tick
+        while not rig.board.driven:
+            rig.board.step()
+        delays.append(rig.board.tick - began)
+    return max(delays) <= 11
+
+
+def slow_boot(quirks: Quirks) -> bool:
+    """Silent; what comes meanwhile is read afterwards."""
+    rig = Rig(quirks)
+    rig.board.receive(encode_command(SetDuty(0, 0)))
+    early = rig.run(1.9)
+    deaf = not rig.board.commands
+    rig.run(0.2)
+    assert len(rig.board.commands) == 1
+    assert deaf is not bool(early)
+    return deaf
+
+
+SEEN: dict[str, Callable[[Quirks], bool]] = {
+    name: found
+    for name, found in globals().items()
+    if name in {field.name for field in fields(Quirks)}
+}
+
+
+def test_every_quirk_has_its_sight() -> None:
+    """None is forgotten here."""
+    assert set(SEEN) == {field.name for field in fields(Quirks)}
+
+
+@pytest.mark.parametrize("name", SEEN)
+def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
+    """All the others being there."""
+    assert SEEN[name](FIRMWARE)
+    assert not SEEN[name](replace(FIRMWARE, **{name: False}))
+
+
+@pytest.mark.parametrize("name", [name for name in SEEN if name != "extra_settings"])
+def test_a_quirk_is_unseen_on_a_board_as_documented(name: str) -> None:
+    """All the others being away as well."""
+    assert not SEEN[name](DOCUMENTED)
+
+
+def test_ticks_are_reported_as_they_are() -> None:
+    """So the tests above look at the right ones."""
+    rig = Rig().booted()
+    rig.drive(20, 20, 3.0)
+    assert isinstance(ticks_in(rig.run(0.5))[-1], Ticks)
