@@ -1,0 +1,374 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The LOIS ECU: its lines as readings, orders as its lines.
+
+``wrote`` must be called with whatever goes out: the odometry rests on it, since the board tells
+little of where its wheels turn. What the board says is told in ``translation``, how settings reach
+it in ``opening``, why set-points look as they do in ``outbound``.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from omnibot_driver.core.board import BoardFigures, Mode
+from omnibot_driver.core.commands.set_points import Authority
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.differential import DifferentialKinematics
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.lois_ecu import outbound
+from omnibot_driver.core.lois_ecu.decoder import DecoderStatistics, LoisDecoder
+from omnibot_driver.core.lois_ecu.messages import (
+    MOST_SAMPLES,
+    Command,
+    DistributeBall,
+    RecordHeading,
+    RecordKind,
+    RecordRpm,
+    RecordTorque,
+    Report,
+    Reset,
+    SetDuty,
+    SetLed,
+    SetRpm,
+    SetTerminalMode,
+    TerminalMode,
+    Ticks,
+)
+from omnibot_driver.core.lois_ecu.misconfiguration import Suspicion
+from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
+from omnibot_driver.core.lois_ecu.opening import RECOVER_AFTER_S, SettingsWriter
+from omnibot_driver.core.lois_ecu.readings import LoisReading
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.translation import Translation
+from omnibot_driver.core.requests import Request
+from omnibot_driver.core.traits import Traits
+
+TRAITS: Final = Traits(
+    imu=False,
+    authorities=frozenset({Authority.BASE, Authority.WHEELS}),
+    requests=frozenset({Request.RESET}),
+    wheels=("left", "right"),
+    unheard_s=1.0,  # groups come each 0.2 s, and may be lost
+    silence_s=1.5,
+)
+STANDS_AFTER_S: Final = 0.6
+"""Without a tick. The slowest wheel that turns, at 2 RPM, ticks each half second."""
+CLEAR_AFTER_S: Final = 0.8
+"""A Stop after which RPM 0/0 ends the counting."""
+
+
+class LoisEcu:
+    """One board on one line. ``settings`` may be replaced at any time."""
+
+    traits = TRAITS
+
+    def __init__(self, settings: LoisEcuSettings) -> None:
+        self._settings = settings
+        self._translation = Translation(settings)
+        self._writer = SettingsWriter(settings)
+        self._suspicion = Suspicion()
+        self._statistics = DecoderStatistics()
+        self._saturated = 0
+        self._opened = False
+        self.mode = Mode.UNKNOWN
+        self._forget_line()
+
+    def _forget_line(self) -> None:
+        self._decoder = LoisDecoder(sum_required=self._settings.with_sum)
+        self._decoder.statistics = self._statistics
+        self._heard_at_s = -math.inf
+        self._recovered_at_s = -math.inf
+        self._said: SetRpm | SetDuty | None = None
+        self._stopped_at_s = math.inf
+        self._clears_left = outbound.CLEARED_TIMES
+
+    @property
+    def settings(self) -> LoisEcuSettings:
+        """What the wire does not tell."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: LoisEcuSettings) -> None:
+        changed = (
+            settings.low_pass,
+            settings.written,
+            settings.periods_ms,
+            settings.with_sum,
+        ) != (
+            self._settings.low_pass,
+            self._settings.written,
+            self._settings.periods_ms,
+            self._settings.with_sum,
+        )
+        self._settings = self._translation.settings = self._writer.settings = settings
+        self._decoder.sum_required = settings.with_sum
+        if changed:
+            self._opened = False
+
+    # Inbound
+
+    def connect(self) -> None:
+        """The line is new; the settings are written again."""
+        self.mode = Mode.UNKNOWN
+        self._opened = False
+        self._forget_line()
+        self._translation.connect()
+
+    def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
+        """The readings that these bytes complete. Call it without bytes when none came."""
+        self._suspicion.look(data)
+        return self._understood(self._decoder.feed(data, now), now)
+
+    def flush(self, now: float) -> list[LoisReading]:
+        """The line is closed: what was held is all there will be."""
+        return self._understood(self._decoder.flush(now), now)
+
+    def _understood(self, reports: list[Report], now: float) -> list[LoisReading]:
+        restarts = self._translation.restarts
+        if reports:
+            if self.mode is Mode.UNKNOWN and self._opened:
+                self._writer.begin(now)  # it may have booted, and forgotten what it was told
+            self.mode = Mode.NOMINAL
+            self._heard_at_s = now
+            self._suspicion.understood()
+        for report in reports:
+            if isinstance(report, Ticks):
+                self._writer.ticks_came(now)
+        found = self._translation.readings(reports, self._decoder.clock_unit, now)
+        if self._translation.restarts != restarts:
+            self._writer.begin(now)
+        return found
+
+    def silence(self) -> None:
+        """Nothing was understood for so long that the mode is unknown again."""
+        self.mode = Mode.UNKNOWN
+
+    def predicted(self, now: float) -> FusedOdometry | None:
+        """Where the robot should be now; None before the first ticks."""
+        return self._translation.odometry.predict(now)
+
+    def reset_odometry(self) -> None:
+        """The odometry frame begins where the robot stands."""
+        self._translation.odometry.reset()
+
+    def stands(self, now: float) -> bool | None:
+        """Whether the robot is seen to stand since it was stopped; None where that is unknown.
+
+        The public firmware counts no ticks of a wheel that was commanded backward, or by RPM 0/0.
+        """
+        translation = self._translation
+        if now - translation.last_ticks_at_s > STANDS_AFTER_S:
+            return None
+        if now - max(translation.ticked_at_s, self._stopped_at_s) < STANDS_AFTER_S:
+            return False
+        return True if translation.odometry.counting else None
+
+    @property
+    def figures(self) -> BoardFigures:
+        """Over all connections."""
+        return BoardFigures(
+            rates_hz=(0.0, 0.0, 0.0),
+            faults=self._statistics.faults + self._decoder.group_statistics.damaged_groups,
+            discarded_bytes=self._statistics.discarded_bytes,
+            saturated=self._saturated,
+        )
+
+    @property
+    def advice(self) -> str | None:
+        """What a user should set otherwise, by what comes; None while all is well."""
+        return self._suspicion.advice
+
+    @property
+    def configured(self) -> bool:
+        """Whether the settings have gone out; by RPM the wheels do not turn before."""
+        return self._opened and self._writer.done
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the board has shown that it took the period of its ticks."""
+        return self._writer.confirmed
+
+    # Outbound
+
+    def due(self, now: float) -> bytes:
+        """Settings and what clears up after a Stop; call it at ``wake_at``."""
+        if not self._opened:
+            self._opened = True
+            self._writer.begin(now)
+            self._recovered_at_s = self._heard_at_s = now
+        data = self._writer.due(now, driving=self._driving)
+        if self._clear_due(now):
+            data += self._lines(outbound.EMERGENCY_STOP)
+        if now >= self._recover_at:
+            self._recovered_at_s = now
+            data += self._writer.recovery()
+        return data
+
+    @property
+    def wake_at(self) -> float:
+        """When ``due`` has to be asked again."""
+        if not self._opened:
+            return -math.inf
+        clear_at = self._stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
+        held = self._decoder.resolves_at
+        return min(self._writer.wake_at, clear_at, self._recover_at, held)
+
+    @property
+    def _recover_at(self) -> float:
+        if self._settings.terminal_mode in (TerminalMode.GPS, TerminalMode.COMPASS):
+            return math.inf
+        return max(self._heard_at_s, self._recovered_at_s) + RECOVER_AFTER_S
+
+    @property
+    def _driving(self) -> bool:
+        return self._said is not None and _moves(self._said)
+
+    def _clear_due(self, now: float) -> bool:
+        return self._clears_left > 0 and now >= self._stopped_at_s + CLEAR_AFTER_S
+
+    def wrote(self, data: bytes, now: float) -> None:
+        """These bytes went to the board."""
+        for command in outbound.set_points(data, with_sum=self._settings.with_sum):
+            self._translation.odometry.wrote(command, now)
+            if _moves(command):
+                self._stopped_at_s = math.inf
+                if isinstance(self._said, SetDuty) and isinstance(command, SetRpm):
+                    self._clears_left = outbound.CLEARED_TIMES
+            elif isinstance(command, SetDuty):
+                if self._driving or self._stopped_at_s == math.inf:
+                    self._stopped_at_s = now
+                    self._clears_left = outbound.CLEARED_TIMES
+            else:
+                self._clears_left = max(self._clears_left - 1, 0)
+                if self._stopped_at_s == math.inf:
+                    self._stopped_at_s = now
+            self._said = command
+
+    def stop(self) -> bytes:
+        """Duty 0/0."""
+        return self._lines(outbound.STOP)
+
+    def emergency_stop(self) -> bytes:
+        """RPM 0/0, which alternates with Stop; the board has no latch of its own."""
+        return self._lines(outbound.EMERGENCY_STOP)
+
+    def velocity(self, twist: BodyTwist) -> bytes:
+        """By the drive mode; Stop when it rounds to nothing."""
+        rates = self._kinematics.wheel_rates(twist)
+        return self.wheels(rates)
+
+    def wheels(self, rates_radps: Sequence[float]) -> bytes:
+        """Left and right in rad/s; Stop when both round to nothing."""
+        settings = self._settings
+        left, right = rates_radps
+        if settings.drive_mode == "duty":
+            percent = settings.wheel_radius_m * settings.duty_scale
+            return self.duty((left * percent, right * percent))
+        rpm = 60 / math.tau
+        pair, was_saturated = outbound.saturated((left * rpm, right * rpm), outbound.MOST_RPM)
+        self._saturated += was_saturated
+        if not any(pair):
+            return self.stop()
+        command = SetRpm(*self._board_order(pair))
+        if self._clears_left and not self._driving_by_rpm:
+            return self._lines(outbound.EMERGENCY_STOP, command)
+        return self._lines(command)
+
+    def duty(self, percents: Sequence[float]) -> bytes:
+        """Left and right in percent, open loop. Refused in RPM mode."""
+        if self._settings.drive_mode != "duty":
+            raise CommandRefused(
+                "duty_cmd refused: drive_mode is rpm; set it to duty to drive without the"
+                " speed controller"
+            )
+        left, right = percents
+        most = min(self._settings.max_duty, outbound.MOST_PERCENT)
+        pair, was_saturated = outbound.saturated((left, right), most)
+        self._saturated += was_saturated
+        return self._lines(SetDuty(*self._board_order(pair)))
+
+    @property
+    def _driving_by_rpm(self) -> bool:
+        return self._driving and isinstance(self._said, SetRpm)
+
+    def meaning(self, data: bytes) -> BodyTwist:
+        """The body velocity that the last set-point in these bytes commands."""
+        found = outbound.set_points(data, with_sum=self._settings.with_sum)
+        if not found:
+            return BodyTwist(0.0, 0.0, 0.0)
+        command = found[-1]
+        settings = self._settings
+        if isinstance(command, SetRpm):
+            pair = (command.left_rpm, command.right_rpm)
+            unit = math.tau / 60
+        else:
+            pair = (command.left_percent, command.right_percent)
+            unit = 1 / (settings.duty_scale * settings.wheel_radius_m)
+        left, right = self._board_order(pair)
+        return self._kinematics.body_twist((left * unit, right * unit))
+
+    # Other requests
+
+    def reset(self) -> bytes:
+        """Stop, then the board's reset; the counters begin anew."""
+        self._decoder.forget_counters()
+        self._translation.connect()
+        return self._lines(outbound.STOP, Reset())
+
+    def led(self, on: bool) -> bytes:
+        """The board's LED."""
+        return self._lines(SetLed(on))
+
+    def distribute_ball(self) -> bytes:
+        """Once; do not repeat it."""
+        return self._lines(DistributeBall())
+
+    def record(self, kind: RecordKind, samples: int) -> bytes:
+        """Begin to record. Raises CommandRefused where it could not complete."""
+        if not 0 < samples <= MOST_SAMPLES:
+            raise CommandRefused(
+                f"record refused: {samples} samples; the board completes 1 to {MOST_SAMPLES}"
+            )
+        self._decoder.expect_record(kind, samples, 0 if kind is RecordKind.HEADING else samples)
+        command: Command
+        match kind:
+            case RecordKind.RPM:
+                command = RecordRpm(samples, samples)
+            case RecordKind.TORQUE:
+                command = RecordTorque(samples, samples)
+            case RecordKind.HEADING:
+                command = RecordHeading(samples)
+        return self._lines(command)
+
+    def terminal_mode(self, mode: TerminalMode, now: float) -> bytes:
+        """Stop, then the mode; back on the protocol the left short correction is written again.
+
+        A press of the button meanwhile is not told by the public firmware.
+        """
+        self._decoder.terminal = mode in (TerminalMode.GPS, TerminalMode.COMPASS)
+        data = self._lines(outbound.STOP, SetTerminalMode(mode))
+        if not self._decoder.terminal:
+            self._writer.begin(now)
+            data += self._writer.recovery()
+        return data
+
+    def _lines(self, *commands: Command) -> bytes:
+        return outbound.lines(*commands, with_sum=self._settings.with_sum)
+
+    def _board_order(self, pair: tuple[int, int]) -> tuple[int, int]:
+        """The board's left and right, or back."""
+        return (pair[1], pair[0]) if self._settings.inverted else pair
+
+    @property
+    def _kinematics(self) -> DifferentialKinematics:
+        settings = self._settings
+        return DifferentialKinematics(
+            wheel_radius_m=settings.wheel_radius_m, track_m=settings.track_m
+        )
+
+
+def _moves(command: SetRpm | SetDuty) -> bool:
+    match command:
+        case SetRpm(left, right) | SetDuty(left, right):
+            return bool(left or right)

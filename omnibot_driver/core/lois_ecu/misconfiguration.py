@@ -1,0 +1,59 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What bytes that are no lines look like: which other board, or which wrong setting.
+
+Knows bytes, no time. One sentence at most, and none while lines are understood.
+"""
+
+import re
+from typing import Final
+
+LOOK_AT: Final = 600
+"""Bytes without one right line. At the slowest, the board sends 70 of them in a second."""
+
+_LINE: Final = re.compile(rb":[0-9a-fA-F]+\r?\n")
+_NMEA: Final = re.compile(rb"[$!][A-Z]{2}[A-Z]{3},")
+_OMNIBOT: Final = re.compile(rb"\xff[\xfa\xfb\xfc]|Paused: ")
+
+
+class Suspicion:
+    """``look`` at all bytes; ``understood`` when some were a report."""
+
+    def __init__(self) -> None:
+        self.advice: str | None = None
+        self._seen = b""
+
+    def understood(self) -> None:
+        """It is the right board."""
+        self._seen, self.advice = b"", None
+
+    def look(self, data: bytes) -> None:
+        """More bytes."""
+        if not data:
+            return
+        self._seen = (self._seen + data)[-2 * LOOK_AT :]
+        if len(self._seen) >= LOOK_AT:
+            self.advice = _advice(self._seen)
+
+
+def _advice(seen: bytes) -> str:
+    if len(_OMNIBOT.findall(seen)) >= 5:
+        return (
+            "the port carries an OmniBot board's frames: set board to omnibot, or choose its port"
+        )
+    if len(_NMEA.findall(seen)) >= 3:
+        return (
+            "the port carries NMEA sentences: it is a GPS or a compass, or the board is in a"
+            " terminal mode; set terminal_mode to host, or choose another port"
+        )
+    lengths = [len(line.replace(b"\r", b"")) for line in _LINE.findall(seen)]
+    if len(lengths) >= 5:
+        usual = max(set(lengths), key=lengths.count)
+        if usual == 12:
+            return "lines come without checksum: turn the parameter for checksums off"
+        if usual == 14:
+            return "lines come with wrong checksums: check the cable and the baud rate"
+        return f"lines of {usual} characters come instead of 14: this is another firmware or board"
+    if sum(byte > 126 for byte in seen) > len(seen) / 10:
+        return "the bytes are no text: check baudrate (115200), and that the port is the ECU's"
+    return "nothing that comes is a line of this board: check that the port is the ECU's"

@@ -1,0 +1,134 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Settings on their way to a board that acknowledges nothing and loses single lines.
+
+Every line goes out ``ROUNDS`` times, the rounds apart by more than the board is deaf for. What can
+be confirmed is the period of the ticks; while that is another one, the rounds go on. Writing a gain
+makes the firmware's controller begin anew, so settings wait while the robot drives.
+
+A board whose terminal mode or checksum is set otherwise is silent, or seems to obey nothing. Then a
+line that puts it back goes out in both forms, and the left short correction after it, which any
+write of the terminal mode overwrites.
+"""
+
+import math
+from collections import deque
+from collections.abc import Iterable
+from statistics import median
+from typing import Final
+
+from omnibot_driver.core.lois_ecu.messages import (
+    Command,
+    SetPeriod,
+    SetTerminalMode,
+    Setting,
+    Stream,
+    TerminalMode,
+    WriteSetting,
+    encode_command,
+)
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+ROUNDS: Final = 5
+ROUND_S: Final = 0.15
+LINE_S: Final = 0.02
+CONFIRMED_WITHIN: Final = 0.35
+"""Part by which the ticks' period may differ from what was asked for."""
+MOST_ROUNDS: Final = 40
+RECOVER_AFTER_S: Final = 3.0
+"""The board boots for two seconds."""
+BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
+"""What the public firmware begins with."""
+
+
+class SettingsWriter:
+    """``due`` what to write now. ``confirmed``: the ticks come at the period that was asked for."""
+
+    def __init__(self, settings: LoisEcuSettings) -> None:
+        self.settings = settings
+        self.confirmed = False
+        self._queue: deque[tuple[float, Command]] = deque()
+        self._rounds_left = 0
+        self._round_at_s = math.inf
+        self._arrivals: deque[float] = deque(maxlen=6)
+        self._rounds = 0
+
+    @property
+    def done(self) -> bool:
+        """All that was to be written went out as often as it should."""
+        return not self._queue and not self._rounds_left
+
+    @property
+    def wake_at(self) -> float:
+        """When ``due`` has something; infinity while nothing is left."""
+        if self._queue:
+            return self._queue[0][0]
+        return self._round_at_s if self._rounds_left else math.inf
+
+    def begin(self, now: float) -> None:
+        """All settings, from now on: a new line, a restart, or other settings."""
+        self._queue.clear()
+        self._arrivals.clear()
+        self._rounds_left, self._round_at_s = ROUNDS, now
+        self._rounds, self.confirmed = 0, False
+
+    def write(self, command: Command, now: float) -> None:
+        """One more, as often."""
+        for count in range(ROUNDS):
+            self._queue.append((now + count * ROUND_S, command))
+        self._queue = deque(sorted(self._queue, key=lambda entry: entry[0]))
+
+    def ticks_came(self, now: float) -> None:
+        """A group of ticks: its period confirms ours."""
+        self._arrivals.append(now)
+        wanted = self.settings.periods_ms.get(Stream.TICKS)
+        if wanted is None or len(self._arrivals) < 4:
+            return
+        times = list(self._arrivals)
+        steps = [after - before for before, after in zip(times, times[1:], strict=False)]
+        wanted_s = wanted / 1000
+        self.confirmed = abs(median(steps) - wanted_s) <= CONFIRMED_WITHIN * wanted_s
+        if not self.confirmed and self.done and self._rounds < MOST_ROUNDS:
+            self._rounds_left, self._round_at_s = 1, now
+
+    def due(self, now: float, *, driving: bool) -> bytes:
+        """The lines to write now, possibly none."""
+        if driving and self._rounds >= ROUNDS:
+            return b""
+        if self._rounds_left and not self._queue and now >= self._round_at_s:
+            self._rounds_left -= 1
+            self._rounds += 1
+            self._round_at_s = max(now, self._round_at_s) + ROUND_S
+            for index, command in enumerate(self.commands()):
+                self._queue.append((now + index * LINE_S, command))
+        data = b""
+        while self._queue and now >= self._queue[0][0]:
+            data += encode_command(self._queue.popleft()[1], with_sum=self.settings.with_sum)
+        return data
+
+    def commands(self) -> Iterable[Command]:
+        """In the order in which they are written."""
+        settings = self.settings
+        if not settings.with_sum:
+            yield SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
+            yield self._left_short_correction()
+        yield WriteSetting(Setting.RPM_LOW_PASS, settings.low_pass)
+        for stream, period_ms in settings.periods_ms.items():
+            yield SetPeriod(stream, period_ms)
+        for setting, number in settings.written.items():
+            if setting is not Setting.LEFT_SHORT_CORRECTION or settings.with_sum:
+                yield WriteSetting(setting, number)
+
+    def recovery(self) -> bytes:
+        """For a board that is silent or obeys nothing, whatever it expects."""
+        mode = TerminalMode.HOST if self.settings.with_sum else TerminalMode.HOST_WITHOUT_SUM
+        back = SetTerminalMode(mode)
+        correction = encode_command(self._left_short_correction(), with_sum=self.settings.with_sum)
+        return (
+            encode_command(back, with_sum=True) + encode_command(back, with_sum=False) + correction
+        )
+
+    def _left_short_correction(self) -> WriteSetting:
+        setting = Setting.LEFT_SHORT_CORRECTION
+        number = self.settings.written.get(setting, BOOT_LEFT_SHORT_CORRECTION)
+        return WriteSetting(setting, number)

@@ -1,0 +1,54 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a user has to say of a LOIS ECU and its robot, because its wire does not."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Final, Literal
+
+from omnibot_driver.core.lois_ecu.messages import Setting, Stream, TerminalMode
+
+DriveMode = Literal["rpm", "duty"]
+
+USUAL_PERIODS_MS: Final[Mapping[Stream, int]] = MappingProxyType(
+    {Stream.TICKS: 200, Stream.ODOMETRY: 200}
+)
+"""What the odometry needs. Shorter ones make the board deaf for more of the time."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoisEcuSettings:
+    """``inverted``: the board's left wheel is the robot's right one, and the other way round.
+
+    ``drive_mode``: whether ``cmd_vel`` is said as RPM or as duty; then ``duty_scale`` is percent
+    for each m/s of a rim, and no motor gets more than ``max_duty``. ``low_pass``: 0..1, what each
+    step of the speed controller takes over of a new set-point; a board that has none never turns
+    its wheels in RPM mode. ``written``: further settings that the user wants on the board.
+    ``periods_ms``: of what the board sends by itself; others stay as they are. ``with_sum``:
+    whether what is sent has a checksum. ``declination_rad``: of magnetic north, east positive.
+    """
+
+    wheel_radius_m: float = 0.13
+    track_m: float = 0.47
+    ticks_per_revolution: int = 60
+    inverted: bool = False
+    drive_mode: DriveMode = "rpm"
+    max_duty: int = 100
+    duty_scale: float = 130.0
+    low_pass: float = 1.0
+    written: Mapping[Setting, float] = field(default_factory=dict)
+    periods_ms: Mapping[Stream, int] = field(default_factory=lambda: USUAL_PERIODS_MS)
+    with_sum: bool = True
+    terminal_mode: TerminalMode = TerminalMode.HOST
+    declination_rad: float = 0.0
+
+    @property
+    def rim_mps_per_rpm(self) -> float:
+        """Speed of a rim at one revolution per minute."""
+        return 0.10471975511965977 * self.wheel_radius_m
+
+    @property
+    def tick_m(self) -> float:
+        """What a wheel rolls in one tick."""
+        return 6.283185307179586 * self.wheel_radius_m / self.ticks_per_revolution

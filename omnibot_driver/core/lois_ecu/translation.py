@@ -1,0 +1,157 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From what a LOIS ECU reports to readings in SI units. Knows reports, not lines.
+
+Also finds out that the board has restarted: its ticks are zero again, or its clock is behind.
+"""
+
+import math
+from datetime import UTC, datetime
+from typing import Final
+
+from omnibot_driver.core.board import DisplacementReading
+from omnibot_driver.core.lois_ecu.heading_filter import HeadingFilter
+from omnibot_driver.core.lois_ecu.messages import (
+    BoardOdometry,
+    EStopButton,
+    GpsDate,
+    GpsPosition,
+    GpsTime,
+    Heading,
+    Record,
+    Report,
+    TerminalLine,
+    Ticks,
+)
+from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
+from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
+from omnibot_driver.core.lois_ecu.readings import (
+    FixReading,
+    HeadingReading,
+    LoisReading,
+    TimeReading,
+    WheelReading,
+)
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+RESTARTED_TICKS: Final = 20
+"""So many fewer ticks than before are a new beginning, not wheels that roll back."""
+
+
+class Translation:
+    """``settings`` may be replaced at any time. ``restarts``: of the board, as far as is known."""
+
+    def __init__(self, settings: LoisEcuSettings) -> None:
+        self.settings = settings
+        self.odometry = LoisOdometry(settings)
+        self.headings = HeadingFilter()
+        self.restarts = 0
+        self.last_ticks_at_s = -math.inf
+        self.ticked_at_s = -math.inf
+        """When ticks were last seen to change."""
+        self._connect()
+
+    def _connect(self) -> None:
+        self._ticks: Ticks | None = None
+        self._stamp_s: float | None = None
+        self._date: GpsDate | None = None
+
+    def connect(self) -> None:
+        """The line is new."""
+        self._connect()
+        self.odometry.connect()
+        self.headings.forget()
+
+    def readings(
+        self, reports: list[Report], clock_unit: ClockUnit | None, now: float
+    ) -> list[LoisReading]:
+        """In the order of the line."""
+        found: list[LoisReading] = []
+        for report in reports:
+            found += self._readings(report, clock_unit, now)
+        return found + self.rest(now)
+
+    def rest(self, now: float) -> list[LoisReading]:
+        """What waited for more that did not come."""
+        return self._displaced(self.odometry.rest(now))
+
+    def _readings(
+        self, report: Report, clock_unit: ClockUnit | None, now: float
+    ) -> list[LoisReading]:
+        match report:
+            case Ticks():
+                self._watch(report, clock_unit, now)
+                return self._displaced(self.odometry.heard_ticks(report, now))
+            case BoardOdometry():
+                return self._displaced(self.odometry.heard_odometry(report, now))
+            case GpsPosition(latitude, longitude):
+                return [FixReading(latitude, longitude, bool(latitude or longitude))]
+            case GpsDate():
+                self._date = report if report.month and report.day else None
+            case GpsTime():
+                return [TimeReading(self._utc_s(report))]
+            case Heading(heading_deg):
+                return self._heading(heading_deg)
+            case EStopButton():
+                self.odometry.halted(now)
+                return [report]
+            case Record() | TerminalLine():
+                return [report]
+        return []
+
+    def _watch(self, ticks: Ticks, clock_unit: ClockUnit | None, now: float) -> None:
+        before, self._ticks = self._ticks, ticks
+        self.last_ticks_at_s = now
+        if before is None:
+            self.ticked_at_s = now
+            return
+        ways = wrapped(ticks.left - before.left), wrapped(ticks.right - before.right)
+        if any(ways):
+            self.ticked_at_s = now
+        late = clock_unit == "ms" and wrapped(ticks.time_counts - before.time_counts) < 0
+        fewer = min(ways) < -RESTARTED_TICKS and max(abs(ticks.left), abs(ticks.right)) < 100
+        if late or fewer:
+            self.restarts += 1
+            self.odometry.connect()
+            self.headings.forget()
+
+    def _displaced(self, fused: FusedOdometry | None) -> list[LoisReading]:
+        if fused is None:
+            return []
+        before, self._stamp_s = self._stamp_s, fused.stamp_s
+        way = fused.displacement
+        radius_m = self.settings.wheel_radius_m
+        left_m, right_m = fused.wheel_ways_m
+        if self.settings.inverted:
+            left_m, right_m = right_m, left_m
+        return [
+            DisplacementReading(
+                way.x_m,
+                way.y_m,
+                way.yaw_rad,
+                "body",
+                None if before is None else fused.stamp_s - before,
+                0,
+            ),
+            WheelReading(left_m / radius_m, right_m / radius_m, not fused.blind),
+            fused,
+        ]
+
+    def _heading(self, heading_deg: int) -> list[LoisReading]:
+        now = self.odometry.yaw_rad
+        if not self.headings.believes(float(heading_deg), now):
+            return []
+        magnetic_rad = math.radians(heading_deg)
+        yaw_rad = math.pi / 2 - (magnetic_rad + self.settings.declination_rad)
+        return [HeadingReading(math.remainder(yaw_rad, math.tau))]
+
+    def _utc_s(self, time: GpsTime) -> int | None:
+        date = self._date
+        if date is None:
+            return None
+        try:
+            day = datetime(2000 + date.year, date.month, date.day, tzinfo=UTC)
+        except ValueError:
+            return None
+        clock_s = time.hours * 3600 + time.minutes * 60 + time.seconds
+        return int(day.timestamp()) + clock_s
