@@ -54,8 +54,9 @@ TRAITS: Final = Traits(
 )
 STANDS_AFTER_S: Final = 0.6
 """Without a tick. The slowest wheel that turns, at 2 RPM, ticks each half second."""
-CLEAR_AFTER_S: Final = 0.8
-"""A Stop after which RPM 0/0 ends the counting."""
+CLEAR_AFTER_S: Final = 2.0
+"""After a Stop; then RPM 0/0 ends the counting."""
+CLEAR_AGAIN_S: Final = 0.15
 
 
 class LoisEcu:
@@ -81,6 +82,7 @@ class LoisEcu:
         self._recovered_at_s = -math.inf
         self._said: SetRpm | SetDuty | None = None
         self._stopped_at_s = math.inf
+        self._stood = False
         self._clears_left = outbound.CLEARED_TIMES
 
     @property
@@ -157,12 +159,16 @@ class LoisEcu:
 
         The public firmware counts no ticks of a wheel that was commanded backward, or by RPM 0/0.
         """
+        if self._stood:
+            return True
         translation = self._translation
         if now - translation.last_ticks_at_s > STANDS_AFTER_S:
             return None
-        if now - max(translation.ticked_at_s, self._stopped_at_s) < STANDS_AFTER_S:
+        stopped_at_s = self._stopped_at_s
+        if self._driving or now - max(translation.ticked_at_s, stopped_at_s) < STANDS_AFTER_S:
             return False
-        return True if translation.odometry.counting else None
+        self._stood = translation.odometry.counting
+        return self._stood or None
 
     @property
     def figures(self) -> BoardFigures:
@@ -196,13 +202,15 @@ class LoisEcu:
         if not self._opened:
             self._opened = True
             self._writer.begin(now)
-            self._recovered_at_s = self._heard_at_s = now
+            self._recovered_at_s = now
         data = self._writer.due(now, driving=self._driving)
         if self._clear_due(now):
+            self._stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S
             data += self._lines(outbound.EMERGENCY_STOP)
         if now >= self._recover_at:
             self._recovered_at_s = now
             data += self._writer.recovery()
+            self._writer.begin(now)
         return data
 
     @property
@@ -218,7 +226,10 @@ class LoisEcu:
     def _recover_at(self) -> float:
         if self._settings.terminal_mode in (TerminalMode.GPS, TerminalMode.COMPASS):
             return math.inf
-        return max(self._heard_at_s, self._recovered_at_s) + RECOVER_AFTER_S
+        if self._driving:
+            return math.inf
+        silent_since_s = self._recovered_at_s if self._writer.ignored else self._heard_at_s
+        return max(silent_since_s, self._recovered_at_s) + RECOVER_AFTER_S
 
     @property
     def _driving(self) -> bool:
@@ -232,17 +243,16 @@ class LoisEcu:
         for command in outbound.set_points(data, with_sum=self._settings.with_sum):
             self._translation.odometry.wrote(command, now)
             if _moves(command):
-                self._stopped_at_s = math.inf
-                if isinstance(self._said, SetDuty) and isinstance(command, SetRpm):
-                    self._clears_left = outbound.CLEARED_TIMES
-            elif isinstance(command, SetDuty):
-                if self._driving or self._stopped_at_s == math.inf:
-                    self._stopped_at_s = now
+                self._stopped_at_s, self._stood = math.inf, False
+                if isinstance(command, SetDuty):
                     self._clears_left = outbound.CLEARED_TIMES
             else:
-                self._clears_left = max(self._clears_left - 1, 0)
                 if self._stopped_at_s == math.inf:
                     self._stopped_at_s = now
+                if isinstance(command, SetRpm):
+                    self._clears_left = max(self._clears_left - 1, 0)
+                elif self._driving:
+                    self._clears_left = outbound.CLEARED_TIMES
             self._said = command
 
     def stop(self) -> bytes:
@@ -271,7 +281,7 @@ class LoisEcu:
         if not any(pair):
             return self.stop()
         command = SetRpm(*self._board_order(pair))
-        if self._clears_left and not self._driving_by_rpm:
+        if self._clears_left:
             return self._lines(outbound.EMERGENCY_STOP, command)
         return self._lines(command)
 
@@ -287,10 +297,6 @@ class LoisEcu:
         pair, was_saturated = outbound.saturated((left, right), most)
         self._saturated += was_saturated
         return self._lines(SetDuty(*self._board_order(pair)))
-
-    @property
-    def _driving_by_rpm(self) -> bool:
-        return self._driving and isinstance(self._said, SetRpm)
 
     def meaning(self, data: bytes) -> BodyTwist:
         """The body velocity that the last set-point in these bytes commands."""

@@ -9,7 +9,8 @@ can stand twice then) and the values go on from the last group. Else it waits fo
 or for ``QUIET_S`` without one.
 
 0x12 is two kinds of group, told apart by their length: ticks of 3 lines, and in the public firmware
-6 of odometry right behind them. Knows lines and arrival times, no characters.
+6 of odometry right behind them. A count of -1 looks like a marker; then too the length tells.
+Knows lines and arrival times, no characters.
 """
 
 import math
@@ -48,7 +49,7 @@ _LENGTHS: Final = {
     Code.TICKS: (3, 6),
     Code.ODOMETRY: (6,),
 }
-_LONGEST: Final = 7
+_LONGEST: Final = 10
 _RECORD_CODES: Final = (Code.RECORD_RPM, Code.RECORD_TORQUE, Code.RECORD_HEADING)
 
 GroupReport = Ticks | BoardOdometry | GpsPosition
@@ -116,7 +117,7 @@ class Assembler:
         code, payload = line.command, line.payload
         if code in _LENGTHS:
             found = self._break_record()
-            if payload == MARKER:
+            if payload == MARKER and not self._may_be_minus_one(code):
                 found += self._end(now)
                 self._code, self._payloads, self._done, self._astray = code, [], False, False
                 self._at = now
@@ -150,6 +151,10 @@ class Assembler:
 
     # Groups
 
+    def _may_be_minus_one(self, code: int) -> bool:
+        """Whether this marker could be a count; if it is none, the group will be too long."""
+        return code == self._code == Code.TICKS and not self._done and 0 < len(self._payloads) < 3
+
     def _value(self, code: int, payload: int, now: float) -> list[Report]:
         if code != self._code:
             found = self._end(now)
@@ -165,7 +170,7 @@ class Assembler:
             self._payloads.append(payload)
         if len(self._payloads) not in _LENGTHS[Code(code)]:
             return []
-        repeated = any(map(eq, self._payloads, self._payloads[1:]))
+        repeated = any(map(eq, self._payloads, self._payloads[1:])) or MARKER in self._payloads
         if repeated or (self._after_ticks and self._appends and len(self._payloads) == 3):
             return []
         group = _group(code, self._payloads)
@@ -185,7 +190,11 @@ class Assembler:
             self._after_ticks = 0 < len(self._payloads) < 4 and not was_after_ticks
         if self._done:
             return []
-        group = _group(code, self._payloads)
+        payloads = self._payloads
+        if MARKER in payloads and len(payloads) != 3:  # it was no count
+            self.statistics.damaged_groups += 1
+            payloads = payloads[payloads.index(MARKER) + 1 :]
+        group = _group(code, payloads)
         if group is None:
             self.statistics.damaged_groups += 1
             return []

@@ -38,15 +38,21 @@ FIRMWARE_GAIN: Final = 1.09
 """Backwards, the firmware lowers its target with each tick, until the controller's next step."""
 GAIN_STDDEV: Final = 0.05
 GAIN_MEASURED_STDDEV: Final = 0.03
-GAIN_FLOOR: Final = 0.02
+GAIN_FLOOR: Final = 0.025
 DUTY_STDDEV: Final = 0.3
-ROUNDING_STDDEV: Final = 0.012
+ROUNDING_STDDEV: Final = 0.015
 """Of the turn that 0x20 tells, after half an RPM was added to each wheel."""
-UNSTEADY: Final = 0.35
+UNSTEADY: Final = 0.55
 """Part of a blind change of speed that the model may be off by."""
-TRANSITION_S: Final = 0.05
+TRANSITION_S: Final = 0.06
 HALF_RPM: Final = 0.5
 LONGEST_STEP_S: Final = 2.0
+STARTING_TICKS: Final = 1.2
+STARTING_STDDEV: Final = 0.8
+"""What 0x20 lacks of a wheel that starts: the tick that takes the whole rest has no speed."""
+CHANGING_PART: Final = 0.12
+TOLD_PART: Final = 0.5
+"""0x20's speeds leave so much of the model's error, where they are used."""
 TOLD_AT_MOST: Final = 1.5
 """More than the model's way so many times is a leap of 0x20, not motion: it takes a speed from
 before a rest for that of the whole rest."""
@@ -285,7 +291,7 @@ class LoisOdometry:
         errors = [0.0, 0.0]
         common_m = 0.0
         if turned is not None:
-            ways, errors, common_m = self._with_heading(ways, blind, expected, turned)
+            ways, errors, common_m = self._with_heading(ways, blind, expected, turned, duration_s)
         else:
             for index in range(2):
                 if blind[index]:
@@ -346,6 +352,10 @@ class LoisOdometry:
         by_model = (ways[1] - ways[0]) / self._settings.track_m
         if abs(turned - by_model) > 0.25 + 0.6 * abs(by_model):
             return None
+        lost_m = STARTING_TICKS * self._settings.tick_m
+        for one, direction, side in zip(expected, directions, (-1, 1), strict=True):
+            if one.started:
+                turned += side * direction * lost_m / self._settings.track_m
         return turned
 
     def _with_heading(
@@ -354,14 +364,17 @@ class LoisOdometry:
         blind: list[bool],
         expected: tuple[Expected, Expected],
         turned: float,
+        duration_s: float,
     ) -> tuple[list[float], list[float], float]:
         """Ways, standard deviations of each wheel alone, and the way by the model."""
         rim_m = turned * self._settings.track_m
         left_m, right_m = ways
+        starting = sum(one.started for one in expected)
+        unsure = STARTING_STDDEV * self._settings.tick_m * math.sqrt(starting)
         if not blind[0]:
-            return [left_m, left_m + rim_m], [0.0, 0.0], 0.0
+            return [left_m, left_m + rim_m], [0.0, unsure], 0.0
         if not blind[1]:
-            return [right_m - rim_m, right_m], [0.0, 0.0], 0.0
+            return [right_m - rim_m, right_m], [unsure, 0.0], 0.0
         mean_m = (left_m + right_m) / 2
         board, before = self._board, self._board_used
         if board is not None and before is not None and left_m < 0 and right_m < 0:
@@ -369,7 +382,22 @@ class LoisOdometry:
             if told_m < TOLD_AT_MOST * -mean_m:
                 mean_m = -max(-mean_m, told_m)
         error = max(self._model_error(one) for one in expected)
+        told = self._told_speeds(board) if board is not None else None
+        if told is not None and self._changing(told):
+            before_mps = sum(one.from_mps for one in expected) / 2
+            mean_m = (before_mps + sum(told) / 2) / 2 * duration_s
+            error *= TOLD_PART
         return [mean_m - rim_m / 2, mean_m + rim_m / 2], [error, error], abs(mean_m)
+
+    def _changing(self, told: tuple[float, float]) -> bool:
+        """Whether 0x20's speeds tell more than the model: on the way to another speed."""
+        for model, speed in zip(self._models, told, strict=True):
+            if speed * model.target_mps <= 0 or not model.measuring:
+                return False
+        return any(
+            abs(speed - model.final_mps) > CHANGING_PART * abs(model.final_mps)
+            for model, speed in zip(self._models, told, strict=True)
+        )
 
     def _model_error(self, expected: Expected) -> float:
         return UNSTEADY * expected.unsteady_m + TRANSITION_S * expected.changes_mps
@@ -482,9 +510,13 @@ class LoisOdometry:
         if hidden:
             self._extra = self._extra.with_errors([(hidden, cos, sin, 0.0)])
         if any(errors):
-            if turned is not None:
+            if turned is not None and all(blind):
                 mean = max(errors)
-                self._extra = self._extra.with_errors([(mean * mean, cos, sin, 0.0)])
+                unsure = sum(one.started for one in expected) * (STARTING_STDDEV / track_m) ** 2
+                turn = unsure * self._settings.tick_m**2
+                self._extra = self._extra.with_errors(
+                    [(mean * mean, cos, sin, 0.0), (turn, 0.0, 0.0, 1.0)]
+                )
             else:
                 for error, turn in zip(errors, (-1 / track_m, 1 / track_m), strict=True):
                     way = (error * error, cos / 2, sin / 2, turn)

@@ -14,6 +14,7 @@ write of the terminal mode overwrites.
 import math
 from collections import deque
 from collections.abc import Iterable
+from itertools import pairwise
 from statistics import median
 from typing import Final
 
@@ -32,6 +33,8 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 ROUNDS: Final = 5
 ROUND_S: Final = 0.15
 LINE_S: Final = 0.02
+AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
+"""After a group of ticks the next group is often on its way, and the board is deaf."""
 CONFIRMED_WITHIN: Final = 0.35
 """Part by which the ticks' period may differ from what was asked for."""
 MOST_ROUNDS: Final = 40
@@ -52,11 +55,18 @@ class SettingsWriter:
         self._round_at_s = math.inf
         self._arrivals: deque[float] = deque(maxlen=6)
         self._rounds = 0
+        self._overwritten = False
+        """The terminal mode was written, and the left short correction with it."""
 
     @property
     def done(self) -> bool:
         """All that was to be written went out as often as it should."""
         return not self._queue and not self._rounds_left
+
+    @property
+    def ignored(self) -> bool:
+        """Whether the board sends, and seems to take nothing of what it is told."""
+        return self._rounds >= 2 * ROUNDS and not self.confirmed
 
     @property
     def wake_at(self) -> float:
@@ -85,11 +95,12 @@ class SettingsWriter:
         if wanted is None or len(self._arrivals) < 4:
             return
         times = list(self._arrivals)
-        steps = [after - before for before, after in zip(times, times[1:], strict=False)]
+        steps = [after - before for before, after in pairwise(times)]
         wanted_s = wanted / 1000
         self.confirmed = abs(median(steps) - wanted_s) <= CONFIRMED_WITHIN * wanted_s
         if not self.confirmed and self.done and self._rounds < MOST_ROUNDS:
-            self._rounds_left, self._round_at_s = 1, now
+            away_s = AWAY_S[self._rounds % len(AWAY_S)]
+            self._rounds_left, self._round_at_s = 1, now + away_s
 
     def due(self, now: float, *, driving: bool) -> bytes:
         """The lines to write now, possibly none."""
@@ -111,16 +122,17 @@ class SettingsWriter:
         settings = self.settings
         if not settings.with_sum:
             yield SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
+        if self._overwritten or not settings.with_sum:
             yield self._left_short_correction()
         yield WriteSetting(Setting.RPM_LOW_PASS, settings.low_pass)
         for stream, period_ms in settings.periods_ms.items():
             yield SetPeriod(stream, period_ms)
         for setting, number in settings.written.items():
-            if setting is not Setting.LEFT_SHORT_CORRECTION or settings.with_sum:
-                yield WriteSetting(setting, number)
+            yield WriteSetting(setting, number)
 
     def recovery(self) -> bytes:
         """For a board that is silent or obeys nothing, whatever it expects."""
+        self._overwritten = True
         mode = TerminalMode.HOST if self.settings.with_sum else TerminalMode.HOST_WITHOUT_SUM
         back = SetTerminalMode(mode)
         correction = encode_command(self._left_short_correction(), with_sum=self.settings.with_sum)

@@ -6,13 +6,13 @@ The argument. A line is accepted if it is 14 characters from a ``:`` (12 without
 line feed, and its checksum is right. The public firmware counts characters from the last ``:`` and
 begins anew after the fourteenth. So a line that lost characters is too short. For two lines to
 become one, fourteen characters in a row must be lost, the end of one and the beginning of the next
-among them (twelve without checksum); none of up to two lost characters makes another line, nor does
-any loss of fewer than twelve. The board is deaf for 13 ms while it sends a group, and set-points are
-18 ms apart at least, so one deaf time does not take the end of one and the beginning of the next.
+among them (twelve without checksum). No loss of up to two characters makes another line. The board
+is deaf for 13 ms while it sends a group, and set-points are 18 ms apart at least, so one deaf time
+does not take the end of one and the beginning of the next.
 
-Which zero. By its firmware both take the power away with the controller's next step. Duty 0/0 leaves
-the hidden RPM target, so ticks go on counting while a robot that drove forward rolls out: its
-standstill is proved. RPM 0/0 ends the counting, and forgets the measured speed. It must be said
+Which zero. By its firmware both take the power away with the controller's next step. Duty 0/0
+leaves the hidden RPM target, so ticks go on counting while a robot that drove forward rolls out:
+its standstill is proved. RPM 0/0 ends the counting, and forgets the measured speed. It must be said
 before the wheels are to turn again: a wheel that stands keeps its last speed in the controller's
 eyes, and a slower set-point in the same direction would never start it. So Stop is duty 0/0, the
 emergency stop is RPM 0/0 (under the latch both alternate), and the first set-points after a Stop

@@ -45,6 +45,8 @@ class Expected:
     blind_s: float = 0.0
     unsteady_m: float = 0.0
     changes_mps: float = 0.0
+    started: bool = False
+    from_mps: float = 0.0
 
 
 class WheelModel:
@@ -66,6 +68,11 @@ class WheelModel:
     def target_mps(self) -> float:
         """What is carried out."""
         return self._now.speed_mps
+
+    @property
+    def final_mps(self) -> float:
+        """What the speed nears."""
+        return self._course()[0]
 
     @property
     def kind(self) -> CommandKind:
@@ -90,7 +97,7 @@ class WheelModel:
 
     def advance(self, from_s: float, to_s: float) -> Expected:
         """What it should do from then to then."""
-        expected = Expected()
+        expected = Expected(from_mps=self.speed_mps)
         at_s = from_s
         while at_s < to_s:
             while self._commands and self._commands[0].at_s <= at_s:
@@ -128,6 +135,7 @@ class WheelModel:
     def _step(self, duration_s: float, expected: Expected) -> None:
         final, constant_s = self._course()
         before = self.speed_mps
+        expected.started |= not before and final != 0.0
         self.speed_mps += (final - before) * (1 - math.exp(-duration_s / constant_s))
         if not final and abs(self.speed_mps) < 0.01:
             self.speed_mps = 0.0

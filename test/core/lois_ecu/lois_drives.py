@@ -7,42 +7,31 @@ from dataclasses import dataclass
 from random import Random
 
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.lois_ecu import (
-    BoardOdometry,
-    LoisDecoder,
-    SetDuty,
-    SetPeriod,
-    SetRpm,
-    Setting,
-    Stream,
-    Ticks,
-    WriteSetting,
-    encode_command,
-)
-from omnibot_driver.core.lois_ecu.messages import Command
-from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
+from omnibot_driver.core.lois_ecu.board import LoisEcu
+from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
+from omnibot_driver.core.lois_ecu.readings import LoisReading
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import QUIRKS, Firmware, LoisSettings, SimulatedLois
 
-STOP = SetDuty(0, 0)
+STOP = (0.0, 0.0)
 REPEAT_S = 0.05
 
-Program = list[tuple[float, SetRpm | SetDuty]]
-"""For so long, so fast."""
+Program = list[tuple[float, tuple[float, float]]]
+"""For so long, at these RPM left and right."""
 
 CLASSES: dict[str, Program] = {
-    "straight": [(21.0, SetRpm(20, 20))],
-    "curve": [(21.0, SetRpm(17, 22))],
-    "in place": [(12.0, SetRpm(-15, 15))],
-    "reverse": [(20.0, SetRpm(-20, -20))],
-    "reverse curve": [(20.0, SetRpm(-22, -18))],
+    "straight": [(21.0, (20, 20))],
+    "curve": [(21.0, (17, 22))],
+    "in place": [(12.0, (-15, 15))],
+    "reverse": [(20.0, (-20, -20))],
+    "reverse curve": [(20.0, (-22, -18))],
     "mixed": [
-        (6.0, SetRpm(20, 24)),
+        (6.0, (20, 24)),
         (1.5, STOP),
-        (5.0, SetRpm(-20, -20)),
+        (5.0, (-20, -20)),
         (1.5, STOP),
-        (4.0, SetRpm(15, -15)),
-        (5.0, SetRpm(30, 30)),
+        (4.0, (15, -15)),
+        (5.0, (30, 30)),
     ],
 }
 
@@ -55,8 +44,7 @@ class Drive:
     way_m: float
     turned_rad: float
     last: FusedOdometry
-    board: BoardOdometry | None
-    odometry: LoisOdometry
+    driver: LoisEcu
 
     @property
     def error(self) -> Pose:
@@ -107,67 +95,61 @@ def wrong(firmware: Firmware, seed: int) -> LoisSettings:
     )
 
 
-def drive(settings: LoisSettings, program: Program, *, period_ms: int = 200) -> Drive:
-    """Then stop; the set-points are repeated."""
-    board, decoder = SimulatedLois(settings), LoisDecoder()
-    odometry = LoisOdometry(LoisEcuSettings())
-    estimates: list[FusedOdometry] = []
-    heard: list[BoardOdometry] = []
-    start: Pose | None = None
+class Rig:
+    """A board that is driven; ``estimates`` are all that came, each with the truth beside it."""
 
-    def at() -> Pose:
-        truth = board.truth
+    def __init__(self, settings: LoisSettings, ours: LoisEcuSettings | None = None) -> None:
+        self.board = SimulatedLois(settings)
+        self.driver = LoisEcu(LoisEcuSettings() if ours is None else ours)
+        self.estimates: list[tuple[FusedOdometry, Pose]] = []
+        self.readings: list[LoisReading] = []
+        self.way_m = self.turned_rad = 0.0
+
+    @property
+    def now(self) -> float:
+        """Simulated."""
+        return self.board.now_s
+
+    @property
+    def place(self) -> Pose:
+        """Where the robot truly is."""
+        truth = self.board.truth
         return Pose(truth.x_m, truth.y_m, truth.yaw_rad)
 
-    def say(command: Command) -> None:
-        board.receive(encode_command(command))
-        if isinstance(command, SetRpm | SetDuty):
-            odometry.wrote(command, board.now_s)
+    def say(self, data: bytes) -> None:
+        """These go out now."""
+        self.board.receive(data)
+        self.driver.wrote(data, self.now)
 
-    true = start = at()
-    way_m = turned_rad = 0.0
+    def run(self, seconds: float) -> None:
+        """The driver writes what is due and reads what comes."""
+        for _ in range(round(seconds / self.board.tick_s)):
+            if self.now >= self.driver.wake_at:
+                self.say(self.driver.due(self.now))
+            before = self.place
+            found = self.driver.receive(self.board.step(), self.now)
+            found += self.driver.receive(b"", self.now)
+            way = before.way_to(self.place)
+            self.way_m += way.way_m
+            self.turned_rad += abs(way.yaw_rad)
+            self.readings += found
+            for reading in found:
+                if isinstance(reading, FusedOdometry):
+                    self.estimates.append((reading, self.place))
 
-    def run(seconds: float) -> None:
-        nonlocal true, way_m, turned_rad
-        for _ in range(round(seconds / board.tick_s)):
-            before = board.truth
-            reports = decoder.feed(board.step(), board.now_s)
-            way_m += math.hypot(board.truth.x_m - before.x_m, board.truth.y_m - before.y_m)
-            turned_rad += abs(board.truth.yaw_rad - before.yaw_rad)
-            reports += decoder.feed(b"", board.now_s)
-            for report in reports:
-                found = None
-                if isinstance(report, Ticks):
-                    found = odometry.heard_ticks(report, board.now_s)
-                elif isinstance(report, BoardOdometry):
-                    heard.append(report)
-                    found = odometry.heard_odometry(report, board.now_s)
-                if found is not None:
-                    estimates.append(found)
-                    true = at()
-            found = odometry.rest(board.now_s)
-            if found is not None:
-                estimates.append(found)
-                true = at()
-
-    run(2.1)
-    for _ in range(4):
-        for setting in (
-            WriteSetting(Setting.RPM_LOW_PASS, 1.0),
-            SetPeriod(Stream.TICKS, period_ms),
-            SetPeriod(Stream.ODOMETRY, period_ms),
-        ):
-            say(setting)
-            run(0.07)
-    for seconds, command in [*program, (2.0, STOP)]:
+    def order(self, left_rpm: float, right_rpm: float, seconds: float) -> None:
+        """Repeated; zeros are a Stop."""
         for _ in range(round(seconds / REPEAT_S)):
-            say(command)
-            run(REPEAT_S)
-    return Drive(
-        start.way_to(true) + Pose(0.0, 0.0, true.yaw_rad - start.way_to(true).yaw_rad),
-        way_m,
-        turned_rad,
-        estimates[-1],
-        heard[-1] if heard else None,
-        odometry,
-    )
+            unit = math.tau / 60
+            self.say(self.driver.wheels((left_rpm * unit, right_rpm * unit)))
+            self.run(REPEAT_S)
+
+
+def drive(settings: LoisSettings, program: Program, ours: LoisEcuSettings | None = None) -> Drive:
+    """Then stop."""
+    rig = Rig(settings, ours)
+    rig.run(4.0)
+    for seconds, (left, right) in [*program, (2.0, STOP)]:
+        rig.order(left, right, seconds)
+    last, true = rig.estimates[-1]
+    return Drive(true, rig.way_m, rig.turned_rad, last, rig.driver)

@@ -1,0 +1,99 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What goes out to a LOIS ECU whose line loses characters: no loss makes another valid line."""
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import pytest
+
+from omnibot_driver.core.lois_ecu import (
+    DistributeBall,
+    Reset,
+    SetDuty,
+    SetPeriod,
+    SetRpm,
+    Setting,
+    Stream,
+    WriteSetting,
+    encode_command,
+)
+from omnibot_driver.core.lois_ecu.messages import Command
+from omnibot_driver.core.lois_ecu.outbound import set_points
+from omnibot_driver.simulator.lois_ecu.wire import LineReader
+
+STOP, CLEAR = SetDuty(0, 0), SetRpm(0, 0)
+TALKS: dict[str, list[Command]] = {
+    "stop behind motion": [SetRpm(17, 17), STOP, STOP],
+    "start": [CLEAR, SetRpm(18, 18), CLEAR, SetRpm(18, 18)],
+    "ramp": [SetRpm(20, 20), SetRpm(21, 20), SetRpm(21, 22)],
+    "turn": [SetRpm(-1, 1), SetRpm(-256, 255), SetRpm(20, -20)],
+    "emergency stop": [SetRpm(50, -50), CLEAR, STOP, CLEAR, STOP],
+    "duty": [SetDuty(100, -100), SetDuty(3, 3), STOP],
+    "settings": [
+        WriteSetting(Setting.RPM_LOW_PASS, 1.0),
+        SetPeriod(Stream.TICKS, 200),
+        Reset(),
+        DistributeBall(),
+    ],
+}
+
+
+def heard(data: bytes, *, with_sum: bool, lenient: bool) -> list[tuple[int, int]]:
+    """What the firmware takes from it."""
+    reader = LineReader(lenient=lenient)
+    reader.checks = with_sum
+    return list(reader.take_all(data))
+
+
+def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
+    """All sets of up to so many positions."""
+    for count in range(most + 1):
+        yield from combinations(range(length), count)
+
+
+@pytest.mark.parametrize("name", TALKS)
+@pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
+@pytest.mark.parametrize("lenient", [True, False], ids=["lenient", "strict"])
+def test_no_loss_of_up_to_two_characters_makes_another_line(
+    name: str, with_sum: bool, lenient: bool
+) -> None:
+    """Lines are lost, and those that are heard are the ones that were said, in their order."""
+    data = b"".join(encode_command(command, with_sum=with_sum) for command in TALKS[name])
+    said = heard(data, with_sum=with_sum, lenient=lenient)
+    assert len(said) == len(TALKS[name])
+    for lost in losses(len(data), 2):
+        rest = bytes(byte for at, byte in enumerate(data) if at not in lost)
+        found = heard(rest, with_sum=with_sum, lenient=lenient)
+        remaining = iter(said)
+        assert all(line in remaining for line in found), lost
+
+
+@pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
+def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: bool) -> None:
+    """Whichever two set-points stand beside each other."""
+    length = 14 if with_sum else 12
+    for talk in TALKS.values():
+        data = b"".join(encode_command(command, with_sum=with_sum) for command in talk)
+        said = heard(data, with_sum=with_sum, lenient=True)
+        for count in range(1, length):
+            for at in range(len(data) - count + 1):
+                found = heard(data[:at] + data[at + count :], with_sum=with_sum, lenient=True)
+                assert set(found) <= set(said)
+
+
+def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
+    """So they are 18 ms apart, and the board is deaf for 13 ms at once: the bound is known."""
+    data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
+    joined = data[:7] + data[21:]
+    assert heard(joined, with_sum=True, lenient=False) == [(2, 17 << 16)]
+
+
+def test_set_points_are_found_in_what_was_written() -> None:
+    """And nothing else is taken for one."""
+    commands = [STOP, Reset(), CLEAR, SetRpm(20, -20), SetDuty(5, 6)]
+    for with_sum in (True, False):
+        data = b"".join(encode_command(command, with_sum=with_sum) for command in commands)
+        found = set_points(data, with_sum=with_sum)
+        assert found == [STOP, CLEAR, SetRpm(20, -20), SetDuty(5, 6)]
+    assert set_points(b"", with_sum=True) == []
