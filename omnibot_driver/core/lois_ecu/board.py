@@ -22,6 +22,7 @@ from omnibot_driver.core.lois_ecu.messages import (
     MOST_SAMPLES,
     Command,
     DistributeBall,
+    GpsDate,
     RecordHeading,
     RecordKind,
     RecordRpm,
@@ -137,6 +138,8 @@ class LoisEcu:
         for report in reports:
             if isinstance(report, Ticks):
                 self._writer.ticks_came(now)
+            elif isinstance(report, GpsDate):
+                self._writer.date_came()
         found = self._translation.readings(reports, self._decoder.clock_unit, now)
         if self._translation.restarts != restarts:
             self._writer.begin(now)
@@ -192,7 +195,7 @@ class LoisEcu:
 
     @property
     def confirmed(self) -> bool:
-        """Whether the board has shown that it took the period of its ticks."""
+        """Whether the board has answered, and shown that it took the period of its ticks."""
         return self._writer.confirmed
 
     # Outbound

@@ -3,8 +3,9 @@
 """Settings on their way to a board that acknowledges nothing and loses single lines.
 
 Every line goes out ``ROUNDS`` times, the rounds apart by more than the board is deaf for. What can
-be confirmed is the period of the ticks; while that is another one, the rounds go on. Writing a gain
-makes the firmware's controller begin anew, so settings wait while the robot drives.
+be confirmed is the period of the ticks, and that the board answers: each round asks for the date
+once, which is off after a boot. While either is missing the rounds go on. Writing a gain makes the
+firmware's controller begin anew, so settings wait while the robot drives.
 
 A board whose terminal mode or checksum is set otherwise is silent, or seems to obey nothing. Then a
 line that puts it back goes out in both forms, and the left short correction after it, which any
@@ -19,6 +20,7 @@ from statistics import median
 from typing import Final
 
 from omnibot_driver.core.lois_ecu.messages import (
+    PERIOD_ONCE,
     Command,
     SetPeriod,
     SetTerminalMode,
@@ -45,11 +47,11 @@ BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 
 
 class SettingsWriter:
-    """``due`` what to write now. ``confirmed``: the ticks come at the period that was asked for."""
+    """``due`` what to write now. ``confirmed``: the board has answered, and shows our period."""
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self.settings = settings
-        self.confirmed = False
+        self._in_period = self._answered = False
         self._queue: deque[tuple[float, Command]] = deque()
         self._rounds_left = 0
         self._round_at_s = math.inf
@@ -57,6 +59,11 @@ class SettingsWriter:
         self._rounds = 0
         self._overwritten = False
         """The terminal mode was written, and the left short correction with it."""
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the board has taken what could be confirmed."""
+        return self._answered and self._in_period
 
     @property
     def done(self) -> bool:
@@ -80,7 +87,8 @@ class SettingsWriter:
         self._queue.clear()
         self._arrivals.clear()
         self._rounds_left, self._round_at_s = ROUNDS, now
-        self._rounds, self.confirmed = 0, False
+        self._rounds = 0
+        self._in_period = self._answered = False
 
     def write(self, command: Command, now: float) -> None:
         """One more, as often."""
@@ -92,15 +100,18 @@ class SettingsWriter:
         """A group of ticks: its period confirms ours."""
         self._arrivals.append(now)
         wanted = self.settings.periods_ms.get(Stream.TICKS)
-        if wanted is None or len(self._arrivals) < 4:
+        if len(self._arrivals) < 4:
             return
-        times = list(self._arrivals)
-        steps = [after - before for before, after in pairwise(times)]
-        wanted_s = wanted / 1000
-        self.confirmed = abs(median(steps) - wanted_s) <= CONFIRMED_WITHIN * wanted_s
+        steps = [after - before for before, after in pairwise(self._arrivals)]
+        wanted_s = median(steps) if wanted is None else wanted / 1000
+        self._in_period = abs(median(steps) - wanted_s) <= CONFIRMED_WITHIN * wanted_s
         if not self.confirmed and self.done and self._rounds < MOST_ROUNDS:
             away_s = AWAY_S[self._rounds % len(AWAY_S)]
             self._rounds_left, self._round_at_s = 1, now + away_s
+
+    def date_came(self) -> None:
+        """The date, which was asked for."""
+        self._answered |= self._rounds > 0
 
     def due(self, now: float, *, driving: bool) -> bytes:
         """The lines to write now, possibly none."""
@@ -124,6 +135,7 @@ class SettingsWriter:
             yield SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
         if self._overwritten or not settings.with_sum:
             yield self._left_short_correction()
+        yield SetPeriod(Stream.GPS_DATE, PERIOD_ONCE)
         yield WriteSetting(Setting.RPM_LOW_PASS, settings.low_pass)
         for stream, period_ms in settings.periods_ms.items():
             yield SetPeriod(stream, period_ms)

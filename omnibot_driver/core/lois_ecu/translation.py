@@ -55,6 +55,7 @@ class Translation:
         self._ticks: Ticks | None = None
         self._stamp_s: float | None = None
         self._date: GpsDate | None = None
+        self._clock = (0, 0, 0)
 
     def connect(self) -> None:
         """The line is new."""
@@ -89,6 +90,10 @@ class Translation:
             case GpsDate():
                 self._date = report if report.month and report.day else None
             case GpsTime():
+                clock = (report.hours, report.minutes, report.seconds)
+                if clock < self._clock:
+                    self._date = None  # past midnight it is another one
+                self._clock = clock
                 return [TimeReading(self._utc_s(report))]
             case Heading(heading_deg):
                 return self._heading(heading_deg)

@@ -4,6 +4,7 @@
 
 import math
 from dataclasses import replace
+from datetime import date
 
 import pytest
 from lois_drives import Rig, nominal
@@ -13,6 +14,8 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu import (
     EStopButton,
+    GpsDate,
+    GpsTime,
     Record,
     RecordKind,
     SetDuty,
@@ -290,13 +293,28 @@ def test_gps_and_compass_come_in_si_units_and_enu() -> None:
     headings = [reading for reading in rig.readings if isinstance(reading, HeadingReading)]
     assert headings[-1].yaw_rad == pytest.approx(0.0, abs=0.02)
     times = [reading.utc_s for reading in rig.readings if isinstance(reading, TimeReading)]
-    assert times[0] is None
     assert times[-1] is not None
+    day_s = 86400
+    simulated = date(2020, 1, 1).toordinal() - date(1970, 1, 1).toordinal()
+    assert times[-1] - simulated * day_s == pytest.approx(rig.now, abs=1.5)
     rig = Rig(nominal("firmware"))
     rig.run(5.0)
     fixes = [reading for reading in rig.readings if isinstance(reading, FixReading)]
     assert fixes
     assert not any(fix.valid for fix in fixes)
+
+
+def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
+    """Else it would be a day late."""
+    ecu = LoisEcu(LoisEcuSettings())
+    said = [GpsDate(26, 11, 22), GpsTime(23, 59, 59), GpsTime(0, 0, 1), GpsDate(26, 11, 23)]
+    found: list[object] = []
+    for at, report in enumerate([*said, GpsTime(0, 0, 2)]):
+        found += ecu.receive(encode_report(report), float(at))
+    before, unknown, after = (item for item in found if isinstance(item, TimeReading))
+    assert unknown == TimeReading(None)
+    assert before.utc_s is not None
+    assert after == TimeReading(before.utc_s + 3)
 
 
 def test_declination_turns_the_heading() -> None:

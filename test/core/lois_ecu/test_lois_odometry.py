@@ -1,0 +1,229 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The odometry of a LOIS robot against the truth, on both kinds of firmware.
+
+``LOIS_DRIVES=50 pytest -s -k honest`` prints the figures of that many drives; a few run always.
+"""
+
+import math
+import os
+from itertools import pairwise
+from statistics import mean
+
+import pytest
+from lois_drives import CLASSES, STOP, Drive, Rig, drive, nominal, wrong
+
+from omnibot_driver.core.lois_ecu import BoardOdometry, SetDuty, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.simulator.lois_ecu import Firmware, LoisSettings
+
+DRIVES = int(os.environ.get("LOIS_DRIVES", "2"))
+MEASURED = ("straight", "curve", "in place", "reverse", "reverse curve")
+BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
+
+
+def off_m(one: Drive) -> float:
+    """Distance of the estimate from the truth."""
+    return math.hypot(one.error.x_m, one.error.y_m)
+
+
+# What is promised
+
+
+@BOTH
+@pytest.mark.parametrize("name", ["straight", "curve"])
+def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware, name: str) -> None:
+    """With wheels of the right size."""
+    for seed in range(2):
+        one = drive(nominal(firmware, seed), CLASSES[name])
+        assert one.way_m > 5.0
+        assert off_m(one) < max(0.02, 0.02 * one.way_m)
+        assert abs(one.error.yaw_rad) < math.radians(3.0)
+
+
+@BOTH
+@pytest.mark.parametrize("sign", [1, -1], ids=["left", "right"])
+def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware, sign: int) -> None:
+    """One wheel turns backward: the public firmware counts nothing of it."""
+    one = drive(nominal(firmware), [(12.0, (-15.0 * sign, 15.0 * sign))])
+    assert one.turned_rad > 8.0
+    assert abs(one.error.yaw_rad) < 0.03 * one.turned_rad
+
+
+@BOTH
+@pytest.mark.parametrize("name", ["reverse", "reverse curve"])
+def test_backward_it_is_within_10_percent_and_3_sigma(firmware: Firmware, name: str) -> None:
+    """The public firmware counts nothing, and its position stands at equal speeds."""
+    for seed in range(2):
+        one = drive(nominal(firmware, seed), CLASSES[name])
+        assert one.way_m > 5.0
+        assert off_m(one) < 0.1 * one.way_m
+        assert one.sigmas < 3.0
+
+
+@BOTH
+@pytest.mark.parametrize("name", MEASURED)
+def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
+    """Wheels of wrong sizes that slip, on uneven ground: NEES of three numbers is 3 on average."""
+    made = [drive(wrong(firmware, seed), CLASSES[name]) for seed in range(DRIVES)]
+    found = [one.nees for one in made]
+    spread = math.sqrt(6 / DRIVES)
+    errors = [off_m(one) for one in made]
+    degrees = [abs(math.degrees(one.error.yaw_rad)) for one in made]
+    print(
+        f"\n{firmware} {name}: NEES {mean(found):.2f}, greatest {max(found):.1f},"
+        f" error {mean(errors):.3f} m (greatest {max(errors):.3f}) and {mean(degrees):.1f} degrees"
+        f" of {made[0].way_m:.1f} m"
+    )
+    assert 3 - 4 * spread < mean(found) < 3 + 4 * spread
+
+
+# How
+
+
+def settled(firmware: Firmware) -> Rig:
+    """A rig whose board is configured."""
+    rig = Rig(nominal(firmware))
+    rig.run(4.0)
+    return rig
+
+
+def test_the_boards_own_odometry_would_be_wrong() -> None:
+    """Why it is not simply passed on: it misses a good part of a straight drive."""
+    rig = settled("firmware")
+    rig.order(20, 20, 20.0)
+    board = rig.board.odometry.pose
+    truth = rig.board.truth
+    assert math.hypot(board[0], board[1]) < 0.85 * math.hypot(truth.x_m, truth.y_m)
+    estimate = rig.estimates[-1][0].pose
+    assert estimate.way_m > 0.95 * math.hypot(truth.x_m, truth.y_m)
+
+
+@BOTH
+def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
+    """Forward by ticks; backward by commands on the public firmware."""
+    rig = settled(firmware)
+    rig.order(20, 20, 4.0)
+    assert rig.estimates[-1][0].source == "ticks"
+    rig.order(0, 0, 2.0)
+    assert rig.estimates[-1][0].source == "standing"
+    rig.order(-20, -20, 4.0)
+    last = rig.estimates[-1][0]
+    assert last.blind is (firmware == "firmware")
+    assert last.source == ("commands and heading" if last.blind else "ticks")
+    rig.order(0, 0, 2.5)
+    rig.order(-20, 20, 4.0)
+    expected = "ticks and heading" if firmware == "firmware" else "ticks"
+    assert rig.estimates[-1][0].source == expected
+
+
+@BOTH
+def test_a_robot_that_stands_does_not_move_in_odom(firmware: Firmware) -> None:
+    """Whatever stale velocity 0x20 repeats."""
+    rig = settled(firmware)
+    rig.order(20, 25, 4.0)
+    rig.order(0, 0, 2.0)
+    place = rig.estimates[-1][0].pose
+    rig.run(10.0)
+    assert rig.estimates[-1][0].pose == place
+    assert rig.estimates[-1][0].twist.vx_mps == 0.0
+    predicted = rig.driver.predicted(rig.now + 0.2)
+    assert predicted is not None
+    assert predicted.pose.way_to(place).way_m < 1e-9
+
+
+@BOTH
+def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
+    """With a covariance that grows, at 20 Hz between groups."""
+    rig = settled(firmware)
+    rig.order(20, 24, 6.0)
+    misses = []
+    for _ in range(40):
+        count = len(rig.estimates)
+        first = rig.driver.predicted(rig.now)
+        rig.order(20, 24, 0.05)
+        second = rig.driver.predicted(rig.now)
+        assert first is not None
+        assert second is not None
+        assert second.stamp_s > first.stamp_s
+        if len(rig.estimates) == count:
+            assert second.covariance.xx + second.covariance.yy > (
+                first.covariance.xx + first.covariance.yy - 1e-6
+            )
+        else:
+            estimate = rig.estimates[-1][0]
+            misses.append(estimate.pose.way_to(first.pose).way_m)
+    assert len(misses) > 5
+    assert mean(misses) < 0.03
+
+
+@BOTH
+def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
+    """Displacements add up to the pose, and no step is impossible."""
+    rig = settled(firmware)
+    rig.order(30, 30, 5.0)
+    rig.order(*STOP, 2.0)
+    way_m = sum(estimate.displacement.x_m for estimate, _ in rig.estimates)
+    assert way_m == pytest.approx(rig.way_m, rel=0.03)
+    for (before, _), (after, _) in pairwise(rig.estimates):
+        step_m = before.pose.way_to(after.pose).way_m
+        assert step_m < 1.0 * (after.stamp_s - before.stamp_s) + 0.03
+
+
+def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
+    """Neither its ticks nor its heading."""
+    odometry = LoisOdometry(LoisEcuSettings())
+    odometry.wrote(SetRpm(20, 20), 0.0)
+    for step in range(1, 11):
+        odometry.heard_ticks(Ticks(400 * step, 8 * step, 8 * step), 0.4 * step)
+    place = odometry.heard_ticks(Ticks(4400, 88, 88), 4.4)
+    assert place is not None
+    odometry.wrote(SetRpm(0, 0), 4.41)
+    odometry.connect()
+    assert odometry.heard_ticks(Ticks(2000, 0, 0), 9.0) is None
+    after = odometry.heard_ticks(Ticks(2400, 0, 0), 9.4)
+    assert after is not None
+    assert after.pose == place.pose
+
+
+def test_a_velocity_that_is_no_number_is_no_speed() -> None:
+    """The heading beside it is used."""
+    odometry = LoisOdometry(LoisEcuSettings())
+    odometry.wrote(SetRpm(-20, -20), 0.0)
+    last: FusedOdometry | None = None
+    for step in range(1, 21):
+        now = 0.4 * step
+        last = odometry.heard_ticks(Ticks(400 * step, 0, 0), now) or last
+        group = BoardOdometry(0.0, 0.0, 0.0, math.nan, math.inf, math.nan, appended=True)
+        last = odometry.heard_odometry(group, now + 0.01) or last
+    assert last is not None
+    assert last.source == "commands and heading"
+    assert last.pose.x_m == pytest.approx(-0.2723 * 1.1 * 7.5, rel=0.1)
+    assert math.isfinite(last.covariance.xx)
+
+
+def test_duty_backward_is_known_by_commands_alone() -> None:
+    """And badly: the covariance says so."""
+    odometry = LoisOdometry(LoisEcuSettings(drive_mode="duty"))
+    odometry.wrote(SetDuty(-40, -40), 0.0)
+    last = None
+    for step in range(1, 21):
+        last = odometry.heard_ticks(Ticks(400 * step, 0, 0), 0.4 * step)
+        last = odometry.rest(0.4 * step + 0.2) or last
+    assert last is not None
+    assert last.source == "commands"
+    assert last.pose.x_m < -1.5
+    assert math.sqrt(last.covariance.xx) > 0.2 * abs(last.pose.x_m)
+
+
+@BOTH
+def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
+    """Its left wheel is our right one; the estimate is still right."""
+    rig = Rig(LoisSettings(quirks=nominal(firmware).quirks), LoisEcuSettings(inverted=True))
+    rig.run(4.0)
+    rig.order(15, 20, 5.0)
+    rig.order(0, 0, 2.0)
+    estimate, true = rig.estimates[-1]
+    assert true.yaw_rad < -0.15
+    assert estimate.pose.yaw_rad == pytest.approx(-true.yaw_rad, abs=0.05)
