@@ -50,6 +50,11 @@ LONGEST_STEP_S: Final = 2.0
 STARTING_TICKS: Final = 1.2
 STARTING_STDDEV: Final = 0.8
 """What 0x20 lacks of a wheel that starts: the tick that takes the whole rest has no speed."""
+LEAP_RAD: Final = 0.25
+LEAP_PART: Final = 0.6
+MISSED_RAD: Final = 1.0
+"""0x20's heading is believed if it is off the model by no more than this, by this part of the turn,
+and by this where an interval went without it."""
 CHANGING_PART: Final = 0.12
 TOLD_PART: Final = 0.5
 """0x20's speeds leave so much of the model's error, where they are used."""
@@ -134,6 +139,8 @@ class LoisOdometry:
         self._board: BoardOdometry | None = None
         self._board_at_s = -math.inf
         self._board_used: BoardOdometry | None = None
+        self._missed_rad, self._missed = 0.0, False
+        """Turned since 0x20 was used last; whether an interval had to go without it."""
         self._twist = BodyTwist(0.0, 0.0, 0.0)
         self.reset()
 
@@ -162,7 +169,8 @@ class LoisOdometry:
 
     def connect(self) -> None:
         """The line is new: counters may have begun anew, the pose goes on."""
-        self._last_ticks = self._board = self._board_used = None
+        self._last_ticks = self._board = self._board_used = self._pending = None
+        self._missed_rad, self._missed = 0.0, False
         self._at_s = self._board_at_s = -math.inf
 
     # What goes out
@@ -186,18 +194,20 @@ class LoisOdometry:
 
     # What comes in
 
-    def heard_odometry(self, group: BoardOdometry, now: float) -> FusedOdometry | None:
+    def heard_odometry(self, group: BoardOdometry, now: float) -> list[FusedOdometry]:
         """0x20, or what came behind 0x12; completes the interval of ticks just before it."""
         self._board, self._board_at_s = group, now
         if group.appended and not self._appends:
             self._appends = True
             self._set_gain(FIRMWARE_GAIN)
+        if self._board_used is None:
+            self._board_used = group
         if self._pending is not None and now - self._at_s <= NEAR_S:
-            return self._complete(self._pending)
-        return None
+            return [self._complete(self._pending)]
+        return []
 
-    def heard_ticks(self, ticks: Ticks, now: float) -> FusedOdometry | None:
-        """0x12. None while 0x20 has to tell more, which ``rest`` ends."""
+    def heard_ticks(self, ticks: Ticks, now: float) -> list[FusedOdometry]:
+        """0x12. The interval is not complete while 0x20 has to tell more, which ``rest`` ends."""
         found = self.rest(math.inf)
         before, from_s = self._last_ticks, self._at_s
         self._last_ticks, self._at_s = ticks, now
@@ -217,15 +227,15 @@ class LoisOdometry:
         if self._needs_heading(counted):
             self._pending = pending
             return found
-        return self._complete(pending)
+        return [*found, self._complete(pending)]
 
     _pending: "_Interval | None" = None
 
-    def rest(self, now: float) -> FusedOdometry | None:
+    def rest(self, now: float) -> list[FusedOdometry]:
         """Nothing came until now: an interval that waited for 0x20 goes without."""
         if self._pending is not None and now - self._at_s > NEAR_S:
-            return self._complete(self._pending)
-        return None
+            return [self._complete(self._pending)]
+        return []
 
     def predict(self, now: float) -> FusedOdometry | None:
         """Where it should be now; None before the first ticks."""
@@ -305,7 +315,11 @@ class LoisOdometry:
         self._follow(ways, expected, blind, duration_s)
         self._source = source
         if self._board is not None and abs(self._board_at_s - interval.to_s) <= NEAR_S:
-            self._board_used = self._board
+            self._board_used, self._missed_rad, self._missed = self._board, 0.0, False
+        else:
+            self._missed_rad += (ways[1] - ways[0]) / self._settings.track_m
+            self._missed_rad -= self._lacking(ways, expected) if any(blind) else 0.0
+            self._missed = True
         self._twist = self._twist_of_models()
         return FusedOdometry(
             interval.to_s,
@@ -343,20 +357,25 @@ class LoisOdometry:
             for model, one in zip(self._models, expected, strict=True)
         ):
             return None
-        turned = board.yaw_rad - before.yaw_rad
-        directions = [_sign(way) for way in ways]
-        seconds = min(one.blind_s or math.inf for one in expected)
-        if directions[0] * directions[1] < 0 and math.isfinite(seconds):
-            rounding = 2 * HALF_RPM * self._settings.rim_mps_per_rpm / self._settings.track_m
-            turned += directions[1] * rounding * min(seconds, interval.to_s - interval.from_s)
+        turned = board.yaw_rad - before.yaw_rad - self._missed_rad
         by_model = (ways[1] - ways[0]) / self._settings.track_m
-        if abs(turned - by_model) > 0.25 + 0.6 * abs(by_model):
+        missed = MISSED_RAD if self._missed else 0.0
+        if abs(turned - by_model) > LEAP_RAD + LEAP_PART * abs(by_model) + missed:
             return None
+        return turned + self._lacking(ways, expected)
+
+    def _lacking(self, ways: list[float], expected: tuple[Expected, Expected]) -> float:
+        """What 0x20's heading misses: fractions of an RPM, and the first tick after a rest."""
+        track_m = self._settings.track_m
+        left, right = (_sign(way) for way in ways)
+        lacking = 0.0
+        seconds = min(one.blind_s or math.inf for one in expected)
+        if left * right < 0 and math.isfinite(seconds):
+            lacking += right * 2 * HALF_RPM * self._settings.rim_mps_per_rpm * seconds / track_m
         lost_m = STARTING_TICKS * self._settings.tick_m
-        for one, direction, side in zip(expected, directions, (-1, 1), strict=True):
-            if one.started:
-                turned += side * direction * lost_m / self._settings.track_m
-        return turned
+        for one, direction in zip(expected, (-left, right), strict=True):
+            lacking += direction * lost_m / track_m if one.started else 0.0
+        return lacking
 
     def _with_heading(
         self,
@@ -371,6 +390,12 @@ class LoisOdometry:
         left_m, right_m = ways
         starting = sum(one.started for one in expected)
         unsure = STARTING_STDDEV * self._settings.tick_m * math.sqrt(starting)
+        if self._missed and not all(blind):
+            # The heading puts right what was turned before; the way is that of now.
+            mean_m = (left_m + right_m) / 2
+            error = max(self._model_error(one) for one in expected) + unsure
+            errors = [error * blind[0], error * blind[1]]
+            return [mean_m - rim_m / 2, mean_m + rim_m / 2], errors, 0.0
         if not blind[0]:
             return [left_m, left_m + rim_m], [0.0, unsure], 0.0
         if not blind[1]:
@@ -379,7 +404,7 @@ class LoisOdometry:
         board, before = self._board, self._board_used
         if board is not None and before is not None and left_m < 0 and right_m < 0:
             told_m = math.hypot(board.x_m - before.x_m, board.y_m - before.y_m)
-            if told_m < TOLD_AT_MOST * -mean_m:
+            if told_m < TOLD_AT_MOST * -mean_m and not self._missed:
                 mean_m = -max(-mean_m, told_m)
         error = max(self._model_error(one) for one in expected)
         told = self._told_speeds(board) if board is not None else None

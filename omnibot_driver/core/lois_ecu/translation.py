@@ -35,7 +35,8 @@ from omnibot_driver.core.lois_ecu.readings import (
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 RESTARTED_TICKS: Final = 20
-"""So many fewer ticks than before are a new beginning, not wheels that roll back."""
+RESTARTED_TICKS_PER_S: Final = 60.0
+"""Counts that are so much nearer to zero are a new beginning, not wheels that roll back."""
 
 
 class Translation:
@@ -53,6 +54,7 @@ class Translation:
 
     def _connect(self) -> None:
         self._ticks: Ticks | None = None
+        self._unit: ClockUnit | None = None
         self._stamp_s: float | None = None
         self._date: GpsDate | None = None
         self._clock = (0, 0, 0)
@@ -106,23 +108,29 @@ class Translation:
 
     def _watch(self, ticks: Ticks, clock_unit: ClockUnit | None, now: float) -> None:
         before, self._ticks = self._ticks, ticks
-        self.last_ticks_at_s = now
+        duration_s, self.last_ticks_at_s = now - self.last_ticks_at_s, now
         if before is None:
             self.ticked_at_s = now
             return
         ways = wrapped(ticks.left - before.left), wrapped(ticks.right - before.right)
         if any(ways):
             self.ticked_at_s = now
-        late = clock_unit == "ms" and wrapped(ticks.time_counts - before.time_counts) < 0
-        fewer = min(ways) < -RESTARTED_TICKS and max(abs(ticks.left), abs(ticks.right)) < 100
-        if late or fewer:
+        self._unit = clock_unit or self._unit  # it is forgotten when the board begins anew
+        late = self._unit == "ms" and wrapped(ticks.time_counts - before.time_counts) < 0
+        rolled = RESTARTED_TICKS + RESTARTED_TICKS_PER_S * duration_s
+        fewer = max(
+            abs(before.left) - abs(ticks.left),
+            abs(before.right) - abs(ticks.right),
+        )
+        if late or fewer > rolled:
             self.restarts += 1
             self.odometry.connect()
             self.headings.forget()
 
-    def _displaced(self, fused: FusedOdometry | None) -> list[LoisReading]:
-        if fused is None:
-            return []
+    def _displaced(self, estimates: list[FusedOdometry]) -> list[LoisReading]:
+        return [reading for fused in estimates for reading in self._of(fused)]
+
+    def _of(self, fused: FusedOdometry) -> list[LoisReading]:
         before, self._stamp_s = self._stamp_s, fused.stamp_s
         way = fused.displacement
         radius_m = self.settings.wheel_radius_m

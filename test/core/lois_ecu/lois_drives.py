@@ -98,7 +98,10 @@ def wrong(firmware: Firmware, seed: int) -> LoisSettings:
 class Rig:
     """A board that is driven; ``estimates`` are all that came, each with the truth beside it."""
 
-    def __init__(self, settings: LoisSettings, ours: LoisEcuSettings | None = None) -> None:
+    def __init__(
+        self, settings: LoisSettings, ours: LoisEcuSettings | None = None, *, loss: float = 0.0
+    ) -> None:
+        self._loss, self._random = loss, Random(f"line {settings.seed}")
         self.board = SimulatedLois(settings)
         self.driver = LoisEcu(LoisEcuSettings() if ours is None else ours)
         self.estimates: list[tuple[FusedOdometry, Pose]] = []
@@ -116,9 +119,14 @@ class Rig:
         truth = self.board.truth
         return Pose(truth.x_m, truth.y_m, truth.yaw_rad)
 
+    def _arrived(self, data: bytes) -> bytes:
+        if not self._loss:
+            return data
+        return bytes(byte for byte in data if self._random.random() >= self._loss)
+
     def say(self, data: bytes) -> None:
         """These go out now."""
-        self.board.receive(data)
+        self.board.receive(self._arrived(data))
         self.driver.wrote(data, self.now)
 
     def run(self, seconds: float) -> None:
@@ -127,7 +135,7 @@ class Rig:
             if self.now >= self.driver.wake_at:
                 self.say(self.driver.due(self.now))
             before = self.place
-            found = self.driver.receive(self.board.step(), self.now)
+            found = self.driver.receive(self._arrived(self.board.step()), self.now)
             found += self.driver.receive(b"", self.now)
             way = before.way_to(self.place)
             self.way_m += way.way_m
@@ -145,9 +153,9 @@ class Rig:
             self.run(REPEAT_S)
 
 
-def drive(settings: LoisSettings, program: Program, ours: LoisEcuSettings | None = None) -> Drive:
-    """Then stop."""
-    rig = Rig(settings, ours)
+def drive(settings: LoisSettings, program: Program, *, loss: float = 0.0) -> Drive:
+    """Then stop. Each byte is lost with this chance, both ways."""
+    rig = Rig(settings, loss=loss)
     rig.run(4.0)
     for seconds, (left, right) in [*program, (2.0, STOP)]:
         rig.order(left, right, seconds)
