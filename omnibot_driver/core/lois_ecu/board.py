@@ -135,12 +135,13 @@ class LoisEcu:
             self.mode = Mode.NOMINAL
             self._heard_at_s = now
             self._suspicion.understood()
-        for report in reports:
+        times = self._decoder.times
+        for at, report in zip(times, reports, strict=True):
             if isinstance(report, Ticks):
-                self._writer.ticks_came(now)
+                self._writer.ticks_came(at)
             elif isinstance(report, GpsDate):
                 self._writer.date_came()
-        found = self._translation.readings(reports, self._decoder.clock_unit, now)
+        found = self._translation.readings(reports, times, self._decoder.clock_unit, now)
         if self._translation.restarts != restarts:
             self._writer.begin(now)
         return found

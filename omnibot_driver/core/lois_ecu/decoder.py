@@ -14,7 +14,7 @@ between calls, and looks at each byte a bounded number of times.
 from dataclasses import dataclass
 from typing import Final
 
-from omnibot_driver.core.lois_ecu.groups import Assembler, GroupStatistics
+from omnibot_driver.core.lois_ecu.groups import Assembler, GroupStatistics, Timed
 from omnibot_driver.core.lois_ecu.lines import BEGIN, END, LENGTH, line_of
 from omnibot_driver.core.lois_ecu.messages import RecordKind, Report, TerminalLine
 from omnibot_driver.core.lois_ecu.plausibility import ClockUnit
@@ -33,7 +33,8 @@ class DecoderStatistics:
 
 
 class LoisDecoder:
-    """``terminal``: whether lines of a sensor are expected, and text is not damage.
+    """``terminal``: whether lines of a sensor are expected, and text is not damage. ``times``: when
+    the last line of each report of the last call arrived, which may have waited for what follows.
 
     Without ``sum_required`` lines that have no checksum are taken as well.
     """
@@ -41,6 +42,7 @@ class LoisDecoder:
     def __init__(self, *, sum_required: bool = True) -> None:
         self.sum_required = sum_required
         self.terminal = False
+        self.times: list[float] = []
         self.statistics = DecoderStatistics()
         self._assembler = Assembler()
         self._held = b""
@@ -76,27 +78,31 @@ class LoisDecoder:
         Without bytes: those that waited for what might follow, if nothing did for some time.
         """
         if not data:
-            return self._assembler.rest(now)
+            return self._untimed(self._assembler.rest(now))
         *lines, rest = (self._held + data).split(END)
-        reports: list[Report] = []
+        found: list[Timed] = []
         for text in lines:
-            reports += self._take(text, now)
+            found += self._take(text, now)
         if len(rest) >= LONGEST_LINE:
             at = rest.rfind(BEGIN, -LENGTH - 1)
             kept = rest[at:] if at >= 0 else b""
             self._cut_bytes += len(rest) - len(kept)
             rest = kept
         self._held = rest
-        return reports
+        return self._untimed(found)
 
     def flush(self, now: float) -> list[Report]:
         """The line is closed: what was held is all there will be."""
         if self._held or self._cut_bytes:
             self._damaged(len(self._held) + self._cut_bytes)
         self._held, self._cut_bytes = b"", 0
-        return self._assembler.finish(now)
+        return self._untimed(self._assembler.finish(now))
 
-    def _take(self, text: bytes, now: float) -> list[Report]:
+    def _untimed(self, found: list[Timed]) -> list[Report]:
+        self.times = [at for at, _ in found]
+        return [report for _, report in found]
+
+    def _take(self, text: bytes, now: float) -> list[Timed]:
         """One piece of the stream between two line feeds."""
         before, self._cut_bytes = self._cut_bytes, 0
         at = text.rfind(BEGIN)
@@ -106,7 +112,7 @@ class LoisDecoder:
         if line is None:
             length = len(text) + 1 + before
             if self.terminal and not before and at < 0 and _is_text(text):
-                return [TerminalLine(text.decode("ascii").rstrip("\r"))]
+                return [(now, TerminalLine(text.decode("ascii").rstrip("\r")))]
             self._damaged(length)
             return []
         if at + before:

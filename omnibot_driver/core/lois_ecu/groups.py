@@ -53,6 +53,8 @@ _LONGEST: Final = 10
 _RECORD_CODES: Final = (Code.RECORD_RPM, Code.RECORD_TORQUE, Code.RECORD_HEADING)
 
 GroupReport = Ticks | BoardOdometry | GpsPosition
+Timed = tuple[float, Report]
+"""When its last line arrived, which may be before it is known to be whole."""
 
 
 @dataclass(slots=True)
@@ -112,7 +114,7 @@ class Assembler:
         for gate in self._odometry_gates.values():
             gate.forget()
 
-    def add(self, line: Line, now: float) -> list[Report]:
+    def add(self, line: Line, now: float) -> list[Timed]:
         """The reports that this line completes."""
         code, payload = line.command, line.payload
         if code in _LENGTHS:
@@ -125,14 +127,14 @@ class Assembler:
             return found + self._value(code, payload, now)
         found = self._end(now)
         if code in _RECORD_CODES:
-            return found + self._sample(code, payload)
+            return found + [(now, record) for record in self._sample(code, payload)]
         found += self._break_record()
         self._astray = self._after_ticks = False
         report = single_report(line)
         if report is None:
             self.statistics.unknown_lines += 1
             return found
-        return [*found, report]
+        return [*found, (now, report)]
 
     def damage(self) -> None:
         """Characters between two lines were no line."""
@@ -141,11 +143,11 @@ class Assembler:
         if self._record_code is not None:
             self._record_damaged = True
 
-    def rest(self, now: float) -> list[Report]:
+    def rest(self, now: float) -> list[Timed]:
         """Nothing came until now."""
         return self._end(now) if now >= self.resolves_at else []
 
-    def finish(self, now: float) -> list[Report]:
+    def finish(self, now: float) -> list[Timed]:
         """The line is closed."""
         return self._end(now) + self._break_record()
 
@@ -155,7 +157,7 @@ class Assembler:
         """Whether this marker could be a count; if it is none, the group will be too long."""
         return code == self._code == Code.TICKS and not self._done and 0 < len(self._payloads) < 3
 
-    def _value(self, code: int, payload: int, now: float) -> list[Report]:
+    def _value(self, code: int, payload: int, now: float) -> list[Timed]:
         if code != self._code:
             found = self._end(now)
             if not self._astray:
@@ -179,7 +181,7 @@ class Assembler:
         self._done = True
         return self._believed(group, now)
 
-    def _end(self, now: float) -> list[Report]:
+    def _end(self, now: float) -> list[Timed]:
         """What was begun is over."""
         code = self._code
         if code is None:
@@ -221,7 +223,7 @@ class Assembler:
                 return self._odometry_gates[group.appended].would_pass(group, now)
         return False  # one fix says little of the next
 
-    def _believed(self, group: GroupReport, now: float) -> list[Report]:
+    def _believed(self, group: GroupReport, now: float) -> list[Timed]:
         match group:
             case Ticks():
                 passes = self._ticks_gate.passes(group, now)
@@ -233,21 +235,21 @@ class Assembler:
             self.statistics.implausible += 1
             return []
         self._appends |= isinstance(group, BoardOdometry) and group.appended
-        return [group]
+        return [(now, group)]
 
     # Records
 
     def _begin_record(self, code: int | None) -> None:
         self._record, self._record_code, self._record_damaged = [], code, False
 
-    def _break_record(self) -> list[Report]:
+    def _break_record(self) -> list[Timed]:
         """Something else came before its end."""
         if self._record_code is not None:
             self.statistics.damaged_groups += 1
             self._begin_record(None)
         return []
 
-    def _sample(self, code: int, payload: int) -> list[Report]:
+    def _sample(self, code: int, payload: int) -> list[Record]:
         if self._record_code is None:
             self._begin_record(code)
         self._record_damaged |= code != self._record_code

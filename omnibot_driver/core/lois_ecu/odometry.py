@@ -222,7 +222,7 @@ class LoisOdometry:
             abs(count) * self._settings.tick_m > 5.0 * (now - from_s) + 0.5 for count in counted
         ):
             counted = (0, 0)  # the counters began anew
-        self.signed_ticks |= min(counted) < -1
+        self.signed_ticks |= min(counted) < 0
         pending = _Interval(from_s, now, counted)
         if self._needs_heading(counted):
             self._pending = pending
@@ -241,7 +241,8 @@ class LoisOdometry:
         """Where it should be now; None before the first ticks."""
         if self._at_s == -math.inf:
             return None
-        duration_s = min(max(now - self._at_s, 0.0), LONGEST_STEP_S)
+        since_s = self._at_s if self._pending is None else self._pending.from_s
+        duration_s = min(max(now - since_s, 0.0), LONGEST_STEP_S)
         left_m, right_m = (model.ahead(duration_s) for model in self._models)
         tangent = self._tangent(left_m, right_m)
         pose = self._pose.moved(roll(tangent))
@@ -559,15 +560,23 @@ class LoisOdometry:
         gain = self._gain_variance
         if any(model.kind == "duty" and model.target_mps for model in self._models):
             gain = DUTY_STDDEV**2
-        whole = self._uncertainty.total(Pose())
-        return (whole + self._extra).with_errors(
+        whole = self._uncertainty.total(Pose()) + self._extra
+        whole = whole.with_errors(
             [
+                (gain, *self._levers["gain"]),
+                (ROUNDING_STDDEV**2, *self._levers["rounding"]),
+            ]
+        )
+        # A heading that is far off bends the way: the second order, which levers do not have.
+        bent = (whole.xx + whole.yy) * whole.yaw_yaw
+        return whole.with_errors(
+            [
+                (bent, 1.0, 0.0, 0.0),
+                (bent, 0.0, 1.0, 0.0),
                 (tick, cos / 2, sin / 2, -turn),
                 (tick, cos / 2, sin / 2, turn),
                 (late_m**2, cos, sin, 0.0),
                 (late_rad**2, 0.0, 0.0, 1.0),
-                (gain, *self._levers["gain"]),
-                (ROUNDING_STDDEV**2, *self._levers["rounding"]),
             ]
         )
 

@@ -66,12 +66,16 @@ class Translation:
         self.headings.forget()
 
     def readings(
-        self, reports: list[Report], clock_unit: ClockUnit | None, now: float
+        self,
+        reports: list[Report],
+        times: list[float],
+        clock_unit: ClockUnit | None,
+        now: float,
     ) -> list[LoisReading]:
-        """In the order of the line."""
+        """In the order of the line; ``times``: when each of them arrived."""
         found: list[LoisReading] = []
-        for report in reports:
-            found += self._readings(report, clock_unit, now)
+        for at, report in zip(times, reports, strict=True):
+            found += self._readings(report, clock_unit, at)
         return found + self.rest(now)
 
     def rest(self, now: float) -> list[LoisReading]:

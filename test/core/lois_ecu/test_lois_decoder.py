@@ -89,6 +89,7 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
     assert decoder.feed(alike, 0.4) == []
     assert decoder.resolves_at == pytest.approx(0.45)
     assert decoder.feed(encode_report(Heading(3)), 0.41) == [Ticks(1000, 5, 5), Heading(3)]
+    assert decoder.times == [0.4, 0.41]
     assert decoder.resolves_at == float("inf")
 
 
