@@ -82,6 +82,9 @@ class Serializer:
         if twist is not None:
             moving = (twist.vx_mps, twist.vy_mps, 0.0, 0.0, 0.0, twist.yaw_rate_radps)
             twist_noise = self._twist_noise
+            if estimate.twist_variances is not None:
+                speed, turning = estimate.twist_variances
+                twist_noise = messages.planar(speed, 0.0, 0.0, speed, 0.0, turning)
         return LITTLE_ENDIAN + self._odometry.pack(
             *divmod(stamp_ns, 10**9),
             *self._odometry_head,

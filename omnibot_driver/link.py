@@ -36,6 +36,8 @@ STANDS_WITHIN_S: Final = 0.5
 """So long an end waits until the robot is seen to stand; then the guard repeats Stop."""
 UNGUARDED_S: Final = 1.5
 """So long where no guard does."""
+PROOFS: Final = 2.0
+"""An end waits for at least so many times what a proof takes."""
 SILENCE_S: Final = 0.25
 """So long it then waits, without a word, to see that the last Stop was no damaged one."""
 COUNT_EVERY_S: Final = 1.0
@@ -218,9 +220,10 @@ class Link:
         self._session.leave(now := time.monotonic())
         self._settle()
         alone = self._port is not None and self._keeper is None and not self._port.ends_with_us
-        self._await_standstill(now + (UNGUARDED_S if alone else STANDS_WITHIN_S))
+        proof_s = PROOFS * self._session.board.traits.stands_after_s
+        self._await_standstill(now + max(UNGUARDED_S if alone else STANDS_WITHIN_S, proof_s))
         if self._session.stands and self._session.fall_silent(now := time.monotonic()):
-            self._await_standstill(now + SILENCE_S)
+            self._await_standstill(now + max(SILENCE_S, proof_s))
 
     def _await_standstill(self, until: float) -> None:
         while self._port is not None and self._write_error is None and not self._session.stands:

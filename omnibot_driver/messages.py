@@ -73,8 +73,8 @@ class MessageSettings:
             imu_frame=prefix + values.get("imu_frame", ""),
             acceleration_stddev=values.get("linear_acceleration_stddev", 0.0),
             angular_velocity_stddev=values.get("angular_velocity_stddev", 0.0),
-            twist_linear_stddev=values["twist_linear_stddev"],
-            twist_angular_stddev=values["twist_angular_stddev"],
+            twist_linear_stddev=values.get("twist_linear_stddev", 0.0),
+            twist_angular_stddev=values.get("twist_angular_stddev", 0.0),
             wheels=wheels,
         )
 
@@ -116,7 +116,10 @@ def odometry_message(
         return message
     message.twist.twist.linear = Vector3(x=twist.vx_mps, y=twist.vy_mps, z=0.0)
     message.twist.twist.angular = Vector3(x=0.0, y=0.0, z=twist.yaw_rate_radps)
-    linear, angular = settings.twist_linear_stddev**2, settings.twist_angular_stddev**2
+    linear, angular = estimate.twist_variances or (
+        settings.twist_linear_stddev**2,
+        settings.twist_angular_stddev**2,
+    )
     message.twist.covariance = planar(linear, 0.0, 0.0, linear, 0.0, angular)
     return message
 

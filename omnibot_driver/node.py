@@ -58,7 +58,7 @@ class OmniBotDriver(Node):
             self._board,
             parameters.session_settings(self._values, self._profile.kinematics(self._values)),
             run=self._values.get("auto_start", True),
-            axis_signs=tuple(self._values["axis_signs"]),
+            axis_signs=tuple(self._values.get("axis_signs", (1, 1, 1))),
             control=self._values.get("control_method"),
             obeys=not is_recording(port),
         )

@@ -17,10 +17,13 @@ from omnibot_driver.core.geometry.kinematics import Kinematics
 from omnibot_driver.parameters import Parameter, Table, Value
 from omnibot_driver.transports import Transport
 
-PROFILES: Final = {"omnibot": "omnibot_driver.boards.omnibot"}
+PROFILES: Final = {
+    "omnibot": "omnibot_driver.boards.omnibot",
+    "lois_ecu": "omnibot_driver.boards.lois_ecu",
+}
 """By the value of the parameter ``board``: the module that is its profile."""
 DEFAULT: Final = "omnibot"
-NOT_BUILT: Final = ("lois_ecu", "mart", "fejemis")
+NOT_BUILT: Final = ("mart", "fejemis")
 """Names that are kept for boards to come."""
 
 Publish = Callable[[Any, int], None]

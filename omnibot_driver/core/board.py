@@ -113,6 +113,18 @@ class Board(Protocol):
         """
         return NO_PACKETS
 
+    def elapse(self, now: float) -> list[Reading]:
+        """What becomes known as time passes, without bytes; asked when ``wake_at`` has come."""
+        return []
+
+    def reset_odometry(self) -> None:
+        """The frame of its OdometryReadings begins where the robot stands."""
+
+    @property
+    def shows_standstill(self) -> bool:
+        """Whether its displacements can prove now that the robot stands."""
+        return True
+
     def actuator(self, proof: StopProof) -> Actuator:
         """What says orders to it, and tells ``proof`` of stops and motions. Made once."""
 

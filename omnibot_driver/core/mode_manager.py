@@ -146,6 +146,12 @@ class ModeManager:
         elif self.phase is Phase.STARTING or (self.phase is Phase.SETTLED and running_wanted):
             self._begin(now)  # it has restarted, and may have slept through what was said so far
 
+    def heard_reset(self, now: float) -> None:
+        """The board, which never pauses, shows that it has obeyed a reset."""
+        if self.phase is Phase.RESETTING and now - self._said_at >= IN_FLIGHT_S:
+            self.output += self._board.wake()
+            self._settle("the board was reset")
+
     @property
     def at_rest(self) -> bool:
         """Data that goes on coming is nothing to react to."""
@@ -204,7 +210,7 @@ class ModeManager:
         """The opening sequence; a board that is not wanted running gets no S."""
         self.output += self._board.wake()
         self.phase = Phase.SETTLED
-        if self._wanted is Wanted.RUNNING:
+        if self._wanted is Wanted.RUNNING and Request.START in self._board.traits.requests:
             self.phase = Phase.STARTING
             self._say(self._board.start(), now)
 

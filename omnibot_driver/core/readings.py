@@ -5,6 +5,9 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.values import value
 
 Vector3 = tuple[float, float, float]
@@ -28,6 +31,7 @@ class DisplacementReading:
 
     ``duration_s`` is None where nobody knows it: the first after a pause holds all motion since.
     ``restarted``: the board's counters seem to begin anew here, and its earth frame with them.
+    ``measured``: not so where the board is blind, and it is taken from what was commanded.
     """
 
     dx_m: float
@@ -37,6 +41,7 @@ class DisplacementReading:
     duration_s: float | None
     lost: int
     restarted: bool = False
+    measured: bool = True
 
 
 @value(frozen=True, slots=True)
@@ -65,6 +70,36 @@ class PausedReading:
     continues: bool = False
 
 
+@value(frozen=True, slots=True)
+class OdometryReading:
+    """The board's own odometry, in a frame that begins where ``Board.reset_odometry`` was called.
+
+    Pose and covariance in that frame at ``stamp_s``, twist in the body's axes with the variances
+    of its speed and its turning. ``rolled``: what the wheels have made of the robot since the board
+    was made, as one tangent; ``rolling`` its rate, None where the board does not tell.
+    """
+
+    stamp_s: float
+    pose: Pose
+    twist: BodyTwist
+    covariance: Covariance
+    twist_variances: tuple[float, float]
+    rolled: Pose
+    rolling: BodyTwist | None
+
+
+@dataclass(frozen=True, slots=True)
+class EStopButtonReading:
+    """The emergency stop button on the robot was pressed or released."""
+
+    pressed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ResetReading:
+    """The board shows that it has obeyed a reset."""
+
+
 @dataclass(frozen=True, slots=True)
 class ExtraReading:
     """Anything else that a board tells: a value of a kind of its own, passed on as it is."""
@@ -72,7 +107,16 @@ class ExtraReading:
     content: object
 
 
-Reading = ImuReading | DisplacementReading | PoseReading | PausedReading | ExtraReading
+Reading = (
+    ImuReading
+    | DisplacementReading
+    | PoseReading
+    | OdometryReading
+    | PausedReading
+    | EStopButtonReading
+    | ResetReading
+    | ExtraReading
+)
 
 
 @value(frozen=True, slots=True)

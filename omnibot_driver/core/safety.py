@@ -13,7 +13,13 @@ from omnibot_driver.core.commands.pipeline import CommandPipeline
 from omnibot_driver.core.liveness import Liveness
 from omnibot_driver.core.measurement.pipeline import Measured, MeasurementPipeline
 from omnibot_driver.core.mode_manager import CLOSED, ModeManager
-from omnibot_driver.core.readings import DisplacementReading, PausedReading, PoseReading
+from omnibot_driver.core.readings import (
+    DisplacementReading,
+    EStopButtonReading,
+    PausedReading,
+    PoseReading,
+    ResetReading,
+)
 from omnibot_driver.core.reporter import Reporter
 
 
@@ -52,6 +58,10 @@ class SafetyStops:
                 if self._board.mode.running:  # again, within one read
                     self._policy.halt(now)
                 self._mode_manager.heard_paused(now, continues=reading.continues)
+            elif isinstance(reading, EStopButtonReading) and reading.pressed:
+                self.estop(True, now, by="the button on the robot")
+            elif isinstance(reading, ResetReading):
+                self._mode_manager.heard_reset(now)
         if self._policy.current is not None:
             notify(commanding.check_goal([], now))
 

@@ -28,7 +28,7 @@ from omnibot_driver.core.measurement.outlier_filter import Refused
 from omnibot_driver.core.measurement.pipeline import MeasurementPipeline
 from omnibot_driver.core.mode_manager import CLOSED, ModeManager
 from omnibot_driver.core.packets import NO_PACKETS, Packets
-from omnibot_driver.core.readings import PausedReading, Reading, Vector3
+from omnibot_driver.core.readings import OdometryReading, PausedReading, Reading, Vector3
 from omnibot_driver.core.reporter import Reporter
 from omnibot_driver.core.reporting.figures import SessionFigures
 from omnibot_driver.core.requests import OnExit, Request
@@ -204,6 +204,8 @@ class Session:
 
     def tick(self, now: float) -> None:
         """Time passed."""
+        if now >= self._board.wake_at:
+            self._elapse(now)
         self._safety.tick(now)
         self._mode_manager.tick(now)
         self._calibration.tick(now)
@@ -254,6 +256,7 @@ class Session:
     def reset_odometry(self, now: float) -> None:
         """The odometry frame begins where the robot stands; a goal in the old one is dropped."""
         self.process(now)
+        self._board.reset_odometry()
         self._reporter.events += self._odometry.reset()
         self._reporter.notify(self._commanding.check_goal([], now))
 
@@ -269,8 +272,15 @@ class Session:
         """
         if self._board.mode is not Mode.NOMINAL or self.estop_active:
             return False
+        if not self._board.shows_standstill:
+            return False
         self._commands.fall_silent(now)
         return True
+
+    @property
+    def board(self) -> Board:
+        """For what its profile alone knows of."""
+        return self._board
 
     @property
     def stands(self) -> bool:
@@ -314,6 +324,19 @@ class Session:
     def take_events(self) -> list[Event]:
         """What happened since the last call, in order."""
         return self._reporter.take()
+
+    def _elapse(self, now: float) -> None:
+        """What becomes known without bytes; odometry that is predicted does not count as heard."""
+        before = self._board.mode
+        readings = self._board.elapse(now)
+        self._reporter.events += self._measurement.hear(readings, now)
+        if all(isinstance(reading, OdometryReading) for reading in readings):
+            self._safety.react(self._measurement.flush(), now)
+        else:
+            self._liveness.heard_at, self._last = now, readings[-1]
+            self.process(now)
+        if self._board.mode.running and not before.running:
+            self._safety.set_out(now)
 
     def _command(self, wish: Command, now: float) -> None:
         motion, expires_at = wish

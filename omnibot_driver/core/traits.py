@@ -17,7 +17,12 @@ class Traits:
     IMU, whose readings are stamped by their arrival. ``authorities``: who may command motion;
     ``requests``: what else can be asked of it; ``wheels``: names of those that ``wheel_cmd`` turns,
     in its order; ``unheard_s``: a robot that is not heard for so long is driven no further;
-    ``silence_s``: after it a board that says nothing is not known to be there.
+    ``silence_s``: after it a board that says nothing is not known to be there; ``own_odometry``:
+    OdometryReadings say where the robot is, and displacements only whether it obeys;
+    ``stands_after_s``: a robot whose displacements show no motion for so long stands;
+    ``unproved_s``: how long Stop is repeated at most while that is not seen; ``slack_mps``,
+    ``slack_radps``: how far its displacements, or its wheels when they speed up, may be off what is
+    commanded on top of what any robot may.
     """
 
     channels: tuple[str, ...] = ("",)
@@ -27,6 +32,11 @@ class Traits:
     wheels: tuple[str, ...] = ()
     unheard_s: float
     silence_s: float
+    own_odometry: bool = False
+    stands_after_s: float = 0.1
+    unproved_s: float = 5.0
+    slack_mps: float = 0.0
+    slack_radps: float = 0.0
 
     @property
     def imu(self) -> bool:

@@ -7,7 +7,7 @@ What a board's table lacks, means nothing to that board.
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
@@ -19,6 +19,8 @@ from omnibot_driver.core.odometry.covariance import OdometryNoise
 from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.readings import Vector3
 from omnibot_driver.core.settings import SessionSettings
+
+NOISE: Final = OdometryNoise()
 
 
 def session_settings(values: Mapping[str, Any], wheels: Kinematics) -> SessionSettings:
@@ -37,18 +39,18 @@ def session_settings(values: Mapping[str, Any], wheels: Kinematics) -> SessionSe
         motion_monitor=values["motion_monitor"],
         odometry=OdometrySettings(
             noise=OdometryNoise(
-                wheel_drift=values["odom_wheel_drift"],
-                wheel_scale=values["odom_wheel_scale"],
-                wheel_slip=values["odom_wheel_slip"],
+                wheel_drift=values.get("odom_wheel_drift", NOISE.wheel_drift),
+                wheel_scale=values.get("odom_wheel_scale", NOISE.wheel_scale),
+                wheel_slip=values.get("odom_wheel_slip", NOISE.wheel_slip),
                 wheels=wheels.rims,
-                unheard_mps2=values["odom_gap_acceleration"],
-                unheard_radps2=values["odom_gap_angular_acceleration"],
+                unheard_mps2=values.get("odom_gap_acceleration", NOISE.unheard_mps2),
+                unheard_radps2=values.get("odom_gap_angular_acceleration", NOISE.unheard_radps2),
             ),
             use_board_pose=values.get("use_board_pose", True),
             fastest_mps=values["fastest_linear_speed"],
             fastest_radps=values["fastest_angular_speed"],
-            linear_scale=values["odom_linear_scale"],
-            angular_scale=values["odom_angular_scale"],
+            linear_scale=values.get("odom_linear_scale", 1.0),
+            angular_scale=values.get("odom_angular_scale", 1.0),
         ),
         motion=MotionLimits(
             fastest_mps=values["fastest_linear_speed"],

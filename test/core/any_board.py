@@ -69,14 +69,50 @@ def omnibot() -> tuple[Board, Any]:
     return OmniBot(OmniBotSettings()), OmniBotRobot()
 
 
+class LoisRobot:
+    """The simulated LOIS ECU."""
+
+    def __init__(self, firmware: Any) -> None:
+        from omnibot_driver.simulator.lois_ecu import QUIRKS, LoisSettings, SimulatedLois
+
+        self.board = SimulatedLois(LoisSettings(quirks=QUIRKS[firmware], running=True))
+
+    @property
+    def stands(self) -> bool:
+        return self.board.standing
+
+    @property
+    def way_m(self) -> float:
+        return self.board.truth.x_m
+
+    def receive(self, data: bytes, now: float, channel: int) -> None:
+        self.board.receive(data, now, channel)
+
+    def advance(self) -> list[Packet]:
+        return self.board.advance()
+
+
+def lois_ecu(firmware: str) -> tuple[Board, Any]:
+    from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+    from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+    return LoisEcuBoard(LoisEcuSettings()), LoisRobot(firmware)
+
+
 MAKERS: dict[str, Callable[[], tuple[Board, Any]]] = {
     "omnibot": omnibot,
+    "lois_ecu": lambda: lois_ecu("firmware"),
+    "lois_ecu as documented": lambda: lois_ecu("documented"),
     "two lines": lambda: (line_board.make({}), LineRobot()),
     "requests": lambda: (request_board.make({}), RequestRobot()),
 }
 """A new board of each kind, and its robot."""
 CORE = Path(core.__file__).parent
-BOARDS = [name for name in MAKERS if name not in PROFILES or (CORE / name).is_dir()]
+BOARDS = [
+    name
+    for name in MAKERS
+    if (board := name.split()[0]) not in PROFILES or (CORE / board).is_dir()
+]
 """Those that are there: a board is a folder that can be removed."""
 
 

@@ -50,16 +50,18 @@ class CommandPipeline:
         *,
         obeys: bool,
     ) -> None:
-        proof = StopProof()
+        proof = StopProof(board.traits.stands_after_s)
         self._actuator = board.actuator(proof)
-        self.policy = CommandPolicy(settings.commands, self._actuator, proof)
+        self.policy = CommandPolicy(
+            settings.commands, self._actuator, proof, board.traits.unproved_s
+        )
         self._odometry = odometry
         self._shaper = CommandShaper(
             board, self._actuator, odometry, settings.limits, axis_signs, control
         )
         self.interlock = MotionInterlock()
         self._board, self._axis_signs = board, axis_signs
-        self._monitor = MotionMonitor()
+        self._monitor = MotionMonitor(board.traits.slack_mps, board.traits.slack_radps)
         self._obeys = obeys
         self.monitored = settings.motion_monitor
 
@@ -163,7 +165,7 @@ class CommandPipeline:
     ) -> Fault | None:
         """What the newest estimate, or else the bare displacement, shows."""
         seconds = reading.duration_s
-        if not seconds or reading.restarted:
+        if not seconds or reading.restarted or not reading.measured:
             self._monitor.begin()
             return None
         if self.policy.current is None:

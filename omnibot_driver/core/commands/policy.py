@@ -35,8 +35,15 @@ class CommandSettings:
 class CommandPolicy:
     """``proof``: what the actuator tells of stops and motions, and displacements of the robot."""
 
-    def __init__(self, settings: CommandSettings, actuator: Actuator, proof: StopProof) -> None:
+    def __init__(
+        self,
+        settings: CommandSettings,
+        actuator: Actuator,
+        proof: StopProof,
+        unproved_s: float = UNPROVED_S,
+    ) -> None:
         self.proof = proof
+        self._unproved_s = unproved_s
         self._actuator = actuator
         self.configure(settings)
         self.latched = False
@@ -46,7 +53,7 @@ class CommandPolicy:
         self.quiet = False
         """It has fallen silent, and nothing was commanded since."""
         self.unconfirmed = False
-        """Stop was wanted for ``UNPROVED_S`` and a robot that was driven is not seen to stand."""
+        """Stop was wanted for ``unproved_s`` and a robot that was driven is not seen to stand."""
         self._expires_at = -math.inf
         self._stopping_since: float | None = None
 
@@ -128,4 +135,4 @@ class CommandPolicy:
     @property
     def _stopping_s(self) -> float:
         """How long Stop is wanted."""
-        return STOPPING_S if self.proof.proved else UNPROVED_S
+        return STOPPING_S if self.proof.proved else self._unproved_s

@@ -7,6 +7,7 @@ time is an argument.
 """
 
 import math
+from collections.abc import Callable
 from typing import Final, Protocol
 
 from omnibot_driver.core.commands.actuator import Wanted
@@ -36,9 +37,19 @@ class Encoder(Protocol):
 
 
 class SetpointStream:
-    """``proof`` hears of each stop and each motion that goes out."""
+    """``proof`` hears of each stop and each motion that goes out; ``heard``, if there is one, of
+    all packets, those of requests among them.
+    """
 
-    def __init__(self, encoder: Encoder, proof: StopProof, *, rate_hz: float = 20.0) -> None:
+    def __init__(
+        self,
+        encoder: Encoder,
+        proof: StopProof,
+        *,
+        rate_hz: float = 20.0,
+        heard: Callable[[Packets, float], None] | None = None,
+    ) -> None:
+        self._heard = heard
         self.rate_hz = rate_hz
         self.commanded: BodyTwist | None = None
         self._encoder, self._proof = encoder, proof
@@ -75,6 +86,8 @@ class SetpointStream:
 
     def wrote(self, packets: Packets, now: float) -> None:
         """Some begin with Stop. What others left of a motion frame is completed: say it again."""
+        if self._heard is not None:
+            self._heard(packets, now)
         first = dict(reversed(packets))
         if all(first.get(channel, b"").startswith(stop) for channel, stop in self._stop):
             self._note_stop(now)
@@ -97,6 +110,8 @@ class SetpointStream:
             self._moved_at = now if moves else -math.inf
         self._fresh, self._urgent, self._switching = self._switching, False, False
         self.commanded = self._encoder.meaning(packets)
+        if self._heard is not None:
+            self._heard(packets, now)
         return packets
 
     @property

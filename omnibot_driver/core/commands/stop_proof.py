@@ -16,6 +16,8 @@ STILL_RADPS: Final = 0.03
 """Above two encoder counts of a wheel in 40 ms, below the slowest linear command (0.014 m/s)."""
 STILL_S: Final = 0.1
 """Three displacements of 40 ms."""
+SLACK_S: Final = 1e-6
+"""Three times 0.2 s are a little less than 0.6 s in floating point."""
 AT_LEAST: Final = 2
 """Displacements, where one is as long: one alone may be damaged, or be from before the wheels
 turned."""
@@ -24,13 +26,14 @@ UNDER_WAY_S: Final = 0.05
 
 
 class StopProof:
-    """``proved``: Stop went out, no motion since, and the robot has stood for ``STILL_S``.
+    """``proved``: Stop went out, no motion since, and the robot has stood for ``still_s``.
 
     ``owed``: motion went out, and since then nothing has proved that the robot stands.
     ``measured``: a displacement has come since Stop went out.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, still_s: float = STILL_S) -> None:
+        self._needed_s = still_s - SLACK_S
         self.owed = False
         self.begin()
 
@@ -55,7 +58,7 @@ class StopProof:
 
     def look(self, reading: DisplacementReading, now: float) -> None:
         """A displacement arrived."""
-        if not reading.duration_s or now < self._stopped_at + UNDER_WAY_S:
+        if not reading.duration_s or not reading.measured or now < self._stopped_at + UNDER_WAY_S:
             return
         self.measured = True
         moves = (
@@ -64,5 +67,5 @@ class StopProof:
         )
         self._still_s = 0.0 if moves else self._still_s + reading.duration_s
         self._still = 0 if moves else self._still + 1
-        self.proved = self._still_s >= STILL_S and self._still >= AT_LEAST
+        self.proved = self._still_s >= self._needed_s and self._still >= AT_LEAST
         self.owed = self.owed and not self.proved

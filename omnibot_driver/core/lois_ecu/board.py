@@ -20,6 +20,7 @@ from omnibot_driver.core.lois_ecu import outbound
 from omnibot_driver.core.lois_ecu.decoder import DecoderStatistics, LoisDecoder
 from omnibot_driver.core.lois_ecu.messages import (
     MOST_SAMPLES,
+    PERIOD_ONCE,
     Command,
     DistributeBall,
     GpsDate,
@@ -33,6 +34,7 @@ from omnibot_driver.core.lois_ecu.messages import (
     SetLed,
     SetRpm,
     SetTerminalMode,
+    Stream,
     TerminalMode,
     Ticks,
 )
@@ -45,16 +47,21 @@ from omnibot_driver.core.lois_ecu.translation import Translation
 from omnibot_driver.core.requests import Request
 from omnibot_driver.core.traits import Traits
 
+STANDS_AFTER_S: Final = 0.6
+"""Without a tick. The slowest wheel that turns, at 2 RPM, ticks each half second."""
 TRAITS: Final = Traits(
-    imu=False,
+    imu_period_s=None,
     authorities=frozenset({Authority.BASE, Authority.WHEELS}),
     requests=frozenset({Request.RESET}),
     wheels=("left", "right"),
     unheard_s=1.0,  # groups come each 0.2 s, and may be lost
     silence_s=1.5,
+    own_odometry=True,
+    stands_after_s=STANDS_AFTER_S,
+    unproved_s=2.0,
+    slack_mps=0.15,  # a tick in 0.2 s is 0.07 m/s
+    slack_radps=1.2,  # with its gains the wheels do not speed up alike
 )
-STANDS_AFTER_S: Final = 0.6
-"""Without a tick. The slowest wheel that turns, at 2 RPM, ticks each half second."""
 CLEAR_AFTER_S: Final = 2.0
 """After a Stop; then RPM 0/0 ends the counting."""
 CLEAR_AGAIN_S: Final = 0.15
@@ -150,6 +157,16 @@ class LoisEcu:
         """Nothing was understood for so long that the mode is unknown again."""
         self.mode = Mode.UNKNOWN
 
+    @property
+    def translation(self) -> Translation:
+        """What is known of the robot."""
+        return self._translation
+
+    @property
+    def held_until(self) -> float:
+        """When ``receive`` without bytes tells what was held; infinity while nothing is."""
+        return self._decoder.resolves_at
+
     def predicted(self, now: float) -> FusedOdometry | None:
         """Where the robot should be now; None before the first ticks."""
         return self._translation.odometry.predict(now)
@@ -177,8 +194,9 @@ class LoisEcu:
     @property
     def figures(self) -> BoardFigures:
         """Over all connections."""
+        ticks_ms = self._settings.periods_ms.get(Stream.TICKS, PERIOD_ONCE)
         return BoardFigures(
-            rates_hz=(0.0, 0.0, 0.0),
+            rates_hz={"Odometry": 1e3 / ticks_ms} if ticks_ms < PERIOD_ONCE else {},
             faults=self._statistics.faults + self._decoder.group_statistics.damaged_groups,
             discarded_bytes=self._statistics.discarded_bytes,
             saturated=self._saturated,
@@ -325,6 +343,10 @@ class LoisEcu:
         self._decoder.forget_counters()
         self._translation.connect()
         return self._lines(outbound.STOP, Reset())
+
+    def say(self, command: Command, now: float) -> None:
+        """Something that may be repeated, until it has surely arrived."""
+        self._writer.write(command, now)
 
     def led(self, on: bool) -> bytes:
         """The board's LED."""

@@ -7,9 +7,9 @@ EStopButton, Record and TerminalLine are passed on as they are.
 
 from dataclasses import dataclass
 
-from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.lois_ecu.messages import EStopButton, Record, TerminalLine
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
+from omnibot_driver.core.readings import DisplacementReading
 
 
 @dataclass(frozen=True, slots=True)

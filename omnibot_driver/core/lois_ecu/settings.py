@@ -27,6 +27,7 @@ class LoisEcuSettings:
     its wheels in RPM mode. ``written``: further settings that the user wants on the board.
     ``periods_ms``: of what the board sends by itself; others stay as they are. ``with_sum``:
     whether what is sent has a checksum. ``declination_rad``: of magnetic north, east positive.
+    ``odom_rate_hz``: how often the odometry is told, predicted from one group to the next.
     """
 
     wheel_radius_m: float = 0.13
@@ -42,6 +43,7 @@ class LoisEcuSettings:
     with_sum: bool = True
     terminal_mode: TerminalMode = TerminalMode.HOST
     declination_rad: float = 0.0
+    odom_rate_hz: float = 20.0
 
     @property
     def rim_mps_per_rpm(self) -> float:

@@ -9,7 +9,6 @@ import math
 from datetime import UTC, datetime
 from typing import Final
 
-from omnibot_driver.core.board import DisplacementReading
 from omnibot_driver.core.lois_ecu.heading_filter import HeadingFilter
 from omnibot_driver.core.lois_ecu.messages import (
     BoardOdometry,
@@ -33,6 +32,7 @@ from omnibot_driver.core.lois_ecu.readings import (
     WheelReading,
 )
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.readings import DisplacementReading
 
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
@@ -87,8 +87,8 @@ class Translation:
     ) -> list[LoisReading]:
         match report:
             case Ticks():
-                self._watch(report, clock_unit, now)
-                return self._displaced(self.odometry.heard_ticks(report, now))
+                restarted = self._watch(report, clock_unit, now)
+                return restarted + self._displaced(self.odometry.heard_ticks(report, now))
             case BoardOdometry():
                 return self._displaced(self.odometry.heard_odometry(report, now))
             case GpsPosition(latitude, longitude):
@@ -110,12 +110,14 @@ class Translation:
                 return [report]
         return []
 
-    def _watch(self, ticks: Ticks, clock_unit: ClockUnit | None, now: float) -> None:
+    def _watch(
+        self, ticks: Ticks, clock_unit: ClockUnit | None, now: float
+    ) -> list[LoisReading]:
         before, self._ticks = self._ticks, ticks
         duration_s, self.last_ticks_at_s = now - self.last_ticks_at_s, now
         if before is None:
             self.ticked_at_s = now
-            return
+            return []
         ways = wrapped(ticks.left - before.left), wrapped(ticks.right - before.right)
         if any(ways):
             self.ticked_at_s = now
@@ -130,6 +132,13 @@ class Translation:
             self.restarts += 1
             self.odometry.connect()
             self.headings.forget()
+            return [DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True)]
+        return []
+
+    @property
+    def ticks(self) -> Ticks | None:
+        """The last ones; None since the line is new, or a reset was said."""
+        return self._ticks
 
     def _displaced(self, estimates: list[FusedOdometry]) -> list[LoisReading]:
         return [reading for fused in estimates for reading in self._of(fused)]
@@ -149,6 +158,7 @@ class Translation:
                 "body",
                 None if before is None else fused.stamp_s - before,
                 0,
+                measured=self.odometry.counting and not fused.blind,
             ),
             WheelReading(left_m / radius_m, right_m / radius_m, not fused.blind),
             fused,

@@ -23,7 +23,6 @@ from typing import Final
 
 from omnibot_driver.core.readings import (
     DisplacementReading,
-    ExtraReading,
     ImuReading,
     PausedReading,
     PoseReading,
@@ -95,7 +94,7 @@ class OutlierFilter:
             return self._admit_displacement(reading, stamp_s)
         if isinstance(reading, PausedReading):
             return [*self.release(), (reading, stamp_s)]
-        if isinstance(reading, ExtraReading):
+        if not isinstance(reading, PoseReading):
             return [(reading, stamp_s)]
         if self._held_motion:
             self._held_motion.append((reading, stamp_s))

@@ -18,10 +18,13 @@ from omnibot_driver.core.measurement.statistics import StreamStatistics
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
 from omnibot_driver.core.readings import (
     DisplacementReading,
+    EStopButtonReading,
     ExtraReading,
     ImuReading,
+    OdometryReading,
     PoseReading,
     Reading,
+    ResetReading,
 )
 from omnibot_driver.core.settings import SessionSettings
 from omnibot_driver.core.timing.arrival_clock import ArrivalClock
@@ -127,12 +130,32 @@ class MeasurementPipeline:
     def _estimates(self, reading: Reading, stamp_s: float) -> Sequence[Estimate]:
         if isinstance(reading, DisplacementReading):
             self.inertial.displaced(reading)
+            if self._board.traits.own_odometry:
+                return []
             return self.odometry.displace(reading, stamp_s)
         if isinstance(reading, PoseReading):
             return self.odometry.settle(reading)
         if isinstance(reading, ImuReading):
             return [self.inertial.estimate(reading, stamp_s)]
+        if isinstance(reading, OdometryReading):
+            return [_estimate(reading)]
+        if isinstance(reading, EStopButtonReading):
+            return [Extra(reading, stamp_s)]
         if isinstance(reading, ExtraReading):
             return [Extra(reading.content, stamp_s)]
+        if isinstance(reading, ResetReading):
+            return []
         self._clock.restart()
         return []
+
+
+def _estimate(reading: OdometryReading) -> OdometryEstimate:
+    return OdometryEstimate(
+        reading.stamp_s,
+        reading.pose,
+        reading.twist,
+        reading.covariance,
+        reading.rolled,
+        reading.rolling,
+        reading.twist_variances,
+    )

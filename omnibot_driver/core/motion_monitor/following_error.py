@@ -23,9 +23,10 @@ ones."""
 
 
 class FollowingError:
-    """``outside``: whether the robot was outside of the envelope by the last displacement."""
+    """``slack_mps``, ``slack_radps``: what is no error on top of the envelope. ``outside``: whether the robot was outside of the envelope by the last displacement."""
 
-    def __init__(self) -> None:
+    def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
+        self._slack_mps, self._slack_radps = slack_mps, slack_radps
         self.reset()
 
     def reset(self) -> None:
@@ -63,6 +64,8 @@ class FollowingError:
         if not (heading_known and on_the_way(motion, newest)):
             explained = history.explained(begun_s)
             way_mps, turn_radps = outside(motion, explained, heading_known=heading_known)
+            way_mps -= self._slack_mps
+            turn_radps -= self._slack_radps
         stood, self._stands = self._stands, newest[0] is AT_REST
         if self._stands is not stood:
             self._way_m = self._turn_rad = 0.0

@@ -81,10 +81,10 @@ ADVICE: Final = {
 class MotionMonitor:
     """``commanded``, ``measured``: what the last fault rests on."""
 
-    def __init__(self) -> None:
+    def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
         self.commanded = self.measured = AT_REST
         self._history = SetpointHistory()
-        self._error = FollowingError()
+        self._error = FollowingError(slack_mps, slack_radps)
         self._released = False
         self._told: set[Fault] = set()
         self._refused = self._refused_before = 0

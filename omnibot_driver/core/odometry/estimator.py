@@ -57,7 +57,8 @@ class OdometryEstimate:
 
     ``twist`` is None where the time that the displacement took is not known. ``rolled`` is what
     the wheels have made of the robot since the driver began, as one tangent in the board's own
-    axes; ``rolling`` its rate.
+    axes; ``rolling`` its rate. ``twist_variances``: of speed and turning, where they are known
+    better than by the parameters.
     """
 
     stamp_s: float
@@ -66,6 +67,7 @@ class OdometryEstimate:
     covariance: Covariance
     rolled: Pose = field(default_factory=Pose)
     rolling: BodyTwist | None = None
+    twist_variances: tuple[float, float] | None = None
 
 
 class Odometry:

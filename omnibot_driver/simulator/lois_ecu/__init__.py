@@ -5,7 +5,8 @@
 Shares no code with the driver: a misread manual must not cancel out. ``SimulatedLois`` is pure.
 """
 
-from omnibot_driver.simulator.lois_ecu.board import Obeyed, SimulatedLois, TrueState
+from omnibot_driver.simulator.lois_ecu.board import CHANNELS, Obeyed, SimulatedLois, TrueState
+from omnibot_driver.simulator.lois_ecu.options import add_options, from_arguments
 from omnibot_driver.simulator.lois_ecu.settings import (
     DOCUMENTED,
     FIRMWARE,
@@ -16,10 +17,14 @@ from omnibot_driver.simulator.lois_ecu.settings import (
     Quirks,
 )
 
+TITLE = "LOIS ECU"
+
 __all__ = [
+    "CHANNELS",
     "DOCUMENTED",
     "FIRMWARE",
     "QUIRKS",
+    "TITLE",
     "Firmware",
     "LoisSettings",
     "MotorSettings",
@@ -27,4 +32,6 @@ __all__ = [
     "Quirks",
     "SimulatedLois",
     "TrueState",
+    "add_options",
+    "from_arguments",
 ]

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from math import cos, hypot, pi, sin
 from random import Random
 
+from omnibot_driver.simulator.common.board import Channel, Packet
 from omnibot_driver.simulator.lois_ecu import wire
 from omnibot_driver.simulator.lois_ecu.channel import RECORD_DEPTH, WheelChannel
 from omnibot_driver.simulator.lois_ecu.motors import Encoder, Gains, Motor
@@ -21,6 +22,7 @@ from omnibot_driver.simulator.lois_ecu.odometry import DocumentedOdometry, Firmw
 from omnibot_driver.simulator.lois_ecu.sensors import Compass, Fix, fix_at, sentence
 from omnibot_driver.simulator.lois_ecu.settings import LoisSettings
 
+CHANNELS = (Channel(),)
 STEP_S = 0.001
 STEPS_PER_TICK = 10
 BYTES_PER_STEP = 11.52
@@ -69,6 +71,7 @@ class SimulatedLois:
     those, what it did not hear. led, balls, pressed: what can be seen of it.
     """
 
+    channels = CHANNELS
     tick_s = STEP_S * STEPS_PER_TICK
 
     def __init__(self, settings: LoisSettings | None = None) -> None:
@@ -102,7 +105,7 @@ class SimulatedLois:
     def _boot(self) -> None:
         settings, quirks = self.settings, self.settings.quirks
         low_pass = 0.0 if quirks.low_pass_starts_at_zero else 1.0
-        self.channels = tuple(
+        self.wheels = tuple(
             WheelChannel(
                 quirks,
                 settings.steps,
@@ -170,17 +173,41 @@ class SimulatedLois:
         self.pressed = pressed
         self._button_news = pressed
         self._applied_duty = (0, 0)
-        for channel in self.channels:
+        for channel in self.wheels:
             channel.release()
 
     def hold(self, *, left: bool = False, right: bool = False) -> None:
         """Somebody holds these wheels."""
         self.motors[0].held, self.motors[1].held = left, right
 
-    def receive(self, data: bytes, now: float | None = None) -> None:
+    def receive(self, data: bytes, now: float | None = None, channel: int = 0) -> None:
         """Take bytes off the line; they arrive one after the other from now on."""
         self.received += data
         self._inbound.extend(data)
+
+    def advance(self) -> list[Packet]:
+        """Let one tick pass; what left the board in it."""
+        data = self.step()
+        return [(0, data)] if data else []
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """Of the robot and its board."""
+        truth, (left, right) = self.truth, self.wheels
+        return {
+            "x_m": truth.x_m,
+            "y_m": truth.y_m,
+            "yaw_rad": truth.yaw_rad,
+            "speed_mps": truth.speed_mps,
+            "yaw_rate_radps": truth.yaw_rate_radps,
+            "rpm": [motor.rpm for motor in self.motors],
+            "ticks": [left.ticks, right.ticks],
+            "led": self.led,
+            "balls": self.balls,
+            "pressed": self.pressed,
+            "obeyed": len(self.commands),
+            "lost_bytes": self.lost_bytes,
+        }
 
     def step(self) -> bytes:
         """Let one tick pass; the bytes that left the board in it."""
@@ -245,9 +272,9 @@ class SimulatedLois:
         if self._deaf:
             self._pending[index] = (is_long, direction)
             return
-        self.channels[index].edge(at_s, is_long, direction)
+        self.wheels[index].edge(at_s, is_long, direction)
         if isinstance(self.odometry, FirmwareOdometry):
-            self.odometry.tick(at_s, self.channels[0].rpm, self.channels[1].rpm)
+            self.odometry.tick(at_s, self.wheels[0].rpm, self.wheels[1].rpm)
 
     def _interrupts(self) -> None:
         quirks = self.settings.quirks
@@ -259,18 +286,18 @@ class SimulatedLois:
             self._control_late = True
         if self._control_late and not self._deaf:
             self._control_late = False
-            for channel in self.channels:
+            for channel in self.wheels:
                 channel.settle(self.now_s)
                 channel.control(period_s)
-            left, right = self.channels
+            left, right = self.wheels
             self._applied_duty = (left.duty_percent, right.duty_percent)
             if self._recording == "torque":
-                for channel in self.channels:
+                for channel in self.wheels:
                     channel.torque()
         if not self._firmware_odometry and self._steps % 5 == 0:
-            self.odometry.move(*(channel.turned_ticks for channel in self.channels))
-            self.odometry.measure(*(channel.exact_rpm for channel in self.channels))
-            for channel in self.channels:
+            self.odometry.move(*(channel.turned_ticks for channel in self.wheels))
+            self.odometry.measure(*(channel.exact_rpm for channel in self.wheels))
+            for channel in self.wheels:
                 channel.turned_ticks = 0
         if self.now_s >= self._compass_at_s + self.settings.compass_period_s:
             self._compass_at_s += self.settings.compass_period_s
@@ -392,7 +419,7 @@ class SimulatedLois:
         if code == 0x20:
             return wire.sequence(code, numbers)
         clock = self._clock_ms if quirks.clock_in_ms else round(self.now_s * 1e9)
-        ticks = [channel.ticks & 0xFFFFFFFF for channel in self.channels]
+        ticks = [channel.ticks & 0xFFFFFFFF for channel in self.wheels]
         group = wire.sequence(code, [clock & 0xFFFFFFFF, *ticks])
         return group + wire.sequence(code, numbers) if quirks.appends_odometry else group
 
@@ -408,7 +435,7 @@ class SimulatedLois:
     def _send_record(self) -> None:
         if self._recording not in ("rpm", "torque"):
             return
-        left, right = self.channels
+        left, right = self.wheels
         if left.record_left or right.record_left:
             return
         under_rpm = self._recording == "rpm" or self.settings.quirks.torque_comes_as_rpm
@@ -436,7 +463,7 @@ class SimulatedLois:
     def _obey(self, command: int, payload: int) -> None:
         quirks = self.settings.quirks
         self.commands.append(Obeyed(self.tick, command, payload))
-        left, right = self.channels
+        left, right = self.wheels
         high, low = payload >> 16, payload & 0xFFFF
         signed = [word - 0x10000 if word & 0x8000 else word for word in (high, low)]
         if command == 0x01:
@@ -483,7 +510,7 @@ class SimulatedLois:
                 channel.controller.change(feed_forward=number)
 
     def _correct(self, command: int, factor: float) -> None:
-        channel = self.channels[0 if command <= 0x14 else 1]
+        channel = self.wheels[0 if command <= 0x14 else 1]
         if command in (0x13, 0x15):
             channel.short_correction = factor
         else:

@@ -9,7 +9,7 @@ from datetime import date
 import pytest
 from lois_drives import Rig, nominal
 
-from omnibot_driver.core.board import DisplacementReading, Mode
+from omnibot_driver.core.board import Mode
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu import (
@@ -35,6 +35,7 @@ from omnibot_driver.core.lois_ecu.readings import (
     WheelReading,
 )
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.readings import DisplacementReading
 from omnibot_driver.simulator.lois_ecu import DOCUMENTED, FIRMWARE, Firmware, LoisSettings
 
 BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
@@ -153,7 +154,7 @@ def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
     assert rig.driver.mode is Mode.NOMINAL
     assert rig.driver.configured
     assert rig.driver.confirmed
-    assert rig.board.channels[0].controller.gains.kp == pytest.approx(0.5)
+    assert rig.board.wheels[0].controller.gains.kp == pytest.approx(0.5)
     rig.order(20, 20, 4.0)
     assert rig.board.truth.speed_mps > 0.2
     assert any(isinstance(reading, DisplacementReading) for reading in rig.readings)
@@ -186,7 +187,7 @@ def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
     rig.board.reboot()
     rig.run(3.0)
     assert rig.driver._translation.restarts == 1
-    assert rig.board.channels[0].controller.gains.low_pass == 1.0
+    assert rig.board.wheels[0].controller.gains.low_pass == 1.0
 
 
 @BOTH
@@ -207,7 +208,7 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
         rig.run(0.1)
     assert rig.driver.mode is Mode.NOMINAL
     assert rig.driver.confirmed
-    assert rig.board.channels[0].short_correction == pytest.approx(1.0761719)
+    assert rig.board.wheels[0].short_correction == pytest.approx(1.0761719)
 
 
 def test_a_board_without_checksum_is_driven_without() -> None:
@@ -217,7 +218,7 @@ def test_a_board_without_checksum_is_driven_without() -> None:
         rig.run(0.1)
     assert rig.driver.confirmed
     assert rig.board.terminal_mode == 4
-    assert rig.board.channels[0].short_correction == pytest.approx(1.0761719)
+    assert rig.board.wheels[0].short_correction == pytest.approx(1.0761719)
     rig.order(20, 20, 4.0)
     assert rig.board.truth.speed_mps > 0.2
 
@@ -376,7 +377,7 @@ def test_terminal_mode_passes_lines_on_and_comes_back() -> None:
     rig.readings.clear()
     rig.run(2.0)
     assert any(isinstance(reading, WheelReading) for reading in rig.readings)
-    assert rig.board.channels[0].short_correction == pytest.approx(1.0761719)
+    assert rig.board.wheels[0].short_correction == pytest.approx(1.0761719)
 
 
 # What the line carries instead

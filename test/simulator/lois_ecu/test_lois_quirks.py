@@ -76,7 +76,7 @@ def sign_of_command(quirks: Quirks) -> bool:
     rig.say(SetRpm(-30, -40))
     for _ in range(60):
         rig.board.step()
-        if rig.board.channels[1].rpm < 0 < rig.board.motors[1].rpm:
+        if rig.board.wheels[1].rpm < 0 < rig.board.motors[1].rpm:
             return True
     return False
 
@@ -87,7 +87,7 @@ def keeps_speed_of_stalled_wheel(quirks: Quirks) -> bool:
     rig.drive(20, 30, 6.0)
     rig.board.hold(left=True, right=True)
     rig.run(3.0)
-    return rig.board.channels[0].rpm > 0
+    return rig.board.wheels[0].rpm > 0
 
 
 def duty_drags_target(quirks: Quirks) -> bool:
@@ -99,7 +99,7 @@ def duty_drags_target(quirks: Quirks) -> bool:
     rig.run(1.0)
     rig.say(SetDuty(30, 40))
     rig.run(3.0)
-    return rig.board.motors[0].rpm > 5 and rig.board.channels[0].rpm < 0
+    return rig.board.motors[0].rpm > 5 and rig.board.wheels[0].rpm < 0
 
 
 def reverse_runs_fast(quirks: Quirks) -> bool:
@@ -181,7 +181,7 @@ def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.HOST))
-    return rig.board.channels[0].short_correction < 1e-6
+    return rig.board.wheels[0].short_correction < 1e-6
 
 
 def button_is_lost_in_terminal_mode(quirks: Quirks) -> bool:
@@ -200,7 +200,7 @@ def reset_clears_ticks_only(quirks: Quirks) -> bool:
     rig = Rig(quirks).booted()
     rig.drive(20, 30, 4.0)
     rig.say(Reset())
-    assert rig.board.channels[0].ticks < 5
+    assert rig.board.wheels[0].ticks < 5
     rig.run(1.0)
     return rig.board.driven and abs(rig.board.odometry.pose[0]) > 0.1
 

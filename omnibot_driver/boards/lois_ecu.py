@@ -1,0 +1,97 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The LOIS ECU: its parameters, and what makes it of them."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final
+
+from omnibot_driver.boards.lois_ecu_parameters import (
+    DRIVING,
+    PERIODS,
+    SENT,
+    SETTINGS,
+    WHEELS,
+    WRITTEN,
+    require_possible_periods,
+)
+from omnibot_driver.core.geometry.differential import DifferentialKinematics
+from omnibot_driver.core.lois_ecu import PERIOD_OFF
+from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.parameters import table
+from omnibot_driver.transports.serial_port import SerialPort
+
+SIMULATOR: Final = "omnibot_driver.simulator.lois_ecu"
+PARAMETERS: Final = table(
+    "lois_ecu",
+    LoisEcuBoard.traits,
+    own={
+        "The robot's wheels": WHEELS,
+        "The LOIS ECU": DRIVING,
+        "What the board keeps": WRITTEN,
+        "What the board sends": SENT,
+    },
+    without=(
+        "axis_signs",
+        "odom_wheel_drift",
+        "odom_wheel_scale",
+        "odom_wheel_slip",
+        "odom_gap_acceleration",
+        "odom_gap_angular_acceleration",
+        "twist_linear_stddev",
+        "twist_angular_stddev",
+    ),
+    checks=(require_possible_periods,),
+)
+
+
+def make(values: Mapping[str, Any]) -> LoisEcuBoard:
+    """The board, nothing of which is heard yet."""
+    return LoisEcuBoard(settings(values))
+
+
+def settings(values: Mapping[str, Any]) -> LoisEcuSettings:
+    """What its wire does not tell, by checked values."""
+    wheels = kinematics(values)
+    return LoisEcuSettings(
+        wheel_radius_m=wheels.wheel_radius_m,
+        track_m=wheels.track_m,
+        ticks_per_revolution=values["ticks_per_revolution"],
+        inverted=values["inverted"],
+        drive_mode=values["drive_mode"],
+        max_duty=values["max_duty"],
+        duty_scale=values["duty_scale"],
+        low_pass=values["low_pass"],
+        written={
+            setting: values[name] for name, setting in SETTINGS.items() if values[name] is not None
+        },
+        periods_ms={
+            stream: round(1e3 * values[name]) or PERIOD_OFF
+            for name, stream in PERIODS.items()
+            if values[name] is not None
+        },
+        with_sum=values["checksum"],
+        declination_rad=values["magnetic_declination"],
+        odom_rate_hz=values["odom_rate"],
+    )
+
+
+def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
+    """A device, or any URL that pyserial knows."""
+    return partial(SerialPort, values["port"], values["baudrate"])
+
+
+def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
+    """Left and right, of the sizes that calibration found."""
+    linear, angular = values["odom_linear_scale"], values["odom_angular_scale"]
+    return DifferentialKinematics(
+        wheel_radius_m=linear * values["wheel_radius"], track_m=linear / angular * values["track"]
+    )
+
+
+def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
+    """Fix, time, heading, button; LED and balls; duties."""
+    from omnibot_driver.boards.lois_ecu_topics import LoisEcuTopics  # needs ROS
+
+    return LoisEcuTopics(node, link, values).publish

@@ -1,0 +1,203 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The parameters that the LOIS ECU has and other boards need not have. Knows no ROS.
+
+What the board keeps by itself is unset: it is written only where the user gives a value.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.core.lois_ecu import Setting, Stream
+from omnibot_driver.parameters import Parameter
+
+SHORTEST_PERIOD_S: Final = 0.05
+LONGEST_PERIOD_S: Final = 60.0
+
+WHEELS: Final = (
+    Parameter(
+        "wheel_radius",
+        0.13,
+        "m",
+        "Radius of a wheel.",
+        low=0.001,
+        high=1.0,
+        calibrated=True,
+    ),
+    Parameter(
+        "track",
+        0.47,
+        "m",
+        "From one wheel to the other.",
+        low=0.01,
+        high=10.0,
+        calibrated=True,
+    ),
+    Parameter(
+        "ticks_per_revolution",
+        60,
+        "ticks",
+        "Encoder ticks of one turn of a wheel.",
+        low=1,
+        high=1_000_000,
+    ),
+    Parameter(
+        "inverted",
+        False,
+        "",
+        "Whether the board's left wheel is the robot's right one, and the other way round.",
+        fixed=True,
+        calibrated=True,
+    ),
+)
+
+DRIVING: Final = (
+    Parameter(
+        "drive_mode",
+        "rpm",
+        "",
+        "How motion is commanded: as the wheels' RPM, which the board controls, or as the motors'"
+        " duty. In duty mode the robot is driven without speed control, and there is duty_cmd.",
+        choices=("rpm", "duty"),
+        fixed=True,
+    ),
+    Parameter(
+        "duty_scale",
+        130.0,
+        "%/(m/s)",
+        "Duty that drives a wheel's rim at 1 m/s, for cmd_vel and wheel_cmd in duty mode.",
+        low=1.0,
+        high=10_000.0,
+        calibrated=True,
+    ),
+    Parameter(
+        "max_duty",
+        100,
+        "%",
+        "Largest duty of a motor that is commanded in duty mode.",
+        low=1,
+        high=100,
+    ),
+    Parameter(
+        "low_pass",
+        1.0,
+        "",
+        "Part of a new RPM that the speed controller takes over in each of its steps (0x23). It is"
+        " always written: with the public firmware's own value, 0, the wheels never turn.",
+        low=0.001,
+        high=1.0,
+    ),
+    Parameter(
+        "odom_rate",
+        20.0,
+        "Hz",
+        "How often odom and its transform are published, predicted between the board's messages.",
+        low=1.0,
+        high=50.0,
+    ),
+    Parameter(
+        "magnetic_declination",
+        0.0,
+        "rad",
+        "Of magnetic north from true north, east positive, for imu/heading.",
+        low=-3.15,
+        high=3.15,
+    ),
+    Parameter(
+        "heading_stddev",
+        0.1,
+        "rad",
+        "Noise of the compass, for the covariance of imu/heading.",
+        low=1e-6,
+        high=10.0,
+    ),
+    Parameter(
+        "checksum",
+        True,
+        "",
+        "Whether the board checks what it is sent. The board is set to it (0x11).",
+        fixed=True,
+    ),
+)
+
+
+def _setting(name: str, what: str) -> Parameter:
+    return Parameter(
+        name,
+        0.0,
+        "",
+        f"{what}. Unset: the board keeps its own.",
+        low=-1e6,
+        high=1e6,
+        unset=True,
+        calibrated=True,
+    )
+
+
+SETTINGS: Final[Mapping[str, Setting]] = {
+    f"{setting.name.lower()}": setting for setting in Setting if setting != Setting.RPM_LOW_PASS
+}
+"""By the name of its parameter."""
+_WORDS: Final = {
+    "kp": "Gain Kp of the {} wheel's speed controller",
+    "tn": "Integral time Tn of the {} wheel's speed controller, in s",
+    "td": "Time constant Td of the {} wheel's speed controller, in s",
+    "short_correction": "Factor for the short level of the {} encoder",
+    "long_correction": "Factor for the long level of the {} encoder",
+    "feed_forward": "Feed-forward of the {} wheel's speed controller",
+}
+WRITTEN: Final = tuple(
+    _setting(name, _WORDS[name.partition("_")[2]].format(name.partition("_")[0]))
+    for name in SETTINGS
+)
+
+PERIODS: Final[Mapping[str, Stream]] = {
+    "ticks_period": Stream.TICKS,
+    "odometry_period": Stream.ODOMETRY,
+    "heading_period": Stream.HEADING,
+    "position_period": Stream.GPS_POSITION,
+    "time_period": Stream.GPS_TIME,
+    "date_period": Stream.GPS_DATE,
+}
+"""By the name of its parameter."""
+
+
+def _period(name: str, what: str, default_s: float = 0.0) -> Parameter:
+    note = "" if default_s else " Unset: the board keeps its own."
+    return Parameter(
+        name,
+        default_s,
+        "s",
+        f"From one {what} to the next; 0 turns them off, shorter ones make the board deaf for more"
+        f" of the time.{note}",
+        low=0.0,
+        high=LONGEST_PERIOD_S,
+        unset=not default_s,
+    )
+
+
+SENT: Final = (
+    _period("ticks_period", "message with the ticks (0x12), which odometry rests on,", 0.2),
+    _period("odometry_period", "message with the board's own odometry (0x20)", 0.2),
+    _period("heading_period", "heading (0x10)"),
+    _period("position_period", "GPS position (0x0d)"),
+    _period("time_period", "GPS time (0x0e)"),
+    _period("date_period", "GPS date (0x0f)"),
+)
+
+
+def require_possible_periods(values: Mapping[str, Any]) -> None:
+    """Period 0 makes the public firmware deaf, so the shortest ones are refused."""
+    for name in PERIODS:
+        period_s = values[name]
+        if period_s and period_s < SHORTEST_PERIOD_S:
+            raise ParameterError(
+                f"parameter '{name}' must be 0 (off) or {SHORTEST_PERIOD_S} to"
+                f" {LONGEST_PERIOD_S:g} s, not {period_s:g}"
+            )
+    if not 0.0 < values["ticks_period"] <= 0.5:
+        raise ParameterError(
+            "parameter 'ticks_period' must be above 0 and at most 0.5 s, not"
+            f" {values['ticks_period']:g}: odometry and the proof of standstill rest on the ticks"
+        )

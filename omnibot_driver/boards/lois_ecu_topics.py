@@ -1,0 +1,140 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What only the LOIS ECU has, as topics and services. Wires only."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final, cast
+
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, TimeReference
+from std_msgs.msg import Bool, Float32MultiArray, Header
+from std_srvs.srv import SetBool, Trigger
+
+from omnibot_driver import messages
+from omnibot_driver.core.commands.limits import require_finite
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.readings import FixReading, HeadingReading, TimeReading
+from omnibot_driver.core.readings import EStopButtonReading
+from omnibot_driver.core.session import Session
+
+LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+FIX_VARIANCE_M2: Final = 0.4**2
+"""Of a longitude as a float32; a GPS knows its place less well, but the board does not say how."""
+GPS_VARIANCE_M2: Final = 5.0**2
+ABSENT: Final = [-1.0] + [0.0] * 8
+NOT_HEARD: Final = "the board is not heard; connect it and switch it on, then call again"
+
+
+class LoisEcuTopics:
+    """``publish``: who publishes each type of value."""
+
+    def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
+        self._node, self._link, self._values = node, link, values
+        prefix = values["frame_prefix"]
+        self._gps_frame, self._heading_frame = prefix + "gps_link", prefix + "compass_link"
+        self._fix = node.create_publisher(NavSatFix, "fix", 10)
+        self._time = node.create_publisher(TimeReference, "time_reference", 10)
+        self._heading = node.create_publisher(Imu, "imu/heading", 10)
+        self._button = node.create_publisher(Bool, "estop_button", LATCHED)
+        self.publish: dict[type, Callable[[Any, int], None]] = {
+            FixReading: self._publish_fix,
+            TimeReading: self._publish_time,
+            HeadingReading: self._publish_heading,
+            EStopButtonReading: lambda button, _stamp_ns: self._button.publish(
+                Bool(data=button.pressed)
+            ),
+        }
+        node.create_service(SetBool, "~/led", self._on_led)
+        node.create_service(Trigger, "~/distribute_ball", self._on_ball)
+        if values["drive_mode"] == "duty":
+            node.create_subscription(Float32MultiArray, "duty_cmd", self._on_duty, 1)
+
+    # From the board
+
+    def _publish_fix(self, fix: FixReading, stamp_ns: int) -> None:
+        status = NavSatStatus.STATUS_FIX if fix.valid else NavSatStatus.STATUS_NO_FIX
+        variance = FIX_VARIANCE_M2 + GPS_VARIANCE_M2
+        self._fix.publish(
+            NavSatFix(
+                header=Header(stamp=messages.time_message(stamp_ns), frame_id=self._gps_frame),
+                status=NavSatStatus(status=status, service=NavSatStatus.SERVICE_GPS),
+                latitude=fix.latitude_deg,
+                longitude=fix.longitude_deg,
+                altitude=float("nan"),
+                position_covariance=[variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, 1e6],
+                position_covariance_type=NavSatFix.COVARIANCE_TYPE_APPROXIMATED,
+            )
+        )
+
+    def _publish_time(self, time: TimeReading, stamp_ns: int) -> None:
+        if time.utc_s is None:
+            return
+        self._time.publish(
+            TimeReference(
+                header=Header(stamp=messages.time_message(stamp_ns)),
+                time_ref=messages.time_message(time.utc_s * 10**9),
+                source="gps",
+            )
+        )
+
+    def _publish_heading(self, heading: HeadingReading, stamp_ns: int) -> None:
+        variance = self._values["heading_stddev"] ** 2
+        self._heading.publish(
+            Imu(
+                header=Header(stamp=messages.time_message(stamp_ns), frame_id=self._heading_frame),
+                orientation=messages.yaw_quaternion(heading.yaw_rad),
+                orientation_covariance=[1e6, 0.0, 0.0, 0.0, 1e6, 0.0, 0.0, 0.0, variance],
+                angular_velocity_covariance=ABSENT,
+                linear_acceleration_covariance=ABSENT,
+            )
+        )
+
+    # To the board
+
+    def _on_led(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        on = bool(request.data)
+        return self._say(
+            lambda board, now: board.set_led(on, now),
+            f"LED {'on' if on else 'off'} sent; the board does not confirm it",
+            response,
+        )
+
+    def _on_ball(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._say(
+            lambda board, _now: board.distribute_ball(),
+            "distribute ball sent once; the board does not confirm it: if no ball comes, call again",
+            response,
+        )
+
+    def _say(
+        self, action: Callable[[LoisEcuBoard, float], None], message: str, response: Any
+    ) -> Any:
+        def say(session: Session, now: float) -> bool:
+            if not session.board.mode.running or session.state == "disconnected":
+                return False
+            action(cast(LoisEcuBoard, session.board), now)
+            return True
+
+        response.success = self._link.call(say)
+        response.message = message if response.success else NOT_HEARD
+        return response
+
+    def _on_duty(self, message: Float32MultiArray) -> None:
+        duties = list(message.data)
+        try:
+            self._link.command(self._drive, duties, ())
+        except CommandRefused as error:
+            self._node.get_logger().warning(str(error), throttle_duration_sec=2.0)
+
+    def _drive(self, session: Session, duties: list[float], now: float) -> None:
+        """Percent, as the rates of wheels that the board's settings make this duty of again."""
+        require_finite("duty_cmd", duties)
+        if len(duties) != 2:
+            raise CommandRefused(
+                f"duty_cmd refused: it has {len(duties)} values; send exactly 2, left and right"
+            )
+        settings = session.board.settings
+        rate_radps = 1.0 / (settings.duty_scale * settings.wheel_radius_m)
+        session.command_wheels([duty * rate_radps for duty in duties], now)

@@ -1,0 +1,237 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The LOIS ECU as a board of the driver: what ``LoisEcu`` knows, in the words of the seam.
+
+Its odometry is its own: told ``odom_rate_hz`` times a second, predicted from one group of ticks to
+the next. Displacements tell whether the robot obeys, and stands; where the board is blind they are
+marked as not measured.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.board import Board, BoardFigures, Mode
+from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Order, TurnWheels
+from omnibot_driver.core.commands.set_point_stream import SetpointStream
+from omnibot_driver.core.commands.stop_proof import StopProof
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.lois_ecu.board import TRAITS, LoisEcu
+from omnibot_driver.core.lois_ecu.messages import EStopButton, SetLed
+from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
+from omnibot_driver.core.lois_ecu.readings import LoisReading, WheelReading
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.translation import RESTARTED_TICKS
+from omnibot_driver.core.packets import NO_PACKETS, Packets, joined, packed
+from omnibot_driver.core.readings import (
+    DisplacementReading,
+    EStopButtonReading,
+    ExtraReading,
+    OdometryReading,
+    Reading,
+    ResetReading,
+)
+
+RESET_SHOWN: Final = 2
+"""So many groups of few ticks show that a reset was obeyed: the first may have been on its way."""
+
+HEARD: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
+"""A first message, which tells nothing of motion yet."""
+
+
+class LoisEcuBoard(Board):
+    """One ECU. ``settings`` may be replaced at any time."""
+
+    traits = TRAITS
+
+    def __init__(self, settings: LoisEcuSettings) -> None:
+        self._ecu = LoisEcu(settings)
+        self._once: Packets = NO_PACKETS
+        self._rolled = Pose()
+        self._connect()
+
+    def _connect(self) -> None:
+        self._odometry_at = -math.inf
+        self._resets_to_show = 0
+
+    @property
+    def settings(self) -> LoisEcuSettings:
+        """What the wire does not tell."""
+        return self._ecu.settings
+
+    @settings.setter
+    def settings(self, settings: LoisEcuSettings) -> None:
+        if settings != self._ecu.settings:
+            self._ecu.settings = settings
+
+    @property
+    def mode(self) -> Mode:
+        """Nominal while it is heard."""
+        return self._ecu.mode
+
+    @property
+    def figures(self) -> BoardFigures:
+        """Over all connections."""
+        return self._ecu.figures
+
+    @property
+    def advice(self) -> str | None:
+        """What a user should set otherwise; None while all is well."""
+        return self._ecu.advice
+
+    @property
+    def shows_standstill(self) -> bool:
+        """The public firmware counts no ticks of a wheel that was not commanded forward."""
+        return self._ecu.translation.odometry.counting
+
+    # Inbound
+
+    def connect(self) -> None:
+        """The line is new; the settings are written again."""
+        self._ecu.connect()
+        self._once = NO_PACKETS
+        self._connect()
+
+    def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
+        """What these bytes complete."""
+        before = self.mode
+        readings = self._read(self._ecu.receive(data, now))
+        if not readings and self.mode is not before:
+            return [HEARD]
+        return readings
+
+    def flush(self, now: float) -> list[Reading]:
+        """The line is closed."""
+        return self._read(self._ecu.flush(now))
+
+    def silence(self) -> None:
+        """It is not known to be there any more."""
+        self._ecu.silence()
+
+    def elapse(self, now: float) -> list[Reading]:
+        """Groups that were held until nothing spoke against them, and odometry."""
+        readings: list[Reading] = []
+        if now >= self._ecu.held_until:
+            readings += self.receive(b"", now)
+        if now >= self._odometry_at and self.mode is Mode.NOMINAL:
+            period_s = 1.0 / self.settings.odom_rate_hz
+            self._odometry_at = max(self._odometry_at + period_s, now)
+            if (fused := self._ecu.predicted(now)) is not None:
+                readings.append(self._told(fused))
+        return readings
+
+    def reset_odometry(self) -> None:
+        """The frame begins where the robot stands."""
+        self._ecu.reset_odometry()
+
+    def _read(self, found: list[LoisReading]) -> list[Reading]:
+        readings: list[Reading] = []
+        for reading in found:
+            match reading:
+                case DisplacementReading():
+                    readings.append(reading)
+                case FusedOdometry():
+                    self._rolled = self._rolled + self._tangent(reading)
+                    readings += self._shown_reset()
+                case WheelReading():
+                    pass
+                case EStopButton(pressed):
+                    readings.append(EStopButtonReading(pressed))
+                case _:
+                    readings.append(ExtraReading(reading))
+        return readings
+
+    def _shown_reset(self) -> list[Reading]:
+        ticks = self._ecu.translation.ticks
+        if not self._resets_to_show or ticks is None:
+            return []
+        if max(abs(ticks.left), abs(ticks.right)) > RESTARTED_TICKS:
+            return []
+        self._resets_to_show -= 1
+        return [ResetReading()]
+
+    def _tangent(self, fused: FusedOdometry) -> Pose:
+        """What both wheels made of the robot since the estimate before."""
+        left_m, right_m = fused.wheel_ways_m
+        sign = -1.0 if self.settings.inverted else 1.0
+        return Pose((left_m + right_m) / 2, 0.0, sign * (right_m - left_m) / self.settings.track_m)
+
+    def _told(self, fused: FusedOdometry) -> OdometryReading:
+        return OdometryReading(
+            fused.stamp_s,
+            fused.pose,
+            fused.twist,
+            fused.covariance,
+            fused.twist_covariance,
+            self._rolled + self._tangent(fused),
+            None if fused.blind else fused.twist,
+        )
+
+    # Outbound
+
+    @property
+    def wake_at(self) -> float:
+        """When ``due`` or ``elapse`` have something."""
+        odometry_at = self._odometry_at if self.mode is Mode.NOMINAL else math.inf
+        once_at = -math.inf if self._once else math.inf
+        return min(self._ecu.wake_at, odometry_at, once_at)
+
+    def due(self, now: float) -> Packets:
+        """Settings, and what clears up after a Stop."""
+        once, self._once = self._once, NO_PACKETS
+        data = self._ecu.due(now)
+        if data:
+            self._ecu.wrote(data, now)
+        return packed(data) + once
+
+    def actuator(self, proof: StopProof) -> SetpointStream:
+        """Set-points, as RPM or as duty."""
+        return SetpointStream(self, proof, heard=self._heard)
+
+    def _heard(self, packets: Packets, now: float) -> None:
+        self._ecu.wrote(joined(packets), now)
+
+    def encode(self, order: Order) -> Packets:
+        """The lines that say it. Raises CommandRefused for a pose."""
+        match order:
+            case Drive(twist):
+                return packed(self._ecu.velocity(twist))
+            case TurnWheels(rates_radps):
+                return packed(self._ecu.wheels(rates_radps))
+            case EmergencyStop():
+                return self.emergency_stop()
+            case GoTo():
+                raise CommandRefused("cmd_pose refused: this board drives to no poses")
+        return self.stop()
+
+    def meaning(self, packets: Packets) -> BodyTwist:
+        """The body velocity that the last set-point in them commands."""
+        return self._ecu.meaning(joined(packets))
+
+    def wake(self) -> Packets:
+        """Stop; any line begins a new one, so what was half said is forgotten."""
+        return self.stop()
+
+    def stop(self) -> Packets:
+        """Duty 0/0."""
+        return packed(self._ecu.stop())
+
+    def emergency_stop(self) -> Packets:
+        """RPM 0/0: the board has no emergency stop that it could be told."""
+        return packed(self._ecu.emergency_stop())
+
+    def reset(self) -> Packets:
+        """Stop, and the board's counters begin anew."""
+        self._resets_to_show = RESET_SHOWN
+        return packed(self._ecu.reset())
+
+    # What only this board has
+
+    def set_led(self, on: bool, now: float) -> None:
+        """Said until it has surely arrived."""
+        self._ecu.say(SetLed(on), now)
+
+    def distribute_ball(self) -> None:
+        """Said once, as each is another ball; a lost line is not noticed."""
+        self._once += packed(self._ecu.distribute_ball())

@@ -1,0 +1,35 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a user may choose about a simulated LOIS ECU, besides its seed and the faults of its line.
+
+Knows words and their meaning. Must not know what runs the board.
+"""
+
+import argparse
+from typing import get_args
+
+from omnibot_driver.simulator.lois_ecu.board import SimulatedLois
+from omnibot_driver.simulator.lois_ecu.settings import QUIRKS, Firmware, LoisSettings
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Let the parser know them all."""
+    parser.add_argument(
+        "--firmware",
+        choices=get_args(Firmware),
+        default="firmware",
+        help="whether it does what the manual says (documented) or what the public firmware does"
+        " (firmware, the default)",
+    )
+    parser.add_argument(
+        "--running", action="store_true", help="start as a board that has booted already"
+    )
+
+
+def from_arguments(arguments: argparse.Namespace) -> SimulatedLois:
+    """The board that was chosen."""
+    return SimulatedLois(
+        LoisSettings(
+            quirks=QUIRKS[arguments.firmware], seed=arguments.seed, running=arguments.running
+        )
+    )
