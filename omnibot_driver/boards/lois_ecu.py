@@ -94,4 +94,5 @@ def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any
     """Fix, time, heading, button; LED and balls; duties."""
     from omnibot_driver.boards.lois_ecu_topics import LoisEcuTopics  # needs ROS
 
-    return LoisEcuTopics(node, link, values).publish
+    publish: Mapping[type, Any] = LoisEcuTopics(node, link, values).publish
+    return publish

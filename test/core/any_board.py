@@ -109,9 +109,7 @@ MAKERS: dict[str, Callable[[], tuple[Board, Any]]] = {
 """A new board of each kind, and its robot."""
 CORE = Path(core.__file__).parent
 BOARDS = [
-    name
-    for name in MAKERS
-    if (board := name.split()[0]) not in PROFILES or (CORE / board).is_dir()
+    name for name in MAKERS if (board := name.split()[0]) not in PROFILES or (CORE / board).is_dir()
 ]
 """Those that are there: a board is a folder that can be removed."""
 

@@ -21,6 +21,7 @@ from omnibot_driver.core.lois_ecu.decoder import DecoderStatistics, LoisDecoder
 from omnibot_driver.core.lois_ecu.messages import (
     MOST_SAMPLES,
     PERIOD_ONCE,
+    BoardOdometry,
     Command,
     DistributeBall,
     GpsDate,
@@ -43,6 +44,7 @@ from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.opening import RECOVER_AFTER_S, SettingsWriter
 from omnibot_driver.core.lois_ecu.readings import LoisReading
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.stall import StallWatch
 from omnibot_driver.core.lois_ecu.translation import Translation
 from omnibot_driver.core.requests import Request
 from omnibot_driver.core.traits import Traits
@@ -91,6 +93,7 @@ class LoisEcu:
         self._said: SetRpm | SetDuty | None = None
         self._stopped_at_s = math.inf
         self._stood = False
+        self._stall = StallWatch()
         self._clears_left = outbound.CLEARED_TIMES
 
     @property
@@ -148,6 +151,10 @@ class LoisEcu:
                 self._writer.ticks_came(at)
             elif isinstance(report, GpsDate):
                 self._writer.date_came()
+            if isinstance(report, Ticks | BoardOdometry):
+                self._stall.heard(report, at)
+        if self._translation.odometry.appends and self._stall.looks_stalled(now):
+            self._clears_left = outbound.CLEARED_TIMES
         found = self._translation.readings(reports, times, self._decoder.clock_unit, now)
         if self._translation.restarts != restarts:
             self._writer.begin(now)
@@ -262,7 +269,10 @@ class LoisEcu:
 
     def wrote(self, data: bytes, now: float) -> None:
         """These bytes went to the board."""
-        for command in outbound.set_points(data, with_sum=self._settings.with_sum):
+        said = outbound.set_points(data, with_sum=self._settings.with_sum)
+        if said:
+            self._stall.wrote(said[-1], now)
+        for command in said:
             self._translation.odometry.wrote(command, now)
             if _moves(command):
                 self._stopped_at_s, self._stood = math.inf, False

@@ -155,6 +155,11 @@ class LoisOdometry:
         return self.signed_ticks or all(model.counting for model in self._models)
 
     @property
+    def appends(self) -> bool:
+        """Whether this is the public firmware, or one like it."""
+        return self._appends
+
+    @property
     def standing(self) -> bool:
         """Whether nothing is commanded and the model has come to rest."""
         return all(not model.speed_mps and not model.target_mps for model in self._models)

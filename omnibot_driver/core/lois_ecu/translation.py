@@ -110,9 +110,7 @@ class Translation:
                 return [report]
         return []
 
-    def _watch(
-        self, ticks: Ticks, clock_unit: ClockUnit | None, now: float
-    ) -> list[LoisReading]:
+    def _watch(self, ticks: Ticks, clock_unit: ClockUnit | None, now: float) -> list[LoisReading]:
         before, self._ticks = self._ticks, ticks
         duration_s, self.last_ticks_at_s = now - self.last_ticks_at_s, now
         if before is None:

@@ -23,7 +23,10 @@ ones."""
 
 
 class FollowingError:
-    """``slack_mps``, ``slack_radps``: what is no error on top of the envelope. ``outside``: whether the robot was outside of the envelope by the last displacement."""
+    """``slack_mps``, ``slack_radps``: what is no error on top of the envelope.
+
+    ``outside``: whether the robot was outside of the envelope by the last displacement.
+    """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
         self._slack_mps, self._slack_radps = slack_mps, slack_radps

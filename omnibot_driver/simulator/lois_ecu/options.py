@@ -17,9 +17,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--firmware",
         choices=get_args(Firmware),
-        default="firmware",
-        help="whether it does what the manual says (documented) or what the public firmware does"
-        " (firmware, the default)",
+        default="documented",
+        help="whether it does what the manual says (documented, the default) or what the public"
+        " firmware does (firmware)",
     )
     parser.add_argument(
         "--running", action="store_true", help="start as a board that has booted already"

@@ -1,0 +1,63 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Whether a wheel stands that is commanded to turn: it may never start by itself.
+
+In the eyes of the public firmware's controller a wheel that stands keeps its last speed. If that is
+more than a new, slower set-point, the motor gets no power. RPM 0/0 clears it. Knows set-points,
+reports and times.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Ticks
+
+STALLED_S: Final = 1.0
+"""Without a sign of motion. A wheel takes half as long to start, at 2 RPM a tick half as long."""
+LEAST_RPM: Final = 2
+
+
+class StallWatch:
+    """``looks_stalled`` once for each ``STALLED_S`` that a commanded wheel stands."""
+
+    def __init__(self) -> None:
+        self._targets = [0, 0]
+        self._seen_at = [math.inf, math.inf]
+        self._ticks: Ticks | None = None
+        self._pose: tuple[float, float, float] | None = None
+
+    def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
+        """A set-point went out. Under duty there is no controller that could hold a wheel."""
+        targets = [0, 0]
+        if isinstance(command, SetRpm):
+            targets = [command.left_rpm, command.right_rpm]
+        for wheel, target in enumerate(targets):
+            if abs(target) < LEAST_RPM:
+                self._seen_at[wheel] = math.inf
+            elif self._seen_at[wheel] == math.inf or target * self._targets[wheel] < 0:
+                self._seen_at[wheel] = now
+        self._targets = targets
+
+    def heard(self, report: Ticks | BoardOdometry, now: float) -> None:
+        """A wheel that is to turn forward ticks; of one to turn backward the pose tells."""
+        if isinstance(report, BoardOdometry):
+            pose = (report.x_m, report.y_m, report.yaw_rad)
+            if pose != self._pose:
+                self._turns([target < 0 for target in self._targets], now)
+            self._pose = pose
+            return
+        before, self._ticks = self._ticks, report
+        if before is not None:
+            self._turns([report.left != before.left, report.right != before.right], now)
+
+    def looks_stalled(self, now: float) -> bool:
+        """Whether one of them has not turned for too long."""
+        if now - min(self._seen_at) < STALLED_S:
+            return False
+        self._seen_at = [at if at == math.inf else now for at in self._seen_at]
+        return True
+
+    def _turns(self, wheels: list[bool], now: float) -> None:
+        for wheel, turns in enumerate(wheels):
+            if turns and self._seen_at[wheel] != math.inf:
+                self._seen_at[wheel] = now
