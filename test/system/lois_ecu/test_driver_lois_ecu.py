@@ -1,0 +1,284 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The driver with a LOIS ECU on a real pseudo-terminal, as documented and as its firmware is."""
+
+import math
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any, Final
+
+import pytest
+from driver_process import Driver
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from probe import Probe
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from sensor_msgs.msg import Imu, JointState, NavSatFix, NavSatStatus, TimeReference
+from std_msgs.msg import Bool, Float32MultiArray
+from std_srvs.srv import SetBool, Trigger
+
+from omnibot_driver.simulator.common.serving import PtyBoard
+from omnibot_driver.simulator.lois_ecu import QUIRKS, LoisSettings, SimulatedLois
+
+Start = Callable[..., Any]
+PATIENCE_S: Final = 30.0
+NODE: Final = "omnibot_driver"
+
+
+class Ecu:
+    """A simulated board in real time."""
+
+    def __init__(self, firmware: Any, served: "PtyBoard[SimulatedLois]") -> None:
+        self.firmware, self.served = firmware, served
+
+    @property
+    def path(self) -> str:
+        return self.served.path
+
+    def wait_for(self, predicate: Callable[[SimulatedLois], object]) -> None:
+        assert self.served.wait_for(lambda board: bool(predicate(board)), PATIENCE_S), (
+            list(self.served.board.commands)[-20:]
+        )
+
+    def do(self, action: Callable[[SimulatedLois], object]) -> Any:
+        with self.served.lock:
+            return action(self.served.board)
+
+    def stands_for_good(self) -> None:
+        """For a second and a half."""
+        since: list[int] = []
+
+        def stood(board: SimulatedLois) -> bool:
+            if not board.standing:
+                since.clear()
+                return False
+            since.append(board.tick)
+            return since[-1] - since[0] >= 150
+
+        self.wait_for(stood)
+
+
+def ecu_of(firmware: Any, stack: ExitStack, **settings: Any) -> Ecu:
+    board = SimulatedLois(LoisSettings(quirks=QUIRKS[firmware], **settings))
+    return Ecu(firmware, stack.enter_context(PtyBoard(board)))
+
+
+@pytest.fixture(params=QUIRKS)
+def ecu(request: pytest.FixtureRequest, stack: ExitStack) -> Ecu:
+    return ecu_of(request.param, stack)
+
+
+@pytest.fixture
+def driver(ecu: Ecu, start_driver: Start) -> Driver:
+    started: Driver = start_driver(ecu.path, board="lois_ecu")
+    return started
+
+
+@pytest.fixture
+def probe(driver: Driver, probe_of: Start) -> Probe:
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    return probe
+
+
+@contextmanager
+def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
+    """Commanded ten times a second; begins when it moves."""
+    publisher = probe.publisher(Twist, "cmd_vel")
+    twist = Twist()
+    twist.linear.x, twist.angular.z = vx, yaw
+    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
+    try:
+        ecu.wait_for(lambda board: not board.standing)
+        yield
+    finally:
+        probe.remove(timer)
+
+
+def test_it_drives_and_odometry_tells_how_far(ecu: Ecu, probe: Probe) -> None:
+    """A metre straight on, within 4 cm; commands that cease stop it."""
+    odometry = probe.listen(Odometry, "odom")
+    joints = probe.listen(JointState, "joint_states")
+    with driven(probe, ecu):
+        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 1.0)
+    ecu.stands_for_good()
+    truth = ecu.do(lambda board: board.truth)
+    seen = len(odometry)
+    probe.wait_for(lambda: len(odometry) > seen + 10)
+    place = odometry[-1].pose.pose.position
+    assert math.hypot(place.x - truth.x_m, place.y - truth.y_m) < 0.04
+    assert joints[-1].name == ["left_wheel_joint", "right_wheel_joint"]
+    assert sum(joints[-1].position) / 2 * 0.13 == pytest.approx(truth.x_m, abs=0.2)
+    assert 0.0 < odometry[-1].pose.covariance[0] < 0.05
+    stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in odometry]
+    assert all(after > before for before, after in zip(stamps, stamps[1:], strict=False))
+
+
+def test_the_estop_stops_it_until_it_is_released(ecu: Ecu, probe: Probe) -> None:
+    """Although commands go on."""
+    with driven(probe, ecu):
+        assert probe.call(SetBool, "estop", data=True).success
+        ecu.stands_for_good()
+        assert probe.call(SetBool, "estop", data=False).success
+        ecu.wait_for(lambda board: not board.standing)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL, signal.SIGSTOP])
+def test_whatever_ends_the_driver_stops_it(
+    ecu: Ecu, driver: Driver, probe: Probe, number: signal.Signals
+) -> None:
+    """Its own exit, or the guard."""
+    with driven(probe, ecu):
+        driver.process.send_signal(number)
+        ecu.stands_for_good()
+    if number is signal.SIGSTOP:
+        driver.process.send_signal(signal.SIGCONT)
+        ecu.stands_for_good()
+
+
+def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
+    ecu: Ecu, probe: Probe
+) -> None:
+    """Only the service releases it. Before the first press nothing is said of the button."""
+    button = probe.listen(Bool, "estop_button", latched=True)
+    latched = probe.listen(Bool, f"{NODE}/estop_active", latched=True)
+    with driven(probe, ecu):
+        assert not button
+        ecu.do(lambda board: board.press(True))
+        probe.wait_for(lambda: latched and latched[-1].data)
+        probe.wait_for(lambda: button and button[-1].data)
+        ecu.stands_for_good()
+        ecu.do(lambda board: board.press(False))
+        probe.wait_for(lambda: not button[-1].data)
+        ecu.stands_for_good()
+        assert probe.call(SetBool, "estop", data=False).success
+        ecu.wait_for(lambda board: not board.standing)
+
+
+def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
+    ecu: Ecu, probe: Probe
+) -> None:
+    """It forgets its low-pass; odometry goes on."""
+    odometry = probe.listen(Odometry, "odom")
+    with driven(probe, ecu):
+        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.4)
+    ecu.stands_for_good()
+    ecu.do(lambda board: board.reboot())
+    ecu.wait_for(
+        lambda board: (
+            board.wheels[0].controller.gains.low_pass == 1.0 and board._timers[0x12].period_ms == 200
+        )
+    )
+    probe.wait_for_state("nominal")
+    with driven(probe, ecu):
+        probe.wait_for(lambda: odometry[-1].pose.pose.position.x > 0.7)
+    ecu.stands_for_good()
+    truth = ecu.do(lambda board: board.truth)
+    assert odometry[-1].pose.pose.position.x == pytest.approx(truth.x_m, abs=0.08)
+
+
+def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
+    """After it the robot drives again; odometry goes on."""
+    odometry = probe.listen(Odometry, "odom")
+    with driven(probe, ecu):
+        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.6)
+    ecu.stands_for_good()
+    answer = probe.call(Trigger, "reset")
+    assert answer.success, answer.message
+    assert ecu.do(lambda board: [wheel.ticks for wheel in board.wheels]) == [0, 0]
+    with driven(probe, ecu):
+        probe.wait_for(lambda: odometry[-1].pose.pose.position.x > 0.8)
+
+
+def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
+    """A ball is asked for once."""
+    assert probe.call(SetBool, "led", data=True).success
+    ecu.wait_for(lambda board: board.led)
+    assert probe.call(SetBool, "led", data=False).success
+    ecu.wait_for(lambda board: not board.led)
+    assert probe.call(Trigger, "distribute_ball").success
+    assert ecu.do(lambda board: board.balls) <= 1
+
+
+def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(
+    ecu: Ecu, probe: Probe
+) -> None:
+    """Nothing else is written that the user did not set."""
+    client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
+    assert client.wait_for_service(PATIENCE_S)
+    value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=0.5)
+    request = SetParameters.Request(parameters=[Parameter(name="left_kp", value=value)])
+    future = client.call_async(request)
+    probe.wait_for_future(future)
+    assert future.result().results[0].successful
+    ecu.wait_for(lambda board: board.wheels[0].controller.gains.kp == pytest.approx(0.5))
+    ecu.do(lambda board: board.reboot())
+    ecu.wait_for(lambda board: board.wheels[0].controller.gains.kp == pytest.approx(0.5))
+    written = {obeyed.command for obeyed in ecu.do(lambda board: list(board.commands))}
+    assert written <= {0x01, 0x02, 0x06, 0x0F, 0x11, 0x12, 0x13, 0x20, 0x23}
+
+
+def test_gps_time_and_heading_are_published_where_the_board_tells_them(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """In ENU: the robot looks east, and magnetic north is ahead by the declination."""
+    ecu = ecu_of("documented", stack, running=True)
+    driver = start_driver(
+        ecu.path, board="lois_ecu", date_period=0.5, time_period=0.5, magnetic_declination=0.1
+    )
+    probe: Probe = probe_of(driver)
+    fixes = probe.listen(NavSatFix, "fix")
+    times = probe.listen(TimeReference, "time_reference")
+    headings = probe.listen(Imu, "imu/heading")
+    probe.wait_for(lambda: fixes and times and headings)
+    assert fixes[-1].header.frame_id == "gps_link"
+    assert fixes[-1].status.status == NavSatStatus.STATUS_FIX
+    assert fixes[-1].latitude == pytest.approx(48.1, abs=1e-4)
+    assert fixes[-1].position_covariance[0] >= 0.16
+    assert times[-1].time_ref.sec > 946_684_800
+    turn = headings[-1].orientation
+    assert 2 * math.atan2(turn.z, turn.w) == pytest.approx(-0.1, abs=0.03)
+    assert headings[-1].angular_velocity_covariance[0] == -1.0
+
+
+def test_a_fix_of_the_public_firmware_is_none(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """It sends zeros."""
+    probe: Probe = probe_of(start_driver(ecu_of("firmware", stack).path, board="lois_ecu"))
+    fixes = probe.listen(NavSatFix, "fix")
+    probe.wait_for(lambda: fixes)
+    assert fixes[-1].status.status == NavSatStatus.STATUS_NO_FIX
+
+
+def test_duties_are_commanded_in_duty_mode_alone(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """Limited by max_duty, and they expire like other commands."""
+    ecu = ecu_of("firmware", stack)
+    driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty", max_duty=40)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    publisher = probe.publisher(Float32MultiArray, "duty_cmd")
+    timer = probe.node.create_timer(
+        0.1, lambda: publisher.publish(Float32MultiArray(data=[30.0, 60.0]))
+    )
+    ecu.wait_for(lambda board: [wheel.duty_percent for wheel in board.wheels] == [20, 40])
+    ecu.wait_for(lambda board: not board.standing)
+    probe.remove(timer)
+    ecu.stands_for_good()
+
+
+@pytest.mark.parametrize("firmware", QUIRKS)
+def test_it_runs_inside_the_driver_too(firmware: str, start_driver: Start, probe_of: Start) -> None:
+    """``sim://`` is this board's simulator."""
+    driver = start_driver(f"sim://?firmware={firmware}", board="lois_ecu")
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    publishers = probe.node.get_publisher_names_and_types_by_node(NODE, f"/{driver.namespace}")
+    topics = {name.removeprefix(f"/{driver.namespace}/") for name, _ in publishers}
+    assert {"odom", "joint_states", "fix", "time_reference", "imu/heading", "estop_button"} <= topics
+    assert not {"imu/data_raw"} & topics
+    assert driver.end(signal.SIGINT) == 0
