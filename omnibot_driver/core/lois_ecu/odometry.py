@@ -61,6 +61,8 @@ TOLD_PART: Final = 0.5
 TOLD_AT_MOST: Final = 1.5
 """More than the model's way so many times is a leap of 0x20, not motion: it takes a speed from
 before a rest for that of the whole rest."""
+BENT_PART: Final = 0.1
+"""Of the variance of the way times that of the heading."""
 HIDDEN_BY_TICKS: Final = 1 / 12
 HIDDEN_BY_HEADING: Final = 1 / 3
 """Variance in squared ticks, of the way by two counts, or by one and a heading."""
@@ -113,23 +115,14 @@ class LoisOdometry:
     def __init__(
         self, settings: LoisEcuSettings, noise: LoisOdometrySettings | None = None
     ) -> None:
-        self._settings = settings
-        noise = LoisOdometrySettings() if noise is None else noise
-        self._wheels = DifferentialKinematics(wheel_radius_m=1.0, track_m=settings.track_m)
-        self._uncertainty = Uncertainty(
-            OdometryNoise(
-                wheel_drift=noise.wheel_drift,
-                wheel_scale=noise.wheel_scale,
-                wheel_slip=noise.wheel_slip,
-                wheels=self._wheels,
-            )
-        )
+        self._noise = LoisOdometrySettings() if noise is None else noise
+        self._models = (WheelModel(0.0), WheelModel(0.0))
+        self._uncertainty = Uncertainty(OdometryNoise())
+        self.configure(settings)
         self.blind_way_m = 0.0
         """Rolled by the middle of the axle while nothing measured it."""
         self.signed_ticks = False
         """Ticks of this board were seen to go backwards: they always count."""
-        half = HALF_RPM * settings.rim_mps_per_rpm
-        self._models = (WheelModel(half), WheelModel(half))
         self._appends = False
         self._gain_variance = GAIN_STDDEV**2
         self._gain = 1.0
@@ -143,6 +136,20 @@ class LoisOdometry:
         """Turned since 0x20 was used last; whether an interval had to go without it."""
         self._twist = BodyTwist(0.0, 0.0, 0.0)
         self.reset()
+
+    def configure(self, settings: LoisEcuSettings) -> None:
+        """From the next group on."""
+        self._settings = settings
+        self._wheels = DifferentialKinematics(wheel_radius_m=1.0, track_m=settings.track_m)
+        noise = OdometryNoise(
+            wheel_drift=self._noise.wheel_drift,
+            wheel_scale=self._noise.wheel_scale,
+            wheel_slip=self._noise.wheel_slip,
+            wheels=self._wheels,
+        )
+        self._uncertainty.noise = noise
+        for model in self._models:
+            model.rounding_mps = HALF_RPM * settings.rim_mps_per_rpm
 
     @property
     def yaw_rad(self) -> float:
@@ -573,7 +580,7 @@ class LoisOdometry:
             ]
         )
         # A heading that is far off bends the way: the second order, which levers do not have.
-        bent = (whole.xx + whole.yy) * whole.yaw_yaw
+        bent = BENT_PART * (whole.xx + whole.yy) * whole.yaw_yaw
         return whole.with_errors(
             [
                 (bent, 1.0, 0.0, 0.0),

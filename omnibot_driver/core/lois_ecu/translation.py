@@ -43,7 +43,7 @@ class Translation:
     """``settings`` may be replaced at any time. ``restarts``: of the board, as far as is known."""
 
     def __init__(self, settings: LoisEcuSettings) -> None:
-        self.settings = settings
+        self._settings = settings
         self.odometry = LoisOdometry(settings)
         self.headings = HeadingFilter()
         self.restarts = 0
@@ -51,6 +51,16 @@ class Translation:
         self.ticked_at_s = -math.inf
         """When ticks were last seen to change."""
         self._connect()
+
+    @property
+    def settings(self) -> LoisEcuSettings:
+        """What the wire does not tell."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: LoisEcuSettings) -> None:
+        self._settings = settings
+        self.odometry.configure(settings)
 
     def _connect(self) -> None:
         self._ticks: Ticks | None = None

@@ -7,13 +7,15 @@
 
 import math
 import os
+from dataclasses import replace
 from itertools import pairwise
 from statistics import mean
 
 import pytest
 from lois_drives import CLASSES, STOP, Drive, Rig, drive, nominal, wrong
 
-from omnibot_driver.core.lois_ecu import BoardOdometry, SetDuty, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu import BoardOdometry, SetDuty, SetRpm, Ticks, encode_report
+from omnibot_driver.core.lois_ecu.board import LoisEcu
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import Firmware, LoisSettings
@@ -195,6 +197,24 @@ def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
     assert odometry.heard_ticks(Ticks(2000, 0, 0), 9.0) == []
     (after,) = odometry.heard_ticks(Ticks(2400, 0, 0), 9.4)
     assert after.pose == place.pose
+
+
+def test_other_wheels_count_from_the_next_group_on() -> None:
+    """The way until then stays."""
+    ours = LoisEcuSettings()
+    ecu = LoisEcu(ours)
+    for step in range(3):
+        ecu.receive(encode_report(Ticks(400 * step, 10 * step, 10 * step + 1)), 0.4 * step)
+        ecu.receive(b"", 0.4 * step + 0.2)
+    before = ecu.predicted(0.8)
+    ecu.settings = replace(ours, wheel_radius_m=0.26)
+    ecu.receive(encode_report(Ticks(1200, 30, 31)), 1.2)
+    ecu.receive(b"", 1.4)
+    after = ecu.predicted(1.2)
+    assert before is not None
+    assert after is not None
+    assert before.pose.x_m == pytest.approx(20 * ours.tick_m, rel=1e-3)
+    assert after.pose.x_m == pytest.approx(40 * ours.tick_m, rel=1e-3)
 
 
 def test_a_velocity_that_is_no_number_is_no_speed() -> None:
