@@ -61,6 +61,7 @@ TOLD_PART: Final = 0.5
 TOLD_AT_MOST: Final = 1.5
 """More than the model's way so many times is a leap of 0x20, not motion: it takes a speed from
 before a rest for that of the whole rest."""
+ALL_OF: Final = 0.95
 BENT_PART: Final = 0.1
 """Of the variance of the way times that of the heading."""
 HIDDEN_BY_TICKS: Final = 1 / 12
@@ -307,6 +308,8 @@ class LoisOdometry:
         for count, one in zip(interval.counted, expected, strict=True):
             way_m = count * tick_m
             is_blind = not self.signed_ticks and (one.blind_m != 0.0)
+            if count > 0 and one.blind_s > ALL_OF * duration_s:
+                is_blind = False  # it counts although it should not: somebody pushes
             ways.append(way_m + (one.blind_m if is_blind else 0.0))
             blind.append(is_blind)
         turned = self._turned(ways, blind, expected, interval)

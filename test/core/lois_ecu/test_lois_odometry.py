@@ -14,7 +14,14 @@ from statistics import mean
 import pytest
 from lois_drives import CLASSES, STOP, Drive, Rig, drive, nominal, wrong
 
-from omnibot_driver.core.lois_ecu import BoardOdometry, SetDuty, SetRpm, Ticks, encode_report
+from omnibot_driver.core.lois_ecu import (
+    BoardOdometry,
+    SetDuty,
+    SetRpm,
+    Ticks,
+    encode_command,
+    encode_report,
+)
 from omnibot_driver.core.lois_ecu.board import LoisEcu
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
@@ -203,6 +210,7 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
     """The way until then stays."""
     ours = LoisEcuSettings()
     ecu = LoisEcu(ours)
+    ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)
     for step in range(3):
         ecu.receive(encode_report(Ticks(400 * step, 10 * step, 10 * step + 1)), 0.4 * step)
         ecu.receive(b"", 0.4 * step + 0.2)
