@@ -64,8 +64,8 @@ before a rest for that of the whole rest."""
 ALL_OF: Final = 0.95
 BENT_PART: Final = 0.1
 """Of the variance of the way times that of the heading."""
-HIDDEN_BY_TICKS: Final = 1 / 12
-HIDDEN_BY_HEADING: Final = 1 / 3
+HIDDEN_BY_TICKS: Final = 1 / 24
+HIDDEN_BY_HEADING: Final = 1 / 6
 """Variance in squared ticks, of the way by two counts, or by one and a heading."""
 
 
