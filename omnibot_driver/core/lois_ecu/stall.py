@@ -12,8 +12,8 @@ from typing import Final
 
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Ticks
 
-STALLED_S: Final = 1.0
-"""Without a sign of motion. A wheel takes half as long to start, at 2 RPM a tick half as long."""
+STALLED_S: Final = 2.0
+"""Without a sign of motion. With the firmware's own gains a wheel takes half as long to start."""
 LEAST_RPM: Final = 2
 
 

@@ -1,0 +1,47 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A wheel that stands although it is commanded: the public firmware may hold it."""
+
+from omnibot_driver.core.lois_ecu import BoardOdometry, SetDuty, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu.stall import StallWatch
+
+
+def pose(x_m: float) -> BoardOdometry:
+    return BoardOdometry(x_m, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
+
+
+def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float) -> list[float]:
+    """When a wheel looked stalled in six seconds, with so many ticks and so far in each 0.2 s."""
+    watch = StallWatch()
+    watch.wrote(command, 0.0)
+    found = []
+    for step in range(31):
+        now = 0.2 * step
+        watch.heard(Ticks(200 * step, ticks[0] * step, ticks[1] * step), now)
+        watch.heard(pose(ways_m * step), now)
+        watch.wrote(command, now)
+        if watch.looks_stalled(now):
+            found.append(round(now, 1))
+    return found
+
+
+def test_a_wheel_that_is_to_turn_forward_and_does_not_tick_looks_stalled() -> None:
+    """Again and again, as long as it stands."""
+    assert watched(SetRpm(20, 10), ticks=(3, 0), ways_m=0.1) == [2.0, 4.0, 6.0]
+
+
+def test_wheels_that_tick_do_not() -> None:
+    """Both forward."""
+    assert watched(SetRpm(20, 10), ticks=(3, 1), ways_m=0.0) == []
+
+
+def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
+    """Its ticks are not counted."""
+    assert watched(SetRpm(-10, 10), ticks=(0, 1), ways_m=0.01) == []
+    assert watched(SetRpm(-10, -10), ticks=(0, 0), ways_m=0.0) == [2.0, 4.0, 6.0]
+
+
+def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
+    """A set-point below 2 RPM may well stand."""
+    assert watched(SetRpm(0, 1), ticks=(0, 0), ways_m=0.0) == []
+    assert watched(SetDuty(50, 50), ticks=(0, 0), ways_m=0.0) == []
