@@ -94,7 +94,8 @@ class Reporter:
     def unconfirmed(self) -> None:
         """Stop was repeated for its whole time, and nothing showed that the robot stands."""
         measured = self._policy.proof.measured
-        self.notify(self._notices.unconfirmed(self._board.mode, measured=measured))
+        blind = not self._board.shows_standstill
+        self.notify(self._notices.unconfirmed(self._board.mode, measured=measured, blind=blind))
 
     def take(self) -> list[Event]:
         """What happened since the last call, in order."""

@@ -54,6 +54,7 @@ PURE_MODULES = {
     "cmath",
     "collections",
     "dataclasses",
+    "datetime",
     "enum",
     "functools",
     "itertools",

@@ -21,14 +21,18 @@ STOP_UNSEEN: Final = (
     "stop unconfirmed: in IMU-only mode the board does not report motion, so Stop is repeated for"
     " 5 s each time; check by eye that the robot stands"
 )
+STOP_BLIND: Final = (
+    "stop unconfirmed: the board does not measure its wheels after this command; check by eye that"
+    " the robot stands (said once)"
+)
 STOP_UNANSWERED: Final = "stop unconfirmed: the board is not responding"
 STOP_UNMEASURED: Final = (
-    "stop unconfirmed: no odometry frames come from the board, so Stop was sent for 5 s; check by"
-    " eye that the robot stands, and check cable and hub"
+    "stop unconfirmed: no odometry frames come from the board; check by eye that the robot stands, and check"
+    " cable and hub"
 )
 STOP_UNHEEDED: Final = (
-    "stop unconfirmed: Stop was sent for 5 s and the robot still moves; if it is not being pushed,"
-    " the board is not receiving: switch the motors off by hand and check the cable"
+    "stop unconfirmed: Stop was repeated and the robot still moves; if it is not being pushed, the"
+    " board is not receiving: switch the motors off by hand and check the cable"
 )
 
 
@@ -83,15 +87,17 @@ class Notices:
         self._told.add(sentence)
         return [sentence]
 
-    def unconfirmed(self, mode: Mode, *, measured: bool) -> list[str]:
+    def unconfirmed(self, mode: Mode, *, measured: bool, blind: bool = False) -> list[str]:
         """Stop was repeated for its whole time, and nothing showed that the robot stands.
 
-        ``measured``: displacements came meanwhile.
+        ``measured``: displacements came meanwhile; ``blind``: the board has no way to show it.
         """
         if mode is Mode.IMU_ONLY:
             return self.once(STOP_UNSEEN)
         if mode is Mode.UNKNOWN:
             return [STOP_UNANSWERED]
+        if blind:
+            return self.once(STOP_BLIND)
         return [STOP_UNHEEDED if measured else STOP_UNMEASURED]
 
     def standing(self, sentence: str) -> list[str]:
