@@ -27,8 +27,8 @@ STOP_BLIND: Final = (
 )
 STOP_UNANSWERED: Final = "stop unconfirmed: the board is not responding"
 STOP_UNMEASURED: Final = (
-    "stop unconfirmed: no odometry frames come from the board; check by eye that the robot stands, and check"
-    " cable and hub"
+    "stop unconfirmed: no odometry frames come from the board; check by eye that the"
+    " robot stands, and check cable and hub"
 )
 STOP_UNHEEDED: Final = (
     "stop unconfirmed: Stop was repeated and the robot still moves; if it is not being pushed, the"
