@@ -6,7 +6,6 @@ Also finds out that the board has restarted: its ticks are zero again, or its cl
 """
 
 import math
-from datetime import UTC, datetime
 from typing import Final
 
 from omnibot_driver.core.lois_ecu.heading_filter import HeadingFilter
@@ -34,6 +33,7 @@ from omnibot_driver.core.lois_ecu.readings import (
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.readings import DisplacementReading
 
+DAY_S: Final = 86400
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
 """Counts that are so much nearer to zero are a new beginning, not wheels that roll back."""
@@ -184,9 +184,13 @@ class Translation:
         date = self._date
         if date is None:
             return None
-        try:
-            day = datetime(2000 + date.year, date.month, date.day, tzinfo=UTC)
-        except ValueError:
-            return None
-        clock_s = time.hours * 3600 + time.minutes * 60 + time.seconds
-        return int(day.timestamp()) + clock_s
+        day = _days_since_1970(2000 + date.year, date.month, date.day)
+        return day * DAY_S + time.hours * 3600 + time.minutes * 60 + time.seconds
+
+
+def _days_since_1970(year: int, month: int, day: int) -> int:
+    """In the Gregorian calendar; the year is taken to begin in March, so that it ends with the
+    leap day."""
+    year, month = (year, month - 3) if month > 2 else (year - 1, month + 9)
+    leap_days = year // 4 - year // 100 + year // 400
+    return 365 * year + leap_days + (153 * month + 2) // 5 + day - 1 - 719468

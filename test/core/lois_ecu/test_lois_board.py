@@ -305,6 +305,23 @@ def test_gps_and_compass_come_in_si_units_and_enu() -> None:
     assert not any(fix.valid for fix in fixes)
 
 
+@pytest.mark.parametrize(
+    ("day", "utc_s"),
+    [
+        (GpsDate(0, 1, 1), 946684800),
+        (GpsDate(0, 2, 29), 951782400),
+        (GpsDate(0, 3, 1), 951868800),
+        (GpsDate(26, 12, 31), 1798675200),
+    ],
+    ids=str,
+)
+def test_a_date_is_seconds_of_utc(day: GpsDate, utc_s: int) -> None:
+    """As `date -u +%s` has them."""
+    ecu = LoisEcu(LoisEcuSettings())
+    found = ecu.receive(encode_report(day) + encode_report(GpsTime(0, 0, 1)), 0.0)
+    assert found == [TimeReading(utc_s + 1)]
+
+
 def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
     """Else it would be a day late."""
     ecu = LoisEcu(LoisEcuSettings())
