@@ -54,7 +54,6 @@ PURE_MODULES = {
     "cmath",
     "collections",
     "dataclasses",
-    "datetime",
     "enum",
     "functools",
     "itertools",

@@ -1,0 +1,160 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a board may tell besides displacements: its own odometry, its button, that it was reset."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from any_board import AnyBench
+from toys import line_board
+from toys.line_robot import LineRobot
+
+from omnibot_driver.core.board import Mode
+from omnibot_driver.core.commands.stop_proof import StopProof
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.events import Extra
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.packets import Packets, packed
+from omnibot_driver.core.readings import (
+    DisplacementReading,
+    EStopButtonReading,
+    OdometryReading,
+    Reading,
+    ResetReading,
+)
+from omnibot_driver.core.requests import Request, RequestDone
+
+STANDS = DisplacementReading(0.0, 0.0, 0.0, "body", 0.2, 0)
+
+
+class Teller(line_board.LineBoard):
+    """Tells what ``next`` holds with its next bytes, and its odometry ten times a second."""
+
+    traits = replace(
+        line_board.LineBoard.traits, own_odometry=True, requests=frozenset({Request.RESET})
+    )
+
+    def __init__(self) -> None:
+        self.next: list[Reading] = []
+        self.way_m = 0.0
+        self._told_at = -math.inf
+
+    def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
+        found = super().receive(data, now, channel)
+        self.way_m += sum(
+            reading.dx_m for reading in found if isinstance(reading, DisplacementReading)
+        )
+        told, self.next = self.next, []
+        return found + told
+
+    @property
+    def wake_at(self) -> float:
+        return self._told_at + 0.1 if self.mode is Mode.NOMINAL else math.inf
+
+    def elapse(self, now: float) -> list[Reading]:
+        self._told_at = now
+        pose, twist = Pose(self.way_m, 0.0, 0.0), BodyTwist(0.1, 0.0, 0.0)
+        return [OdometryReading(now, pose, twist, Covariance(), (0.01, 0.02), pose, None)]
+
+    def reset_odometry(self) -> None:
+        self.way_m = 0.0
+
+    def reset(self) -> Packets:
+        return self.stop() + packed(b"v 0 0\n")
+
+
+@pytest.fixture
+def bench() -> AnyBench:
+    bench = AnyBench(Teller(), LineRobot())
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(1.5)
+    return bench
+
+
+def tell(bench: AnyBench, *readings: Reading) -> None:
+    board = bench.session.board
+    assert isinstance(board, Teller)
+    board.next += readings
+    bench.session.receive(b"", bench.now, 1)
+    bench.settle()
+
+
+def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: AnyBench) -> None:
+    """At its own rate, with its own covariance and variances of the twist."""
+    before = len(bench.odometry)
+    bench.drive_on(0.3, 2.0)
+    told = bench.odometry[before:]
+    assert len(told) == pytest.approx(20, abs=3)
+    assert told[-1].pose.x_m > 0.3
+    assert {estimate.twist_variances for estimate in told} == {(0.01, 0.02)}
+
+
+def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> None:
+    """The robot is driven no further."""
+    bench.drive_on()
+    bench.speaks = False
+    with pytest.raises(CommandRefused, match=r"nothing was heard|connecting"):
+        bench.drive_on(seconds=5.0)
+    assert bench.robot.stands
+
+
+def test_resetting_odometry_resets_the_boards(bench: AnyBench) -> None:
+    """Its frame begins where the robot stands."""
+    bench.drive_on()
+    bench.run(1.5)
+    assert bench.odometry[-1].pose.x_m > 0.1
+    bench.session.reset_odometry(bench.now)
+    bench.run(0.2)
+    assert bench.odometry[-1].pose.x_m == 0.0
+
+
+def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: AnyBench) -> None:
+    """Both are told."""
+    bench.drive_on()
+    tell(bench, EStopButtonReading(True))
+    assert bench.session.estop_active
+    bench.run(1.0)
+    tell(bench, EStopButtonReading(False))
+    assert bench.session.estop_active
+    assert bench.robot.stands
+    told = [event.value for event in bench.events if isinstance(event, Extra)]
+    assert told == [EStopButtonReading(True), EStopButtonReading(False)]
+    assert "e-stop latched by the button on the robot" in bench.notices
+
+
+def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
+    """Not by what was on its way when it was asked for."""
+    bench.session.request(Request.RESET, "token", bench.now)
+    bench.settle()
+    tell(bench, ResetReading())
+    bench.run(0.3)
+    assert not [event for event in bench.events if isinstance(event, RequestDone)]
+    tell(bench, ResetReading())
+    (done,) = [event for event in bench.events if isinstance(event, RequestDone)]
+    assert (done.token, done.success) == ("token", True)
+    bench.drive_on()
+    assert not bench.robot.stands
+
+
+def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
+    """However many come."""
+    proof = StopProof()
+    proof.stopped(0.0)
+    for step in range(1, 20):
+        proof.look(replace(STANDS, measured=False), 0.2 * step)
+    assert not proof.proved
+
+
+def test_a_proof_takes_as_long_as_the_board_needs() -> None:
+    """Three displacements of 0.2 s where that is 0.6 s."""
+    proof = StopProof(0.6)
+    proof.stopped(0.0)
+    proved = []
+    for step in range(1, 5):
+        proof.look(STANDS, 0.2 * step)
+        proved.append(proof.proved)
+    assert proved == [False, False, True, True]
