@@ -43,6 +43,7 @@ class OmniBot:
 
     traits = TRAITS
     wake_at = math.inf
+    shows_standstill = True
 
     def __init__(self, settings: OmniBotSettings) -> None:
         self._schedule = Schedule(settings.delta_period_s)
@@ -136,6 +137,13 @@ class OmniBot:
     def due(self, now: float) -> Packets:
         """Nothing: it sends by itself."""
         return NO_PACKETS
+
+    def elapse(self, now: float) -> list[Reading]:
+        """Nothing: it sends by itself."""
+        return []
+
+    def reset_odometry(self) -> None:
+        """It has none of its own."""
 
     def actuator(self, proof: StopProof) -> SetpointStream:
         """Frames, repeated."""
