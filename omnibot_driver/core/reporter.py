@@ -90,6 +90,8 @@ class Reporter:
     def silent(self, silence_s: float, *, bytes_came: bool) -> None:
         """Nothing was understood for so long."""
         self.notify([why_silent(silence_s, bytes_came=bytes_came)])
+        if bytes_came and (advice := self._board.advice):
+            self.notify(self._notices.once(advice))
 
     def unconfirmed(self) -> None:
         """Stop was repeated for its whole time, and nothing showed that the robot stands."""

@@ -1,0 +1,65 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is not this board's on the port: a sentence each, no motion, and recovery by itself."""
+
+from random import Random
+
+import pytest
+from any_board import MAKERS, TICK_S, AnyBench
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+OMNIBOT = b"\xff\xfa" + bytes(range(12)) + b"\x55\xff\xfb" + bytes(range(8))
+NMEA = b"$GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A\r\n"
+SHORT = b":0200140014\n"
+LONG = b":02001400140038\n"
+SUMLESS_SUM = b":0200140014ff\n"
+
+WRONG = {
+    "another board": (OMNIBOT, "OmniBot board's frames: set board to omnibot"),
+    "NMEA": (NMEA, "NMEA sentences"),
+    "noise": (Random(1).randbytes(500), "the bytes are no text: check baudrate"),
+    "too short": (SHORT, "lines come without checksum"),
+    "too long": (LONG, "lines of 16 characters come instead of 14"),
+    "a wrong checksum": (SUMLESS_SUM, "lines come with wrong checksums"),
+}
+
+
+@pytest.mark.parametrize(("data", "sentence"), WRONG.values(), ids=WRONG)
+def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, sentence: str) -> None:
+    """Once, and the board is driven as soon as it is there."""
+    board, robot = MAKERS["lois_ecu"]()
+    bench = AnyBench(board, robot)
+    bench.speaks = False
+    bench.open()
+    for _ in range(500):
+        bench.run(TICK_S)
+        bench.session.receive(data[:40], bench.now)
+        bench.session.receive(data[40:], bench.now)
+        bench.settle()
+    assert bench.session.state == "connecting"
+    with pytest.raises(CommandRefused, match="connecting"):
+        bench.drive()
+    assert robot.stands
+    assert len([notice for notice in bench.notices if sentence in notice]) == 1, bench.notices
+    bench.speaks = True
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.drive_on(seconds=2.0)
+    assert not robot.stands
+
+
+@pytest.mark.parametrize("firmware", ["lois_ecu", "lois_ecu as documented"])
+@pytest.mark.parametrize("checks", [True, False])
+def test_a_board_whose_checksum_is_set_otherwise_is_set_right(
+    firmware: str, *, checks: bool
+) -> None:
+    """And drives, without a restart of anything."""
+    _, robot = MAKERS[firmware]()
+    robot.board._reader.checks = not checks
+    bench = AnyBench(LoisEcuBoard(LoisEcuSettings(with_sum=checks)), robot)
+    bench.open()
+    bench.run(12.0)
+    bench.drive_on(seconds=3.0)
+    assert not robot.stands
