@@ -11,6 +11,7 @@ import os
 import select
 import socket
 import struct
+import termios
 import threading
 import time
 from collections.abc import Iterable, Iterator
@@ -68,25 +69,17 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def kept_full(self, old: bytes) -> Iterator[None]:
-        """Likewise, and it cannot be emptied from the driver's side: zeros take the room."""
-        over = threading.Event()
+        """Likewise, and it takes nothing when the driver has emptied it: its output is held."""
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-
-        def refill() -> None:
-            while not over.wait(0.001):
-                with contextlib.suppress(BlockingIOError):
-                    while True:
-                        os.write(near, bytes(8))  # in larger pieces some room is left
-
-        refilling = threading.Thread(target=refill)
-        with self.full(old):
-            refilling.start()
-            try:
-                yield
-            finally:
-                over.set()
-                refilling.join()
-                os.close(near)
+        try:
+            with self.full(old):
+                termios.tcflow(near, termios.TCOOFF)
+                try:
+                    yield
+                finally:
+                    termios.tcflow(near, termios.TCOON)
+        finally:
+            os.close(near)
 
 
 class Server(RunningBoard):
