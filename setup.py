@@ -30,7 +30,16 @@ setup(
         (f"share/{NAME}/docs", glob("docs/*.md")),
         *(
             (f"share/{NAME}/{folder}", glob(f"{folder}/*.*"))
-            for folder in ("config", "docs/pictures", "launch", "rviz", "systemd", "udev", "urdf")
+            for folder in (
+                "config",
+                "docs/boards",
+                "docs/pictures",
+                "launch",
+                "rviz",
+                "systemd",
+                "udev",
+                "urdf",
+            )
         ),
     ],
     entry_points={

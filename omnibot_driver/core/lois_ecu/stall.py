@@ -15,6 +15,8 @@ from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm
 STALLED_S: Final = 2.0
 """Without a sign of motion. With the firmware's own gains a wheel takes half as long to start."""
 LEAST_RPM: Final = 2
+AT_LEAST: Final = 4
+"""So many groups must say so: on a bad line few come."""
 
 
 class StallWatch:
@@ -23,6 +25,8 @@ class StallWatch:
     def __init__(self) -> None:
         self._targets = [0, 0]
         self._seen_at = [math.inf, math.inf]
+        self._quiet = [0, 0]
+        """Groups since then that could have shown this wheel's motion and did not."""
         self._ticks: Ticks | None = None
         self._pose: tuple[float, float, float] | None = None
 
@@ -35,29 +39,37 @@ class StallWatch:
             if abs(target) < LEAST_RPM:
                 self._seen_at[wheel] = math.inf
             elif self._seen_at[wheel] == math.inf or target * self._targets[wheel] < 0:
-                self._seen_at[wheel] = now
+                self._seen_at[wheel], self._quiet[wheel] = now, 0
         self._targets = targets
 
     def heard(self, report: Ticks | BoardOdometry, now: float) -> None:
         """A wheel that is to turn forward ticks; of one to turn backward the pose tells."""
         if isinstance(report, BoardOdometry):
             pose = (report.x_m, report.y_m, report.yaw_rad)
-            if pose != self._pose:
-                self._turns([target < 0 for target in self._targets], now)
+            for wheel in (0, 1):
+                if self._targets[wheel] < 0:
+                    self._note(wheel, now, turns=pose != self._pose)
             self._pose = pose
             return
         before, self._ticks = self._ticks, report
         if before is not None:
-            self._turns([report.left != before.left, report.right != before.right], now)
+            ticked = report.left != before.left, report.right != before.right
+            for wheel in (0, 1):
+                if self._targets[wheel] > 0 or ticked[wheel]:
+                    self._note(wheel, now, turns=ticked[wheel])
 
     def looks_stalled(self, now: float) -> bool:
         """Whether one of them has not turned for too long."""
-        if now - min(self._seen_at) < STALLED_S:
-            return False
-        self._seen_at = [at if at == math.inf else now for at in self._seen_at]
-        return True
+        stalled = any(
+            now - seen_at >= STALLED_S and quiet >= AT_LEAST
+            for seen_at, quiet in zip(self._seen_at, self._quiet, strict=True)
+        )
+        if stalled:
+            self._seen_at = [at if at == math.inf else now for at in self._seen_at]
+            self._quiet = [0, 0]
+        return stalled
 
-    def _turns(self, wheels: list[bool], now: float) -> None:
-        for wheel, turns in enumerate(wheels):
-            if turns and self._seen_at[wheel] != math.inf:
-                self._seen_at[wheel] = now
+    def _note(self, wheel: int, now: float, *, turns: bool) -> None:
+        self._quiet[wheel] += 1
+        if turns and self._seen_at[wheel] != math.inf:
+            self._seen_at[wheel], self._quiet[wheel] = now, 0
