@@ -20,6 +20,7 @@ from listener import (
 from terminal import Terminal
 
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.packets import joined
 from omnibot_driver.core.session import Session
 from omnibot_driver.link import Link
 
@@ -58,7 +59,7 @@ def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) 
     link, _ours = at_rest(terminal)
     terminal.fill()
     assert not link.close("stop")
-    terminal.read_until(5 * LAST_WORDS[0])
+    terminal.read_until(5 * joined(LAST_WORDS[0]))
     wait_for_the_end_of("omnibot-reader", "omnibot-pacer")
 
 
@@ -89,6 +90,6 @@ def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: 
     ours.hear, ours.closed = defective, tell_and_close  # type: ignore[method-assign]
     os.write(terminal.far, b"x")
     assert farewell_over.wait(PATIENCE_S)
-    terminal.read_until(5 * LAST_WORDS[0])
+    terminal.read_until(5 * joined(LAST_WORDS[0]))
     link.close("stop")
     wait_for_the_end_of("omnibot-reader", "omnibot-pacer")
