@@ -11,6 +11,7 @@ from collections.abc import Callable
 from random import Random
 
 from carriage import CHUNKERS, Chunker, Chunks, Received
+from truth import BYTE_S
 
 LATE_SHARE, LATE_S = 0.02, (0.002, 0.030)
 """Of the reads, and by how much: beside a navigation stack on a small computer."""
@@ -19,11 +20,18 @@ JITTER_S = 60e-6
 """Mean of what any wake-up takes, exponentially distributed."""
 READ_S = 20e-6
 """What a read takes that need not wait."""
+TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
+"""Of the wake-ups beside busy loops, which wait for a turn of the scheduler, and for how long."""
+BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
+"""Of the wake-ups beside busy loops, behind which the process gets no more than its share."""
+SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
+"""Then each read is late by so much, always the same but for 1 ms; each piece takes so long."""
+HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)
 """After so many the line is mixed anew."""
 
 
-def delay_s(random: Random) -> float:
+def delay_s(random: Random, now: float = 0.0) -> float:
     """How late one wake-up is."""
     late_s = random.expovariate(1.0 / JITTER_S)
     kind = random.random()
@@ -34,7 +42,30 @@ def delay_s(random: Random) -> float:
     return late_s
 
 
-def read(pieces: Chunks, random: Random, most: Callable[[], int]) -> Chunks:
+class Turns:
+    """The wake-ups of one process beside busy loops; ``late_s``: while it is behind."""
+
+    def __init__(self, late_s: tuple[float, float]) -> None:
+        self._late_s, self._steady_s, self._until_s = late_s, 0.0, 0.0
+
+    def delay_s(self, random: Random, now: float) -> float:
+        """How late one wake-up is."""
+        late_s = random.expovariate(1.0 / JITTER_S)
+        kind = random.random()
+        if kind < BEHIND_SHARE:
+            self._until_s = now + random.uniform(*BEHIND_FOR_S)
+            self._steady_s = random.uniform(*self._late_s)
+        if now < self._until_s:
+            return late_s + self._steady_s + random.uniform(0.0, 1e-3)
+        return late_s + (random.uniform(*TURN_S) if kind > 1.0 - TURN_SHARE else 0.0)
+
+
+def read(
+    pieces: Chunks,
+    random: Random,
+    most: Callable[[], int],
+    delay_s: Callable[[Random, float], float] = delay_s,
+) -> Chunks:
     """A reader that takes what is there, but no more than ``most`` bytes at once."""
     ends, times = zip(*pieces, strict=True)
     chunks: Chunks = []
@@ -43,7 +74,7 @@ def read(pieces: Chunks, random: Random, most: Callable[[], int]) -> Chunks:
         piece = bisect_right(ends, start)  # the first that is not taken whole
         now += READ_S
         if times[piece] > now:
-            now = times[piece] + delay_s(random)
+            now = times[piece] + delay_s(random, times[piece])
         there = ends[bisect_right(times, now) - 1]
         start = min(there, start + most())
         chunks.append((start, now))
@@ -102,6 +133,20 @@ def mixed(received: Received, random: Random) -> Chunks:
     return read(pieces, random, most)
 
 
+def hogged(received: Received, random: Random) -> Chunks:
+    """Busy loops beside an adapter that hands over 4 bytes at a time, and beside the reader."""
+    times, pieces, at = received.times_s, [], 0
+    adapter, free_s = Turns(SLOW_S), 0.0
+    while at < len(times):
+        start, at = at, at + 1
+        while at < min(len(times), start + HOGGED_PIECE) and times[at] - times[at - 1] < 3e-3:
+            at += 1
+        begun_s = max(free_s, times[start] - BYTE_S)
+        free_s = begun_s + (at - start) * BYTE_S + adapter.delay_s(random, begun_s)
+        pieces.append((at, free_s))
+    return read(pieces, random, lambda: 1 << 30, Turns(SHARE_S).delay_s)
+
+
 READERS: dict[str, Chunker] = {
     "single bytes, late": all_at_once(CHUNKERS["single bytes"]),
     "1-8 bytes, late": all_at_once(few_bytes_straddling),
@@ -109,3 +154,5 @@ READERS: dict[str, Chunker] = {
     "1-8 bytes, each late by itself": each_by_itself,
     "all mixed": mixed,
 }
+BUSY_LOOPS: dict[str, Chunker] = {"4 bytes, busy loops beside": hogged}
+"""Neither the adapter nor the reader is punctual, so times tell next to nothing."""

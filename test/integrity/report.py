@@ -45,7 +45,8 @@ def bound_of(fault: str, chunker: str) -> str:
         return "none"
     one_in = bound.one_wrong_in(chunker)
     wrong = f"1 in {one_in:,}" if one_in else "0"
-    return f"{wrong}; " + ("all" if bound.delivered == 1.0 else f"{bound.delivered:.1%}")
+    share = bound.share(chunker)
+    return f"{wrong}; " + ("all" if share == 1.0 else f"{100 * share:.4g} %")
 
 
 def table(ours: Scores, plain: Scores) -> tuple[list[str], bool]:

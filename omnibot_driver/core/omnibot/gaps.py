@@ -13,13 +13,11 @@ from collections.abc import Sequence
 from typing import Final
 
 from omnibot_driver.core.omnibot import cost_model
-from omnibot_driver.core.omnibot.late_reads import IDLE_S, PACE_S, Cause, Gap, Read, cause
+from omnibot_driver.core.omnibot.late_reads import GAP_S, IDLE_S, PACE_S, Cause, Gap, Read, cause
 
 LATE_S: Final = 0.011
 """While the board runs its line is never idle for longer, unless bytes were lost; an adapter that
 collects bytes for longer shows pauses of its own."""
-GAP_S: Final = 4e-3
-"""No frame is sent with such a pause in it."""
 BYTE_S: Final = 10 / 115200
 """To send one, by the manual."""
 TICK_BYTES: Final = 14 + 9 + 15

@@ -11,10 +11,13 @@ This module knows lengths, ticks and times; not what is in a frame, nor which on
 """
 
 from enum import Enum
+from itertools import pairwise
+from math import remainder
 from typing import Final, NamedTuple
 
 from omnibot_driver.core.omnibot.frames import (
     IMU_LENGTH,
+    INCOMPLETE,
     NO_FRAME,
     is_text,
     length_begun,
@@ -26,6 +29,12 @@ IDLE_S: Final = 0.1
 """Longer than any adapter keeps a byte back (16 ms), and ten times the board's 10 ms tick."""
 HALF_TICK_S: Final = TICK_S / 2
 """A frame that is late by less has not missed its tick."""
+GAP_S: Final = 4e-3
+"""No frame is sent with such a pause in it."""
+NEAR_S: Final = 2e-3
+"""Lost bytes make a board's frames late by whole ticks, give or take so much."""
+INTO_TICK_S: Final = 1e-3
+"""What follows an IMU frame in its tick begins so much later, give or take as much."""
 PUNCTUAL_S: Final = 1e-3
 """The delays of a punctual reader differ by less, also those of a USB adapter."""
 PACE_S: Final = 2e-4
@@ -90,7 +99,7 @@ def cause(
         return Cause.IDLE_LINE
     size, rest_end, tick, ticks = len(data), end, start, 0
     first: Read | None = None
-    latest_s = steady_s = 0.0
+    on_time_s = latest_s = steady_s = 0.0
     to_prove = 1 if gap.pause_s >= IDLE_S else TICKS_TO_PROVE
     proofs, proved, paced = 0, -1, False
     for read_end, now in reads:
@@ -112,21 +121,46 @@ def cause(
         late_s = now - ticks * TICK_S - (read_end - tick) * byte_s
         if first is None:
             first = Read(read_end, now)
-            latest_s = now - gap.pause_s - (gap.first - start) * byte_s + HALF_TICK_S
+            on_time_s = now - gap.pause_s - (gap.first - start) * byte_s
+            latest_s = on_time_s + HALF_TICK_S
+            if rest_end - start != IMU_LENGTH:
+                on_time_s -= INTO_TICK_S
         waited_s = (read_end - first.end) * byte_s - (now - first.now)
         at_pace = abs(waited_s) < PACE_S
         if first.end + FEW_BYTES < read_end <= rest_end:
             paced = at_pace
         if late_s < latest_s:
-            return Cause.IDLE_LINE if paced and at_pace else Cause.LATE_READER
-        if waited_s > PUNCTUAL_S:
+            if paced and at_pace:
+                return _by_the_next_frame(reads, first, data, rest_end, byte_s)
             return Cause.LATE_READER
-        if read_end > rest_end + MOST_BYTES:
-            return Cause.IDLE_LINE if paced else Cause.LATE_READER
-        if proved < 0 or abs(late_s - steady_s) > PUNCTUAL_S:
+        if waited_s > PUNCTUAL_S or read_end > rest_end + MOST_BYTES:
+            return Cause.LATE_READER
+        if abs(remainder(late_s - on_time_s, TICK_S)) > NEAR_S:
+            proved = -1
+        elif proved < 0 or abs(late_s - steady_s) > PUNCTUAL_S:
             steady_s, proofs, proved = late_s, 0, ticks
         elif ticks > proved:
             proofs, proved = proofs + 1, ticks
             if proofs == to_prove:
                 return Cause.IDLE_LINE
     return Cause.UNDECIDED
+
+
+def _by_the_next_frame(
+    reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
+) -> Cause:
+    """Whether it is in one piece, as a tick's frame is, or parted by the pause of a whole tick.
+
+    ``first``: the read that ended the pause; ``start``: where that frame begins.
+    """
+    length = measure(data, start) if start < len(data) else INCOMPLETE
+    if length <= 0:
+        return Cause.UNDECIDED if length == INCOMPLETE else Cause.IDLE_LINE
+    end = start + length
+    for before, after in pairwise(reads):
+        pause_s = after.now - before.now - (after.end - before.end) * byte_s
+        if start < before.end < end and pause_s > GAP_S:
+            ticks_s = after.now - first.now
+            punctual = abs(remainder(ticks_s, TICK_S)) < PACE_S
+            return Cause.IDLE_LINE if punctual else Cause.LATE_READER
+    return Cause.LATE_READER

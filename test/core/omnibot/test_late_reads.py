@@ -167,3 +167,45 @@ def test_a_line_that_was_out_for_long_is_read_anew() -> None:
     for number in range(3):
         found += made.feed(encode(other), 0.5 + number * TICK_S)
     assert found == [REST, REST, other, other, other]
+
+
+LATE_ENDS = {
+    "the rest came at the pace of the line, and the next tick in one piece": [
+        "+8.6 006affc7", "+0.3 0052e4",
+        "+0.5 fffa0006", "+0.4 ffbdbfaa", "+0.4 00070000", "+0.3 fa1f",
+    ],
+    "every tick since was late by half a tick": [
+        "+8.6 006affc70052e4", "+8.2 fffa0006ffbdbfaa00070000fa1f",
+        *["+10 fffaffecff45c01500010000fa24"] * 6,
+    ],
+    "no two reads since were equally late": [
+        "+38 006affc7", "+0.3 0052e4", *(
+            f"+{late} {piece}"
+            for late in (3.5, 4.1, 3.8, 6.2, 4.9, 3.6)
+            for piece in ("fffa0006", "ffbdbfaa", "00070000", "fa1f")
+        ),
+    ],
+}  # fmt: skip
+"""After the first two bytes of a delta: milliseconds since the read before, and bytes."""
+
+
+@pytest.mark.parametrize("name", LATE_ENDS)
+def test_a_late_end_belongs_to_its_frame_where(name: str) -> None:
+    """Read beside busy loops, from an adapter beside busy loops."""
+    made, ticks = FrameDecoder(), ticks_of("driving")[:96]
+    found, now = [], 0.0
+    for number, tick in enumerate(ticks):
+        now = number * TICK_S
+        found += made.feed(tick, now)
+    imu = bytes.fromhex("fffaffecff45c01500010000fa24")
+    found += made.feed(imu, now + 10e-3)
+    found += made.feed(bytes.fromhex("fffb"), now + 10.3e-3)
+    now += 10.3e-3
+    for read in LATE_ENDS[name]:
+        later_ms, data = read.split(maxsplit=1)
+        now += 1e-3 * float(later_ms)
+        found += made.feed(bytes.fromhex(data), now)
+    for number in range(1, 8):
+        found += made.feed(imu, now + number * 0.8 * TICK_S)
+    assert not made.statistics.discarded_bytes
+    assert DeltaFrame(0x6A, -57, 0x52, 0xE4) in found
