@@ -85,7 +85,7 @@ def drop_what_waits(line: int) -> None:
 
 def words(argument: str) -> Words:
     """What `keeper.py` made one argument of."""
-    each = (word.split(":") for word in argument.split(","))
+    each = (word.split(":") for word in argument.split(",") if word)
     return [(int(descriptor), bytes.fromhex(data)) for descriptor, data in each]
 
 

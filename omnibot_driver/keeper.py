@@ -37,15 +37,21 @@ SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + 1.5
 class Keeper:
     """A guard for open lines, from now until ``end``.
 
-    ``descriptors``: of the lines, by channel; ``stop``, ``emergency_stop``: what the guard is to
-    say, by whether the e-stop is latched.
+    ``descriptors``: of the lines, by channel, None for one that is missing; ``stop``,
+    ``emergency_stop``: what the guard is to say, by whether the e-stop is latched.
     """
 
-    def __init__(self, descriptors: Sequence[int], stop: Packets, emergency_stop: Packets) -> None:
+    def __init__(
+        self, descriptors: Sequence[int | None], stop: Packets, emergency_stop: Packets
+    ) -> None:
         self._trouble = ""
-        self._descriptors = tuple(descriptors)
+        self._descriptors = tuple(line for line in descriptors if line is not None)
         self._words = [
-            ",".join(f"{descriptors[channel]}:{data.hex()}" for channel, data in packets)
+            ",".join(
+                f"{line}:{data.hex()}"
+                for channel, data in packets
+                if (line := descriptors[channel]) is not None
+            )
             for packets in (stop, emergency_stop)
         ]
         self._process: subprocess.Popen[bytes] | None = None

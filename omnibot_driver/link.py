@@ -28,7 +28,7 @@ from omnibot_driver.keeper import BEAT_S, WITHOUT_GUARD, Keeper
 from omnibot_driver.kernel_counts import waited_s
 from omnibot_driver.outbox import Delivery, Outbox
 from omnibot_driver.stall_detector import StallDetector, boot_time_s
-from omnibot_driver.transports import Transport
+from omnibot_driver.transports import LinesChanged, Transport
 
 JOIN_TIMEOUT_S: Final = 3.0
 """Longer than a guard takes to repeat Stop."""
@@ -55,9 +55,10 @@ class Link:
     ``opener`` opens the transport, whose name for the user is ``port``. ``last_words``: Stop, and
     the emergency stop, for a guard to say when this process cannot; None: no guard is wanted.
     ``deliver`` gets the session's events; ``refused`` the reason why a command was not obeyed;
-    ``report`` a sentence about the port whenever it cannot be had or is lost, and None when it is
-    open; ``on_read`` and ``on_write`` each packet that was read and written. They are
-    called one at a time, in the order in which it happened, on the reader's thread or another.
+    ``report`` a sentence about the port whenever it, or one of its lines, cannot be had or is lost,
+    and None when all of it is open; ``on_read`` and ``on_write`` each packet that was read and
+    written. They are called one at a time, in the order in which it happened, on the reader's
+    thread or another.
     ``failed`` gets the exception that ended a thread, which nothing but a defect can do.
     """
 
@@ -137,7 +138,8 @@ class Link:
         It may be gone by now: the reader is woken by what the caller finds here.
         """
         with self._changed:
-            return self._write_error is not None
+            port = self._port
+            return self._write_error is not None or bool(port is not None and port.missing)
 
     def command(
         self, action: Callable[[Session, T, float], None], wish: T, sent_ns: Sequence[int]
@@ -192,7 +194,7 @@ class Link:
                 self._stop_for_good()
                 self._write(self._session.shutdown_sequence(on_exit, time.monotonic()))
                 if self._port is not None:
-                    told = self._write_error is None
+                    told = self._write_error is None and not self._port.missing
                     self._stands = told and self._session.stands
                     self._port.interrupt()
                     self._port = None  # nobody adds to the last words
@@ -242,7 +244,6 @@ class Link:
         while not (leaving := self._closing.is_set()) or self._opened:
             try:
                 with closing(self._open()) as port:
-                    self._tell(partial(self._report, None))
                     comes_back = False
                     try:
                         self._attach(port)
@@ -263,17 +264,35 @@ class Link:
                 self._wait_s = min(BACK_OFF * self._wait_s, longest_s)
 
     def _attach(self, port: Transport) -> None:
+        names = self._session.board.traits.channels
+        missing = {
+            f"the line '{names[number]}' is missing": why for number, why in port.missing.items()
+        }
+        self._trouble = "; ".join(f"{which}: {why}" for which, why in missing.items())
+        self._tell(partial(self._report, self._trouble or None))
         keeper, notices = self._guarded(port)
         with self._changed:
             self._port, self._write_error, self._keeper = port, None, keeper
-            self._trouble = ""
             self._opened += 1
             self._overruns, self._count_at = None, -math.inf
-            self._session.opened(time.monotonic())
+            self._session.opened(time.monotonic(), missing="; ".join(missing))
             if notices:
                 self._outbox.put(partial(self._deliver, notices))
             self._settle()
         self._outbox.deliver()
+
+    def _attach_anew(self, port: Transport) -> None:
+        """Its lines have changed: all begins again, on those that are there now."""
+        with self._changed:
+            self._write(self._session.broken_off())
+            self._session.closed(now := time.monotonic())
+            self._session.opened(now, missing="the lines of the board are changing")
+            keeper = self._keeper
+        try:
+            self._attach(port)
+        finally:
+            if keeper is not None:  # until now it was the one that guards
+                keeper.end(stopped=True)
 
     def _guarded(self, port: Transport) -> tuple[Keeper | None, list[Notice]]:
         if self._last_words is None or port.ends_with_us:
@@ -286,7 +305,11 @@ class Link:
 
     def _read(self, port: Transport) -> None:
         while not self._closing.is_set():
-            packet = channel, data = port.read()
+            try:
+                packet = channel, data = port.read()
+            except LinesChanged:
+                self._attach_anew(port)
+                continue
             if data and self._on_read is not None:
                 self._tell(partial(self._on_read, packet))
             with self._lock:

@@ -26,7 +26,8 @@ DISCONNECTED: Final = "disconnected"
 class Reporter:
     """``events``: what happened since they were taken; ``news_at``: when to look for news next.
 
-    ``overruns``: how often the port has lost bytes since it was opened. ``shown``: the public state
+    ``missing``: which lines are, in a sentence; ``overruns``: how often the port has lost bytes
+    since it was opened. ``shown``: the public state
     and the e-stop as of the last ``take``, so nothing that is only passed through amid an input.
     """
 
@@ -44,8 +45,9 @@ class Reporter:
         self.events: list[Event] = []
         self.news_at = -math.inf
         self.overruns = 0
+        self.missing = ""
         self.shown = (self.state, self._policy.latched)
-        self._beneath: tuple[Phase, Mode, bool] | None = None
+        self._beneath: tuple[Phase, Mode, bool, str] | None = None
         """What ``shown`` is made of, which is quicker to look at."""
 
     @property
@@ -53,8 +55,8 @@ class Reporter:
         """The public name of the link's and the board's state."""
         if self._mode_manager.phase is CLOSED:
             return DISCONNECTED
-        resetting = self._mode_manager.phase is Phase.RESETTING
-        return str((Mode.UNKNOWN if resetting else self._board.mode).value)
+        unknown = self.missing or self._mode_manager.phase is Phase.RESETTING
+        return str((Mode.UNKNOWN if unknown else self._board.mode).value)
 
     def figures(self, now: float) -> SessionFigures:
         """All that is counted and measured."""
@@ -88,7 +90,9 @@ class Reporter:
         self.notify(news)
 
     def silent(self, silence_s: float, *, bytes_came: bool) -> None:
-        """Nothing was understood for so long."""
+        """Nothing was understood for so long, which is no wonder while a line is missing."""
+        if self.missing:
+            return
         self.notify([why_silent(silence_s, bytes_came=bytes_came)])
         if bytes_came and (advice := self._board.advice):
             self.notify(self._notices.once(advice))
@@ -105,7 +109,12 @@ class Reporter:
             if answers:
                 self.events += answers
                 answers.clear()
-        beneath = (self._mode_manager.phase, self._board.mode, self._policy.latched)
+        beneath = (
+            self._mode_manager.phase,
+            self._board.mode,
+            self._policy.latched,
+            self.missing,
+        )
         if beneath != self._beneath:
             self._beneath = beneath
             shown = (self.state, self._policy.latched)

@@ -127,14 +127,20 @@ class Session:
             self._reporter.notify(self._commanding.check_anew(now))
         self._measurement.configure(settings)
 
-    def opened(self, now: float) -> None:
-        """The port is open."""
+    def opened(self, now: float, *, missing: str = "") -> None:
+        """The port is open. ``missing``: which of several lines are not, in a sentence.
+
+        A robot that hears only a part of what it is told is stopped, and not driven.
+        """
         self._board.connect()
         self._commanding.begin(now)
         self._commands.connect(now)
         self._measurement.restart()
         self._liveness.begin(now)
         self._mode_manager.opened(now)
+        self._interlocks.missing = self._reporter.missing = missing
+        if missing:
+            self._commands.halt(now)
 
     def closed(self, now: float) -> None:
         """The port is gone."""

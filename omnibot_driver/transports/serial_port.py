@@ -24,7 +24,7 @@ import serial
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.packets import Packet, Packets, joined
 from omnibot_driver.kernel_counts import overruns
-from omnibot_driver.transports import READ_TIMEOUT_S, WRITE_TIMEOUT_S
+from omnibot_driver.transports import NONE_MISSING, READ_TIMEOUT_S, WRITE_TIMEOUT_S
 
 MOST_AT_ONCE: Final = 4096
 PEER_OPTIONS: Final = {
@@ -46,6 +46,7 @@ class SerialPort:
     """
 
     ends_with_us = False
+    missing = NONE_MISSING
 
     def __init__(self, url: str, baudrate: int) -> None:
         self._url = url
@@ -109,15 +110,20 @@ class SerialPort:
             else:
                 _write_whole(self._descriptor, data)
         except OSError as error:
-            with contextlib.suppress(OSError, termios.error):
-                self._serial.reset_output_buffer()
+            self.drop_output()
             raise LinkError(f"lost {self._url} while writing: {error}") from error
 
-    def write_if_room(self, packets: Packets) -> None:
+    def write_if_room(self, packets: Packets) -> int:
         """As much of it as is taken at once."""
         if self._descriptor is not None:
             with contextlib.suppress(OSError):
-                os.write(self._descriptor, joined(packets))
+                return os.write(self._descriptor, joined(packets))
+        return 0
+
+    def drop_output(self) -> None:
+        """Nothing of what was written and is still here is sent."""
+        with contextlib.suppress(OSError, termios.error):
+            self._serial.reset_output_buffer()
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, where the port can do so."""

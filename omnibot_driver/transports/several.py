@@ -1,116 +1,263 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Several lines as one transport: the channels of each follow those of the one before it.
+"""Several lines of bytes as one transport: the channels of each follow those of the one before it.
 
-A line that is lost or takes nothing keeps none of the others from being read or written.
+A line that is missing or takes nothing keeps none of the others from being read or written. It is
+opened again by itself, while the others stay open. Each time that the lines that are there have
+changed, ``read`` says so.
 """
 
-import contextlib
-import os
 import select
-from collections.abc import Callable, Iterator, Sequence
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Final, Protocol
 
 from omnibot_driver.core.errors import LinkError
-from omnibot_driver.core.packets import Packet, Packets
-from omnibot_driver.transports import READ_TIMEOUT_S, Transport
+from omnibot_driver.core.packets import Packet, Packets, joined
+from omnibot_driver.transports import READ_TIMEOUT_S, WRITE_TIMEOUT_S, LinesChanged, Transport
+from omnibot_driver.transports.wake_up import WakeUp
+
+RETRY_S: Final = 0.5
+"""A missing line is tried so often: that disturbs none of the others."""
+
+
+class ByteLine(Transport, Protocol):
+    """A ``Transport`` of one channel of bytes."""
+
+    def drop_output(self) -> None:
+        """Nothing of what was written and is still here is sent."""
+
+
+Opener = Callable[[], ByteLine]
 
 
 class Several:
     """A ``Transport`` of lines of one channel each that can be waited for together."""
 
-    def __init__(self, openers: Sequence[Callable[[], Transport]], stop: Packets = ()) -> None:
-        """``stop``: what those that are open are told while another cannot be opened."""
-        self._lines: list[Transport] = []
-        self._channels: dict[int, int] = {}
-        self._ready: list[int] = []
-        self._wakes = self._wake = -1
+    def __init__(self, openers: Sequence[Opener], retry_s: float = RETRY_S) -> None:
+        """Raises LinkError where not one of them can be opened, or one may never be."""
+        self._retry_s = retry_s
+        self._lines = [Line(opener) for opener in openers]
+        self._writing = threading.Lock()
+        """Guards what is still to be written, and which lines are there."""
+        self._ready: list[tuple[int, int]] = []
         self._arrivals = select.poll()
+        self._channels: dict[int, int] = {}
+        self._changed = False
         try:
-            self._wakes, self._wake = os.pipe()
-            self._arrivals.register(self._wakes, select.POLLIN)
-            for opener in openers:
-                self._add(opener())
-        except BaseException as error:
-            with contextlib.suppress(LinkError):
-                self.write(stop)
+            self._wake_up = WakeUp()
+        except OSError as error:
+            raise LinkError(f"cannot open a line: {error.strerror or error}") from error
+        self._arrivals.register(self._wake_up.descriptor, select.POLLIN)
+        try:
+            self._open_missing()
+            self._require_one()
+        except BaseException:
             self.close()
-            if isinstance(error, OSError):
-                raise LinkError(f"cannot open a line: {error.strerror or error}") from error
             raise
+        self._changed = False
 
     @property
-    def descriptors(self) -> tuple[int, ...] | None:
-        """Of all lines."""
-        return tuple(self._channels)
+    def descriptors(self) -> tuple[int | None, ...] | None:
+        """Of all lines; None in the place of one that is not open."""
+        return tuple(line.descriptor for line in self._lines)
+
+    @property
+    def missing(self) -> Mapping[int, str]:
+        """Why, by channel."""
+        return {channel: line.trouble for channel, line in enumerate(self._lines) if line.trouble}
 
     @property
     def ends_with_us(self) -> bool:
         """Where that is so of every line."""
-        return all(line.ends_with_us for line in self._lines)
+        return all(port.ends_with_us for port in self._ports)
 
     @property
     def overruns(self) -> int | None:
-        """Of those that count."""
-        counts = [line.overruns for line in self._lines]
+        """Of those that are there, if each counts."""
+        counts = [port.overruns for port in self._ports]
         return None if None in counts else sum(filter(None, counts))
 
     def read(self) -> Packet:
-        """What has come in on one of them; each in its turn."""
+        """What has come in on one of them; each in its turn.
+
+        Raises LinesChanged when one is lost, or is there again, and LinkError when none is left.
+        """
         if not self._ready:
-            self._ready = [ready for ready, _ in self._arrivals.poll(1e3 * READ_TIMEOUT_S)]
+            self._open_missing()
+            self._ready = self._arrivals.poll(0.0 if self._changed else 1e3 * READ_TIMEOUT_S)
+            self._write_what_waits(time.monotonic())
+        if self._changed:
+            self._changed, self._ready = False, []
+            self._require_one()
+            raise LinesChanged
         if not self._ready:
             return 0, b""
-        ready = self._ready.pop()
-        if ready == self._wakes:
-            os.read(ready, 1000)
+        ready, why = self._ready.pop()
+        if ready == self._wake_up.descriptor:
+            self._wake_up.answer()
             return 0, b""
-        channel = self._channels[ready]
-        return channel, self._lines[channel].read()[1]
+        channel = self._channels.get(ready)
+        if channel is None or why == select.POLLOUT:
+            return 0, b""
+        port = self._lines[channel].port
+        assert port is not None
+        try:
+            return channel, port.read()[1]
+        except LinkError as error:
+            self._lose(channel, str(error))
+            return 0, b""
 
     def write(self, packets: Packets) -> None:
-        """To each line what is its own."""
-        failed: LinkError | None = None
-        for line, own in self._shared_out(packets):
-            try:
-                line.write(own)
-            except LinkError as error:
-                failed = failed or error
-        if failed is not None:
-            raise failed
+        """To each line what is its own; what it does not take at once follows when it does."""
+        now = time.monotonic()
+        with self._writing:
+            for line, data in self._shared_out(packets):
+                line.write(data, now)
+            waits = any(line.waits for line in self._lines)
+        if waits:
+            self._wake_up.ring()
 
-    def write_if_room(self, packets: Packets) -> None:
+    def write_if_room(self, packets: Packets) -> int:
         """To each line what is its own."""
-        for line, own in self._shared_out(packets):
-            line.write_if_room(own)
+        with self._writing:
+            return sum(
+                line.port.write_if_room(((0, data),))
+                for line, data in self._shared_out(packets)
+                if line.port is not None
+            )
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread."""
-        with contextlib.suppress(OSError):
-            os.write(self._wake, b"\0")
+        self._wake_up.ring()
 
     def close(self) -> None:
         """Harmless to repeat."""
         for line in self._lines:
-            line.close()
-        for descriptor in (self._wakes, self._wake):
-            if descriptor >= 0:
-                os.close(descriptor)
-        self._lines, self._wakes, self._wake = [], -1, -1
+            self._close(line)
+        self._wake_up.close()
 
-    def _shared_out(self, packets: Packets) -> Iterator[tuple[Transport, Packets]]:
-        """To each line that is open its own, the first to be written to first."""
+    @property
+    def _ports(self) -> list[ByteLine]:
+        return [line.port for line in self._lines if line.port is not None]
+
+    def _shared_out(self, packets: Packets) -> "Iterator[tuple[Line, bytes]]":
+        """To each line its own, the first to be written to first."""
         for channel in dict.fromkeys(channel for channel, _ in packets):
-            if channel < len(self._lines):
-                own = tuple((0, data) for other, data in packets if other == channel)
-                yield self._lines[channel], own
+            own = tuple(packet for packet in packets if packet[0] == channel)
+            yield self._lines[channel], joined(own)
 
-    def _add(self, line: Transport) -> None:
-        self._lines.append(line)
-        if line.descriptors is None or len(line.descriptors) != 1:
-            raise LinkError(
-                "a port of this kind cannot be one of several: use a device like /dev/ttyACM0, or"
-                " sim:// for all of them"
-            )
-        (descriptor,) = line.descriptors
-        self._channels[descriptor] = len(self._lines) - 1
-        self._arrivals.register(descriptor, select.POLLIN)
+    def _open_missing(self) -> None:
+        """Those that it is time for. One that took nothing is given back first."""
+        now = time.monotonic()
+        for channel, line in enumerate(self._lines):
+            if not line.trouble or now < line.retry_at:
+                continue
+            self._give_back(line)
+            line.retry_at = now + self._retry_s
+            try:
+                port = line.opener()
+            except LinkError as error:
+                line.trouble = str(error)
+                continue
+            if port.descriptors is None or len(port.descriptors) != 1:
+                port.close()
+                raise LinkError(
+                    "a port of this kind cannot be one of several: use a device like"
+                    " /dev/ttyACM0, or sim:// for all of them"
+                )
+            with self._writing:
+                line.begin(port)
+                assert line.descriptor is not None
+                self._channels[line.descriptor] = channel
+                self._arrivals.register(line.descriptor, select.POLLIN)
+            self._changed = True
+
+    def _write_what_waits(self, now: float) -> None:
+        """And see where there is room again; a line that has none for too long is missing."""
+        with self._writing:
+            for line in self._lines:
+                if line.descriptor is None or not (line.waits or line.watched):
+                    continue
+                if not line.flush(now):
+                    self._miss(line, f"it takes no more bytes for {WRITE_TIMEOUT_S:g} s")
+                line.watched = bool(line.waits)
+                mask = select.POLLIN | (select.POLLOUT if line.waits else 0)
+                self._arrivals.modify(line.descriptor, mask)
+
+    def _lose(self, channel: int, why: str) -> None:
+        line = self._lines[channel]
+        self._miss(line, why)
+        self._give_back(line)
+
+    def _miss(self, line: "Line", why: str) -> None:
+        line.trouble, line.retry_at = why, time.monotonic() + self._retry_s
+        self._changed = True
+
+    def _give_back(self, line: "Line") -> None:
+        if line.descriptor is not None:
+            del self._channels[line.descriptor]
+            self._arrivals.unregister(line.descriptor)
+        self._close(line)
+
+    def _close(self, line: "Line") -> None:
+        with self._writing:
+            port = line.end()
+        if port is not None:  # what the kernel still has may take it a while
+            port.close()
+
+    def _require_one(self) -> None:
+        """Raises LinkError where all are missing, with what is wrong with the first."""
+        if len(self.missing) == len(self._lines):
+            raise LinkError(self._lines[0].trouble)
+
+
+class Line:
+    """One of several. ``trouble``: why it is missing; ``waits``: bytes that it has not taken."""
+
+    def __init__(self, opener: Opener) -> None:
+        self.opener = opener
+        self.port: ByteLine | None = None
+        self.descriptor: int | None = None
+        self.trouble = "it is not open yet"
+        self.retry_at = 0.0
+        self.waits = b""
+        self.watched = False
+        """Whether ``poll`` looks for room."""
+        self._full_since = 0.0
+
+    def begin(self, port: ByteLine) -> None:
+        """It is there."""
+        assert port.descriptors is not None
+        self.port, (self.descriptor,) = port, port.descriptors
+        self.trouble, self.waits, self.watched = "", b"", False
+
+    def write(self, data: bytes, now: float) -> None:
+        """Behind what waits. One that hangs gets what it has room for: see ``flush``."""
+        if self.port is None:
+            return
+        if self.trouble:
+            self.port.write_if_room(((0, data),))
+            return
+        if not self.waits:
+            self._full_since = now
+        self.waits += data
+        self.flush(now)
+
+    def flush(self, now: float) -> bool:
+        """Write what waits. False when it was in vain for too long; then nothing of it is sent."""
+        assert self.port is not None
+        if self.waits and not self.trouble:
+            taken = self.port.write_if_room(((0, self.waits),))
+            self.waits = self.waits[taken:]
+            if self.waits and now - self._full_since >= WRITE_TIMEOUT_S:
+                self.waits = b""
+                self.port.drop_output()
+                return False
+        return True
+
+    def end(self) -> ByteLine | None:
+        """It is not there any more; returns what is to be closed."""
+        port, self.port, self.descriptor, self.waits = self.port, None, None, b""
+        return port

@@ -18,7 +18,7 @@ from omnibot_driver.simulator.common import options
 from omnibot_driver.simulator.common.board import Packet, SimulatedBoard
 from omnibot_driver.simulator.common.running import UNREAD_LIMIT, RunningBoard
 from omnibot_driver.simulator.common.wired import Line
-from omnibot_driver.transports import READ_TIMEOUT_S
+from omnibot_driver.transports import NONE_MISSING, READ_TIMEOUT_S
 
 UNREAD_DATAGRAMS: Final = 256
 """About what a socket of Linux holds of small ones."""
@@ -31,6 +31,7 @@ class SimulatedTransport:
     is wrong. ``read`` and ``close`` raise RuntimeError when the board's thread has died: a defect.
     """
 
+    missing = NONE_MISSING
     overruns: int | None = None
     """Memory does not overrun."""
     ends_with_us: bool = True
@@ -68,9 +69,11 @@ class SimulatedTransport:
         for packet in packets:
             self._board.write(packet)
 
-    def write_if_room(self, packets: Iterable[Packet]) -> None:
+    def write_if_room(self, packets: Iterable[Packet]) -> int:
         """The same: there is always room."""
+        packets = tuple(packets)
         self.write(packets)
+        return sum(len(data) for _, data in packets)
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, or else the next one."""

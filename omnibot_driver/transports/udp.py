@@ -10,7 +10,6 @@ next datagram, so the sockets stay open.
 import contextlib
 import errno
 import math
-import os
 import select
 import socket
 import time
@@ -19,7 +18,8 @@ from urllib.parse import urlsplit
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.packets import Packet, Packets
-from omnibot_driver.transports import READ_TIMEOUT_S, WRITE_TIMEOUT_S
+from omnibot_driver.transports import NONE_MISSING, READ_TIMEOUT_S, WRITE_TIMEOUT_S
+from omnibot_driver.transports.wake_up import WakeUp
 
 SCHEME: Final = "udp://"
 LARGEST: Final = 65_536
@@ -31,24 +31,27 @@ class UdpPorts:
     """A ``Transport`` of as many channels as ``channels`` says."""
 
     ends_with_us = False
+    missing = NONE_MISSING
     overruns = None
 
     def __init__(self, url: str, channels: int = 1) -> None:
         self._host, self._port = _place(url, channels)
         self._sockets: list[socket.socket] = []
-        self._wakes = self._wake = -1
         try:
-            self._wakes, self._wake = os.pipe()
-            self._connect(channels)
+            self._wake_up = WakeUp()
+            try:
+                self._connect(channels)
+            except BaseException:
+                self.close()
+                raise
         except (OSError, ValueError) as error:  # a name that cannot be one is a ValueError
-            self.close()
             reason = getattr(error, "strerror", None) or error
             raise LinkError(
                 f"cannot reach {url}: {reason}; check the parameter `port` and the network"
             ) from error
         self._arrivals = select.poll()
         self._channels = {ours.fileno(): number for number, ours in enumerate(self._sockets)}
-        for descriptor in (self._wakes, *self._channels):
+        for descriptor in (self._wake_up.descriptor, *self._channels):
             self._arrivals.register(descriptor, select.POLLIN)
         self._ready: list[int] = []
 
@@ -64,8 +67,8 @@ class UdpPorts:
         if not self._ready:
             return 0, b""
         ready = self._ready.pop()
-        if ready == self._wakes:
-            os.read(ready, 1000)
+        if ready == self._wake_up.descriptor:
+            self._wake_up.answer()
             return 0, b""
         channel = self._channels[ready]
         try:
@@ -88,25 +91,25 @@ class UdpPorts:
         if failed is not None:
             raise failed
 
-    def write_if_room(self, packets: Packets) -> None:
+    def write_if_room(self, packets: Packets) -> int:
         """Those that are taken at once."""
+        taken = 0
         for channel, data in packets:
             with contextlib.suppress(OSError):
                 self._send(channel, data, until=-math.inf)
+                taken += len(data)
+        return taken
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread."""
-        with contextlib.suppress(OSError):
-            os.write(self._wake, b"\0")
+        self._wake_up.ring()
 
     def close(self) -> None:
         """Harmless to repeat."""
         for ours in self._sockets:
             ours.close()
-        for descriptor in (self._wakes, self._wake):
-            if descriptor >= 0:
-                os.close(descriptor)
-        self._sockets, self._wakes, self._wake = [], -1, -1
+        self._sockets = []
+        self._wake_up.close()
 
     def _connect(self, channels: int) -> None:
         """All to one address, whatever others the name has."""

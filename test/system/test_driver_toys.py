@@ -172,12 +172,23 @@ def test_the_raw_bytes_of_each_line_have_a_topic(
     } <= topics
 
 
-def test_one_of_two_lines_that_is_missing_is_named(start_driver: Start, stack: ExitStack) -> None:
-    """The other one is given back meanwhile."""
+def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """The driver is killed meanwhile, and the half that is there stops."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     toy.ports["sense_port"] = "/dev/no-such-port"
     driver = start_toy(start_driver, toy)
-    driver.wait_for_line("/dev/no-such-port does not exist")
+    driver.wait_for_line("the line 'sense' is missing: /dev/no-such-port does not exist")
+    probe_of(driver).wait_for_state("connecting")
+    toy.wait_for(lambda robot: robot.heard[-2:] == 2 * [b"v 0 0"])
+    driver.process.kill()
+    driver.process.wait()
+    with toy.served.lock:
+        toy.served.board.left = toy.served.board.right = 100
+        mark = len(toy.served.board.heard)
+    toy.wait_for(lambda robot: robot.heard[mark:].count(b"v 0 0") >= 10)
+    toy.comes_to_a_stand()
 
 
 def test_a_host_that_does_not_answer_is_told(start_driver: Start) -> None:
@@ -189,7 +200,7 @@ def test_a_host_that_does_not_answer_is_told(start_driver: Start) -> None:
 def test_a_line_that_is_lost_leaves_the_robot_standing(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The guard repeats the stop on the line that is there."""
+    """The stop is repeated on the line that is there."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     far, near = os.openpty()
     stack.callback(os.close, near)

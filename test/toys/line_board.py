@@ -104,7 +104,7 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Transport]:
     paths = values["port"], values["sense_port"]
-    return partial(Several, [partial(SerialPort, path, 115200) for path in paths], STOP)
+    return partial(Several, [partial(SerialPort, path, 115200) for path in paths])
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:

@@ -4,16 +4,20 @@
 
 import contextlib
 import os
+import select
 import threading
 import tty
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
+from typing import NoReturn
 
 import pytest
 from terminal import fill
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.packets import Packet
+from omnibot_driver.transports import LinesChanged
 from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
 
@@ -55,6 +59,14 @@ def lines(ends: Ends) -> Iterator[Several]:
     lines.close()
 
 
+def heard(far: int, words: bytes) -> bytes:
+    """All that came, once these words did."""
+    came = b""
+    while not came.endswith(words):
+        came += os.read(far, 4096)
+    return came
+
+
 def next_packets(lines: Several, count: int) -> set[Packet]:
     found: set[Packet] = set()
     while len(found) < count:
@@ -74,23 +86,93 @@ def test_what_is_read_and_written_keeps_its_channel(ends: Ends, lines: Several) 
     assert os.read(ends.far[1], 99) == b"ac"
 
 
+def read_on(lines: Several) -> NoReturn:
+    while True:
+        lines.read()
+
+
+def changed(lines: Several) -> dict[int, str]:
+    """What is missing once the lines have changed."""
+    with pytest.raises(LinesChanged):
+        read_on(lines)
+    return dict(lines.missing)
+
+
 def test_a_line_that_is_lost_keeps_the_other_from_nothing(ends: Ends, lines: Several) -> None:
-    """The stop still reaches the half that is there."""
+    """The stop still reaches the half that is there, and what it says is heard."""
     ends.hang_up(0)
-    with pytest.raises(LinkError, match=f"lost {ends.paths[0]}"):
-        lines.write(((0, b"stop"), (1, b"stop")))
+    lines.write(((0, b"stop"), (1, b"stop")))
     assert os.read(ends.far[1], 99) == b"stop"
-    with pytest.raises(LinkError, match=f"lost {ends.paths[0]} while reading"):
-        next_packets(lines, 1)
+    assert f"lost {ends.paths[0]} while reading" in changed(lines)[0]
+    os.write(ends.far[1], b"front")
+    assert next_packets(lines, 1) == {(1, b"front")}
+    assert lines.descriptors is not None
+    assert lines.descriptors[0] is None
 
 
-def test_a_line_that_takes_nothing_keeps_the_other_from_nothing(ends: Ends, lines: Several) -> None:
-    """It is lost; the other was written to."""
+def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
+    """By the sentence of the first."""
+    ends.hang_up(0)
+    changed(lines)
+    ends.hang_up(1)
+    with pytest.raises(LinkError, match=f"lost {ends.paths[0]}|does not exist"):
+        read_on(lines)
+
+
+def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Several) -> None:
+    """A write never waits for it; after a while it is missing, and nothing old is sent to it."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
-    with pytest.raises(LinkError, match="takes no more bytes"):
-        lines.write(((0, b"stop"), (1, b"stop")))
-    assert os.read(ends.far[1], 99) == b"stop"
+    poll = select.poll
+
+    def at_once(*_: object) -> NoReturn:
+        pytest.fail("the write waits")
+
+    select.poll = at_once  # type: ignore[misc,assignment]
+    try:
+        lines.write(((0, b"old"), (1, b"stop")))
+        lines.write(((0, b"old"), (1, b"stop")))
+    finally:
+        select.poll = poll  # type: ignore[misc]
+    assert os.read(ends.far[1], 99) == b"stopstop"
+    assert changed(lines) == {0: "it takes no more bytes for 0.2 s"}
+    lines.write(((0, b"new"), (1, b"stop")))
+    assert heard(ends.far[0], b"new").strip(b"x") == b"new"
+
+
+def test_what_a_full_line_does_not_take_at_once_follows_in_order(
+    ends: Ends, lines: Several
+) -> None:
+    """As soon as its reader makes room."""
+    os.set_blocking(ends.near[0], False)
+    fill(ends.near[0])
+    lines.write(((0, b"one"),))
+    lines.write(((0, b"two"),))
+    reader = threading.Thread(target=heard, args=(ends.far[0], b"onetwo"))
+    reader.start()
+    while reader.is_alive():
+        assert lines.read() == (0, b"")
+    assert lines.missing == {}
+
+
+def test_a_line_that_comes_back_is_opened_while_the_others_stay_open(
+    ends: Ends, tmp_path: Path
+) -> None:
+    """Nothing is given back of what is there."""
+    late = tmp_path / "late"
+    paths = str(late), ends.paths[1]
+    lines = Several([partial(SerialPort, path, 115200) for path in paths], retry_s=0.01)
+    with contextlib.closing(lines):
+        assert lines.descriptors is not None
+        there = lines.descriptors[1]
+        assert "late does not exist" in lines.missing[0]
+        late.symlink_to(ends.paths[0])
+        assert changed(lines) == {}
+        assert lines.descriptors[1] == there
+        os.write(ends.far[0], b"drive")
+        assert next_packets(lines, 1) == {(0, b"drive")}
+        ends.hang_up(0)
+        assert 0 in changed(lines)
 
 
 def test_a_read_that_waits_can_be_ended(lines: Several) -> None:
@@ -99,19 +181,22 @@ def test_a_read_that_waits_can_be_ended(lines: Several) -> None:
     assert lines.read() == (0, b"")
 
 
-def test_where_one_cannot_be_opened_none_is_kept(ends: Ends) -> None:
-    """The sentence is of the one that cannot; the other one is stopped."""
+def test_where_none_can_be_opened_none_is_kept() -> None:
+    """The sentence is of the first."""
     before = len(os.listdir("/proc/self/fd"))
-    paths = ends.paths[0], "/dev/no-such"
+    paths = "/dev/no-such", "/dev/no-such-either"
     with pytest.raises(LinkError, match="/dev/no-such does not exist"):
-        Several([partial(SerialPort, path, 115200) for path in paths], ((0, b"stop"), (1, b"x")))
-    assert os.read(ends.far[0], 99) == b"stop"
+        Several([partial(SerialPort, path, 115200) for path in paths])
     assert len(os.listdir("/proc/self/fd")) == before
-    with contextlib.closing(SerialPort(ends.paths[0], 115200)):
-        pass
 
 
-def test_the_same_port_twice_is_refused(ends: Ends) -> None:
+def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
     """Ports are exclusive."""
-    with pytest.raises(LinkError, match="in use"):
-        Several([partial(SerialPort, ends.paths[0], 115200)] * 2)
+    with contextlib.closing(Several([partial(SerialPort, ends.paths[0], 115200)] * 2)) as lines:
+        assert "in use" in lines.missing[1]
+
+
+def test_a_port_that_cannot_be_waited_for_is_none_of_several() -> None:
+    """It has no descriptor."""
+    with pytest.raises(LinkError, match="cannot be one of several"):
+        Several([partial(SerialPort, "loop://", 115200)])

@@ -14,7 +14,9 @@ from omnibot_driver.core.mode_manager import ModeManager, Phase
 
 
 class Interlocks:
-    """``leaving``: the driver is shutting down, and obeys nothing any more."""
+    """``leaving``: the driver is shutting down, and obeys nothing any more. ``missing``: which of
+    several lines are not there, in a sentence.
+    """
 
     def __init__(
         self,
@@ -28,14 +30,15 @@ class Interlocks:
         self._policy, self._interlock = commanding.policy, commanding.interlock
         self._calibration, self._liveness = calibration, liveness
         self.leaving = False
+        self.missing = ""
 
     def why_not_request(self) -> str:
         """Why nothing is asked of the board."""
-        return "the driver is shutting down" if self.leaving else ""
+        return "the driver is shutting down" if self.leaving else self.missing
 
     def why_not_drive(self, motion: Setpoint, now: float) -> str:
         """Why this motion is refused. To be asked once for each, as the motion monitor counts."""
-        if self.leaving:
+        if self.leaving or self.missing:
             return self.why_not_request()
         stands, phase, mode = motion.is_zero, self._mode_manager.phase, self._board.mode
         tripped = self._interlock.arrive(now, self._policy.settings.timeout_s, stands=stands)
@@ -54,6 +57,8 @@ class Interlocks:
     def why_not_calibrate(self) -> str:
         """Why the gyro's bias cannot be measured."""
         phase, mode, current = self._mode_manager.phase, self._board.mode, self._policy.current
+        if self.missing:
+            return self.missing
         if phase is Phase.CLOSED:
             return "the port is not open; connect the board, then call again"
         if mode is Mode.UNKNOWN:

@@ -1,0 +1,154 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A link to a board of two lines, one of which comes late, goes and comes back."""
+
+import os
+from collections.abc import Iterator
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+
+import pytest
+from listener import Listener
+from terminal import Terminal
+from toys.line_board import STOP, LineBoard
+
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.policy import CommandSettings
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.packets import joined
+from omnibot_driver.core.session import Session, SessionSettings
+from omnibot_driver.link import Link
+from omnibot_driver.transports.serial_port import SerialPort
+from omnibot_driver.transports.several import Several
+
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
+STOPS = joined(STOP)
+
+
+class Lines:
+    """Both lines of a board that nobody simulates, and a link to them; ``sense`` by a name."""
+
+    def __init__(self, folder: Path) -> None:
+        self.drive, self.sense = Terminal(), Terminal()
+        self.name = folder / "sense"
+        self.listener = Listener()
+        self.session = Session(
+            LineBoard(),
+            SessionSettings(
+                limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
+            ),
+            run=False,
+        )
+        paths = (self.drive.path, str(self.name))
+        self.openers = [partial(SerialPort, path, 115200) for path in paths]
+        self.link = Link(
+            self.session,
+            partial(Several, self.openers, retry_s=0.01),
+            "two lines",
+            last_words=(STOP, STOP),
+            reconnect_interval_s=0.02,
+            deliver=self.listener.deliver,
+            report=self.listener.report,
+            failed=self.listener.failed,
+        )
+
+    def connect(self) -> None:
+        self.name.symlink_to(self.sense.path)
+
+    def say_that_it_stands(self) -> None:
+        """As soon as the line is open: what waited before is not heard."""
+        self.listener.wait_for(lambda: self.listener.reports[-1:] == [None])
+        os.write(self.sense.far, b"d 0 0\n")
+        self.come_to_state("nominal")
+
+    def command(self) -> None:
+        self.link.command(
+            lambda session, twist, now: session.command_twist(twist, now),
+            BodyTwist(0.2, 0.0, 0.0),
+            (),
+        )
+
+    @property
+    def estimates(self) -> list[OdometryEstimate]:
+        return [event for event in self.listener.events if isinstance(event, OdometryEstimate)]
+
+    def come_to_state(self, state: str) -> None:
+        self.listener.wait_for(
+            lambda: state in [getattr(event, "state", None) for event in self.listener.events]
+        )
+        self.listener.events.clear()
+        assert self.session.state == state
+
+    def close(self) -> None:
+        self.link.close("stop")
+        for terminal in (self.drive, self.sense):
+            terminal.close()
+
+
+@pytest.fixture
+def lines(tmp_path: Path) -> Iterator[Lines]:
+    with closing(Lines(tmp_path)) as lines:
+        yield lines
+
+
+def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missing(
+    lines: Lines,
+) -> None:
+    """In one connection; motion is refused by the name of the line."""
+    lines.link.start()
+    lines.drive.read_until(5 * STOPS)
+    lines.come_to_state("connecting")
+    with pytest.raises(CommandRefused, match="the line 'sense' is missing"):
+        lines.command()
+    assert lines.link.blocked
+    (report,) = lines.listener.reports
+    assert str(report).startswith(f"the line 'sense' is missing: {lines.name} does not exist")
+    assert lines.link.figures()[0].trouble == report
+    lines.link.call(lambda session, now: session.estop(True, now))
+    lines.drive.read_until(20 * STOPS)
+
+
+def test_a_line_that_comes_late_completes_the_board(lines: Lines) -> None:
+    """The robot drives; the line that was there was never given back."""
+    lines.link.start()
+    lines.drive.read_until(STOPS)
+    lines.connect()
+    lines.say_that_it_stands()
+    lines.command()
+    lines.drive.read_until(b"v 200 200\n")
+
+
+def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
+    lines: Lines,
+) -> None:
+    """The command from before is forgotten."""
+    lines.connect()
+    lines.link.start()
+    lines.say_that_it_stands()
+    lines.command()
+    lines.drive.read_until(b"v 200 200\n")
+    lines.name.unlink()
+    lines.sense.close()
+    lines.drive.read_until(5 * STOPS)
+    lines.come_to_state("connecting")
+    lines.sense = Terminal()
+    lines.connect()
+    lines.say_that_it_stands()
+    assert b"v 2" not in lines.drive.read_until(5 * STOPS)
+
+
+def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
+    """Although all that it measures comes."""
+    lines.connect()
+    missing = lines.openers[0] = partial(SerialPort, str(lines.name) + "-not", 115200)
+    lines.link.start()
+    lines.listener.wait_for(lambda: lines.listener.reports)
+    os.write(lines.sense.far, b"d 0 0\n")
+    lines.listener.wait_for(lambda: lines.estimates)
+    assert lines.session.state == "connecting"
+    with pytest.raises(CommandRefused, match="the line 'drive' is missing"):
+        lines.command()
+    assert missing.args[0] in str(lines.listener.reports)
