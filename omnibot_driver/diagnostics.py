@@ -23,13 +23,21 @@ Publish = Callable[[Sequence[Status]], None]
 
 
 class Diagnostics:
-    """``refusals`` is asked each time; ``hardware_id`` tells robots apart."""
+    """``refusals`` is asked each time; ``hardware_id`` tells robots apart; ``to_check``: what may
+    be wrong with a board of which nothing is understood.
+    """
 
     def __init__(
-        self, node: Node, link: Link, refusals: Callable[[], Refusals], hardware_id: str
+        self,
+        node: Node,
+        link: Link,
+        refusals: Callable[[], Refusals],
+        *,
+        hardware_id: str,
+        to_check: str,
     ) -> None:
         self._link, self._refusals = link, refusals
-        self._diagnosis = Diagnosis()
+        self._diagnosis = Diagnosis(to_check)
         self._publish, period_s = _through_updater(node, hardware_id) or (
             _alone(node, hardware_id),
             PERIOD_S,

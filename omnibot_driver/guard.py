@@ -7,7 +7,8 @@ standard input. When the heartbeat ceases, or the driver is gone, it repeats the
 given, for a second or until the driver is heard again: the emergency stop if the last heartbeat
 said that it is latched. It knows no board, and imports next to nothing, so that it is small and
 soon there: `keeper.py` starts it as ``python guard.py STOP EMERGENCY_STOP``. Each is what to write,
-one thing after the other, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``.
+one thing after the other, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. Where they change, the driver says
+so between two heartbeats, as ``=STOP EMERGENCY_STOP`` and a new line.
 """
 
 import contextlib
@@ -21,6 +22,8 @@ import termios
 BEAT = b"."
 LATCHED_BEAT = b"e"
 """The driver is alive and its e-stop is latched."""
+WORDS = b"="
+"""Other words from now on."""
 BYE = b"!"
 """The driver has stopped the robot itself; the guard may leave."""
 LIMIT_S = 0.5
@@ -40,11 +43,12 @@ Words = list[tuple[int, bytes]]
 
 def watch(stop: Words, emergency_stop: Words) -> None:
     """Until the driver is gone, and then a second longer unless it said that it goes."""
-    for line in {line for line, _ in stop + emergency_stop}:
-        os.set_blocking(line, False)
     patience_s: float | None = LIMIT_S
-    last_words = stop
+    latched, unfinished = False, b""
     while True:
+        for line, _ in stop + emergency_stop:
+            os.set_blocking(line, False)
+        last_words = emergency_stop if latched else stop
         if not select.select([DRIVER], [], [], patience_s)[0]:
             speak(last_words, until=[DRIVER])
             patience_s = None
@@ -55,7 +59,12 @@ def watch(stop: Words, emergency_stop: Words) -> None:
             return
         else:
             patience_s = LIMIT_S
-            last_words = emergency_stop if heard.endswith(LATCHED_BEAT) else stop
+            *others, rest = (unfinished + heard).split(b"\n")
+            for other in others:
+                stop, emergency_stop = map(words, other.partition(WORDS)[2].decode().split(" "))
+            beats, begun, other = rest.partition(WORDS)
+            unfinished = begun + other
+            latched = beats.endswith(LATCHED_BEAT) if beats else latched
 
 
 def speak(last_words: Words, until: list[int]) -> None:

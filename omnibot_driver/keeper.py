@@ -45,15 +45,10 @@ class Keeper:
         self, descriptors: Sequence[int | None], stop: Packets, emergency_stop: Packets
     ) -> None:
         self._trouble = ""
-        self._descriptors = tuple(line for line in descriptors if line is not None)
-        self._words = [
-            ",".join(
-                f"{line}:{data.hex()}"
-                for channel, data in packets
-                if (line := descriptors[channel]) is not None
-            )
-            for packets in (stop, emergency_stop)
-        ]
+        self._descriptors = descriptors
+        self.last_words = stop, emergency_stop
+        self._ahead = 0
+        """Bytes of words that the guard may not have read yet."""
         self._process: subprocess.Popen[bytes] | None = None
         self._dying: list[subprocess.Popen[bytes]] = []
         """Killed, and not gone yet."""
@@ -77,6 +72,19 @@ class Keeper:
         trouble, self._trouble = self._trouble, ""
         return trouble
 
+    def change(self, stop: Packets, emergency_stop: Packets) -> None:
+        """What the guard is to say from now on. Waits for no process."""
+        self.last_words = stop, emergency_stop
+        if (process := self._process) is None:
+            return
+        assert process.stdin is not None
+        message = guard.WORDS + " ".join(map(self._addressed, self.last_words)).encode() + b"\n"
+        try:
+            os.write(process.stdin.fileno(), message)
+            self._ahead += len(message)
+        except OSError:  # gone, or it reads nothing: another one is started with these words
+            self._give_up(process)
+
     def end(self, *, stopped: bool) -> None:
         """It leaves, and the port is ours alone; harmless to repeat.
 
@@ -94,7 +102,8 @@ class Keeper:
         pipe = process.stdin.fileno()
         try:
             (unread,) = struct.unpack("i", fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)))
-            if unread < HANGS_AFTER * len(word):
+            self._ahead = min(self._ahead, unread)
+            if unread - self._ahead < HANGS_AFTER * len(word):
                 os.write(pipe, word)
                 return ""
         except OSError:
@@ -117,18 +126,27 @@ class Keeper:
         self._dying.append(process)
         self._process, self._broken = None, False
 
+    def _addressed(self, packets: Packets) -> str:
+        """As the guard takes them; what is for a line that is missing is left out."""
+        return ",".join(
+            f"{line}:{data.hex()}"
+            for channel, data in packets
+            if (line := self._descriptors[channel]) is not None
+        )
+
     def _start(self) -> None:
+        self._ahead = 0
         # By its bare name: whoever kills all that is called omnibot_driver does not hit the guard.
         folder, name = os.path.split(guard.__file__)
         command = [sys.executable, "-I", "-S", name]
         try:
             self._process = subprocess.Popen(
-                [*command, *self._words],
+                [*command, *map(self._addressed, self.last_words)],
                 bufsize=0,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
-                pass_fds=self._descriptors,
+                pass_fds=[line for line in self._descriptors if line is not None],
                 cwd=folder,
                 start_new_session=True,  # ctrl-C is for the driver alone
             )

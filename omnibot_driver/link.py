@@ -52,8 +52,8 @@ T = TypeVar("T")
 class Link:
     """One session on one port, which is opened again whenever it is lost.
 
-    ``opener`` opens the transport, whose name for the user is ``port``. ``last_words``: Stop, and
-    the emergency stop, for a guard to say when this process cannot; None: no guard is wanted.
+    ``opener`` opens the transport, whose name for the user is ``port``. ``guard``: whether a
+    process of its own is to say the board's last words when this one cannot.
     ``deliver`` gets the session's events; ``refused`` the reason why a command was not obeyed;
     ``report`` a sentence about the port whenever it, or one of its lines, cannot be had or is lost,
     and None when all of it is open; ``on_read`` and ``on_write`` each packet that was read and
@@ -68,7 +68,7 @@ class Link:
         opener: Callable[[], Transport],
         port: str,
         *,
-        last_words: tuple[Packets, Packets] | None,
+        guard: bool,
         reconnect_interval_s: float,
         deliver: Callable[[Sequence[Event]], None],
         report: Callable[[str | None], None],
@@ -84,7 +84,7 @@ class Link:
         self._overruns: int | None = None
         self._count_at = -math.inf
         self._open = opener
-        self._last_words = last_words
+        self._has_guard = guard
         self.reconnect_interval_s = self._wait_s = reconnect_interval_s
         self._deliver, self._report, self._failed = deliver, report, failed
         self._refused = refused
@@ -295,10 +295,10 @@ class Link:
                 keeper.end(stopped=True)
 
     def _guarded(self, port: Transport) -> tuple[Keeper | None, list[Notice]]:
-        if self._last_words is None or port.ends_with_us:
+        if not self._has_guard or port.ends_with_us:
             return None, []
         if port.descriptors is not None:
-            return Keeper(port.descriptors, *self._last_words), []
+            return Keeper(port.descriptors, *self._session.board.last_words()), []
         told, self._unguarded_told = self._unguarded_told, True
         text = f"this kind of port cannot be shared with a guard process: {WITHOUT_GUARD}"
         return None, [] if told else [Notice(text)]
@@ -336,6 +336,8 @@ class Link:
                 stopped = self._heed_standstill(boot_time_s())
                 if self._session.process(now) or stopped:
                     self._settle()
+                else:
+                    self._tell_guard()
             self._outbox.deliver()
 
     def _count(self, port: Transport, now: float) -> None:
@@ -409,12 +411,21 @@ class Link:
 
         What there is to tell takes its place in the order.
         """
-        if packets := self._session.take_output(time.monotonic()):
+        packets = self._session.take_output(time.monotonic())
+        self._tell_guard()
+        if packets:
             self._write(packets)
         if self._session.wake_at < self._pacing_until or self._leaving:
             self._changed.notify_all()
         if events := self._session.take_events():
             self._outbox.put(partial(self._deliver, events))
+
+    def _tell_guard(self) -> None:
+        """With the lock held: what stops the board now, where that has changed."""
+        if (keeper := self._keeper) is None:
+            return
+        if (words := self._session.board.last_words()) != keeper.last_words:
+            keeper.change(*words)
 
     def _write(self, packets: Packets) -> None:
         if not packets or self._port is None or self._write_error is not None:

@@ -75,7 +75,13 @@ class OmniBotDriver(Node):
         self._create_inputs()
         self._publishing.extras = self._profile.extras(self, self._link, self._values)
         if isinstance(self._link, Link):  # a recording is no link to be judged
-            self._diagnostics = Diagnostics(self, self._link, lambda: self._refusals, port)
+            self._diagnostics = Diagnostics(
+                self,
+                self._link,
+                lambda: self._refusals,
+                hardware_id=port,
+                to_check=self._board.traits.to_check,
+            )
         if advice := selfcheck.clock_advice(port, self.get_parameter("use_sim_time").value):
             self.get_logger().warning(advice)
         self._publishing.publish_state()
@@ -100,14 +106,11 @@ class OmniBotDriver(Node):
                 refused=self._refuse,
             )
         taps = self._publishing.taps() if self._values["publish_raw"] else {}
-        stop = self._board.stop()
         return Link(
             self._session,
             boards.opener(self._profile, self._values),
             port,
-            last_words=(stop, self._board.emergency_stop() + stop)
-            if self._values["guard"]
-            else None,
+            guard=self._values["guard"],
             reconnect_interval_s=self._values["reconnect_interval"],
             deliver=self._publishing.deliver,
             report=self._publishing.report_port,

@@ -71,7 +71,7 @@ def link_to(url: str, listener: Listener, session: Session, **taps: Callable[[An
         session,
         boards.opener(omnibot, {"port": url, "baudrate": 115200}),
         url,
-        last_words=LAST_WORDS,
+        guard=True,
         reconnect_interval_s=0.02,
         deliver=listener.deliver,
         report=listener.report,

@@ -149,6 +149,51 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
     keeper.end(stopped=True)
 
 
+def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Line) -> None:
+    """What stops a board may depend on what it does just now."""
+    keeper = Keeper([line.near, None], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    words = packed(b"other words"), packed(b"other latched words")
+    keeper.change(*words)
+    assert keeper.last_words == words
+    assert keeper.beat(time.monotonic(), latched=True) == ""
+    (first,) = line.children()
+    started(first)
+    keeper.change(packed(b"newest") + packed(b"missing", 1), packed(b"newest latched"))
+    os.kill(first, signal.SIGSTOP)
+    os.kill(first, signal.SIGCONT)
+    line.hear(2 * b"newest latched")  # no heartbeat comes
+    assert LAST_WORDS not in line.heard
+    os.kill(first, signal.SIGKILL)
+    beat_until(keeper, lambda: line.children() not in ([first], []))
+    keeper.end(stopped=False)
+    assert b"missing" not in line.hear(2 * b"newest" + b"newest")
+
+
+def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
+    """It would say old ones."""
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    (first,) = line.children()
+    os.kill(first, signal.SIGSTOP)
+    os.waitid(os.P_PID, first, os.WSTOPPED)
+    for number in range(200):
+        keeper.change(packed(b"%d" % number + bytes(1000)), packed(LATCHED_WORDS))
+    keeper.change(packed(b"newest"), packed(LATCHED_WORDS))
+    beat_until(keeper, lambda: line.children() not in ([first], []))
+    keeper.end(stopped=False)
+    assert LAST_WORDS not in line.hear(2 * b"newest")
+
+
+def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
+    """It has not come up yet."""
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    children = line.children()
+    for number in range(30):
+        keeper.change(packed(b"%d" % number), packed(LATCHED_WORDS))
+        assert keeper.beat(1000.0) == ""
+    assert line.children() == children
+    keeper.end(stopped=True)
+
+
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
     """What waits there is old commands; nobody reads until the guard has gone."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))

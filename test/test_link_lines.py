@@ -18,7 +18,7 @@ from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
-from omnibot_driver.core.packets import joined
+from omnibot_driver.core.packets import Packets, joined, packed
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link
 from omnibot_driver.transports.serial_port import SerialPort
@@ -28,15 +28,25 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 STOPS = joined(STOP)
 
 
+OTHER_STOP = packed(b"v  0  0\n")
+
+
+class MoodyBoard(LineBoard):
+    """What stops it depends on what it said last."""
+
+    def stop(self) -> Packets:
+        return OTHER_STOP if self.mode.running else STOP
+
+
 class Lines:
     """Both lines of a board that nobody simulates, and a link to them; ``sense`` by a name."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, board: LineBoard | None = None) -> None:
         self.drive, self.sense = Terminal(), Terminal()
         self.name = folder / "sense"
         self.listener = Listener()
         self.session = Session(
-            LineBoard(),
+            board or LineBoard(),
             SessionSettings(
                 limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
             ),
@@ -48,7 +58,7 @@ class Lines:
             self.session,
             partial(Several, self.openers, retry_s=0.01),
             "two lines",
-            last_words=(STOP, STOP),
+            guard=True,
             reconnect_interval_s=0.02,
             deliver=self.listener.deliver,
             report=self.listener.report,
@@ -152,3 +162,17 @@ def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
     with pytest.raises(CommandRefused, match="the line 'drive' is missing"):
         lines.command()
     assert missing.args[0] in str(lines.listener.reports)
+
+
+def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> None:
+    """It changes with what the board says."""
+    with closing(Lines(tmp_path, MoodyBoard())) as lines:
+        lines.connect()
+        lines.link.start()
+        lines.drive.read_until(STOPS)
+        keeper = lines.link._keeper
+        assert keeper is not None
+        assert keeper.last_words == (STOP, STOP)
+        lines.say_that_it_stands()
+        lines.drive.read_until(joined(OTHER_STOP))
+        assert keeper.last_words == (OTHER_STOP, OTHER_STOP)

@@ -148,8 +148,16 @@ class Board(Protocol):
         return NO_PACKETS
 
     def stop(self) -> Packets:
-        """Stand still: what a guard can say without knowing the board."""
+        """Stand still."""
 
     def emergency_stop(self) -> Packets:
         """The board's own emergency stop, and nothing else."""
         return NO_PACKETS
+
+    def last_words(self) -> tuple[Packets, Packets]:
+        """What stops it now if this process cannot: as Stop, and as the emergency stop.
+
+        Asked after each input and before each output, for a board where they follow its state.
+        """
+        stop = self.stop()
+        return stop, self.emergency_stop() + stop

@@ -236,7 +236,7 @@ class ModeManager:
     def _give_up(self, now: float) -> None:
         mode = self._board.mode
         if mode is Mode.UNKNOWN:
-            reason = "nothing was understood from the board: check its power, cable and baudrate"
+            reason = f"nothing was understood from the board: check {self._board.traits.to_check}"
         elif mode is Mode.PAUSED:
             reason = "the board still says that it is paused: does the cable carry our bytes to it?"
         else:

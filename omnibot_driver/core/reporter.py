@@ -93,7 +93,9 @@ class Reporter:
         """Nothing was understood for so long, which is no wonder while a line is missing."""
         if self.missing:
             return
-        self.notify([why_silent(silence_s, bytes_came=bytes_came)])
+        self.notify(
+            [why_silent(silence_s, bytes_came=bytes_came, baudrate=self._board.traits.baudrate)]
+        )
         if bytes_came and (advice := self._board.advice):
             self.notify(self._notices.once(advice))
 

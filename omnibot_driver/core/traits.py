@@ -20,6 +20,7 @@ class Traits:
     ``silence_s``: after it a board that says nothing is not known to be there; ``own_odometry``:
     OdometryReadings say where the robot is, and displacements only whether it obeys;
     ``stands_after_s``: a robot whose displacements show no motion for so long stands;
+    ``baudrate``: whether the speed of its line is to be set;
     ``unproved_s``: how long Stop is repeated at most while that is not seen; ``slack_mps``,
     ``slack_radps``: how far its displacements, or its wheels when they speed up, may be off what is
     commanded on top of what any robot may.
@@ -35,6 +36,7 @@ class Traits:
     own_odometry: bool = False
     stands_after_s: float = 0.1
     unproved_s: float = 5.0
+    baudrate: bool = True
     slack_mps: float = 0.0
     slack_radps: float = 0.0
 
@@ -42,3 +44,8 @@ class Traits:
     def imu(self) -> bool:
         """Whether it sends ImuReadings."""
         return self.imu_period_s is not None
+
+    @property
+    def to_check(self) -> str:
+        """What may be wrong where nothing is understood."""
+        return "its power, cable and baudrate" if self.baudrate else "its power and cable"

@@ -40,6 +40,7 @@ def _takes_twists(traits: Traits) -> bool:
 
 
 NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
+    "baudrate": lambda traits: traits.baudrate,
     "auto_start": lambda traits: Request.START in traits.requests,
     "enable_stamped_cmd_vel": _takes_twists,
     "max_linear_speed": _takes_twists,

@@ -41,6 +41,8 @@ PSEUDO_TERMINALS: Final = range(136, 144)
 class SerialPort:
     """A ``Transport`` of one channel of bytes: an open port, exclusively ours.
 
+    ``parameter``: where a user says which port.
+
     Linux raises DTR and RTS when the first program opens a port. Closing leaves them raised, so
     that a board that is wired to them restarts once after plugging in at the most.
     """
@@ -48,7 +50,7 @@ class SerialPort:
     ends_with_us = False
     missing = NONE_MISSING
 
-    def __init__(self, url: str, baudrate: int) -> None:
+    def __init__(self, url: str, baudrate: int, parameter: str = "port") -> None:
         self._url = url
         self._is_terminal = False
         self._peer: socket.socket | None = None
@@ -66,12 +68,12 @@ class SerialPort:
         except LinkError:
             raise
         except Exception as error:  # its URL handlers raise whatever they stumble over
-            raise LinkError(_explain(url, error)) from error
+            raise LinkError(_explain(url, parameter, error)) from error
         try:
             self._settle_in()
         except (OSError, termios.error) as error:
             self.close()
-            raise LinkError(_explain(url, error)) from error
+            raise LinkError(_explain(url, parameter, error)) from error
 
     @property
     def descriptors(self) -> tuple[int, ...] | None:
@@ -199,23 +201,23 @@ def _write_whole(descriptor: int, data: bytes) -> None:
             raise TimeoutError(f"it takes no more bytes for {WRITE_TIMEOUT_S:g} s")
 
 
-def _explain(url: str, error: Exception) -> str:
+def _explain(url: str, parameter: str, error: Exception) -> str:
     """What is wrong with this port, and what to do."""
     code = error.errno if isinstance(error, OSError) else None
     # pyserial words some errors anew without their number; where it stumbled is in the context.
     misread = TypeError | ValueError | LookupError | re.error
     if isinstance(error, misread) or isinstance(error.__context__, misread):
         return (
-            f"port '{url}' is not understood: give a device like /dev/ttyUSB0"
+            f"{parameter} '{url}' is not understood: give a device like /dev/ttyUSB0"
             " or a pyserial URL like socket://host:port, or sim:// for a simulated board"
         )
     no_terminal = isinstance(error, termios.error) or isinstance(error.__context__, termios.error)
     if no_terminal or code == errno.EISDIR:
-        return f"{url} is no serial port: `ls /dev/serial/by-id/` shows what is; set `port`"
+        return f"{url} is no serial port: `ls /dev/serial/by-id/` shows what is; set `{parameter}`"
     if code == errno.ENOENT:
         return (
             f"{url} does not exist: plug the board in, look it up with `ls /dev/serial/by-id/`"
-            " and set the parameter `port`; without a robot try port:=sim://"
+            f" and set the parameter `{parameter}`; without a robot try port:=sim://"
         )
     if code in (errno.EACCES, errno.EPERM):
         return (
@@ -232,7 +234,7 @@ def _explain(url: str, error: Exception) -> str:
     reason = getattr(source, "strerror", None) or source
     if isinstance(source, ConnectionRefusedError):
         return f"cannot open {url}: {reason}: is the server running, and is that its port?"
-    return f"cannot open {url}: {reason}; check the parameter `port`"
+    return f"cannot open {url}: {reason}; check the parameter `{parameter}`"
 
 
 def _owner(path: str) -> str:

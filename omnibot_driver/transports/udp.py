@@ -141,7 +141,8 @@ class UdpPorts:
                 return
 
     def _lost(self, channel: int, error: OSError) -> LinkError:
-        place = f"{SCHEME}{self._host}:{self._port + channel}"
+        host = f"[{self._host}]" if ":" in self._host else self._host
+        place = f"{SCHEME}{host}:{self._port + channel}"
         return LinkError(f"lost {place}: {error.strerror or error}; check the network")
 
 

@@ -40,6 +40,7 @@ class LineBoard(Board):
         wheels=("left", "right"),
         unheard_s=1.0,
         silence_s=2.0,
+        baudrate=False,
     )
     settings: Any = None
     mode = Mode.UNKNOWN
@@ -86,7 +87,6 @@ PARAMETERS = table(
     "line_board",
     LineBoard.traits,
     own={"The toy": (Parameter("sense_port", "/dev/ttyACM1", "", "It tells.", fixed=True),)},
-    without=("baudrate",),
 )
 
 
@@ -103,8 +103,8 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Transport]:
-    paths = values["port"], values["sense_port"]
-    return partial(Several, [partial(SerialPort, path, 115200) for path in paths])
+    names = "port", "sense_port"
+    return partial(Several, [partial(SerialPort, values[name], 115200, name) for name in names])
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:

@@ -87,6 +87,7 @@ class RequestBoard(Board):
         requests=frozenset(),
         unheard_s=1.0,
         silence_s=1.5,
+        baudrate=False,
     )
     settings: Any = None
     mode = Mode.UNKNOWN
@@ -141,7 +142,6 @@ SIMULATOR = "toys.request_robot"
 PARAMETERS = table(
     "request_board",
     RequestBoard.traits,
-    without=("baudrate",),
     changed={"port": {"default": "udp://127.0.0.1:5000"}},
 )
 

@@ -2,11 +2,14 @@
 
 """Datagrams on the loopback: a packet each way is one datagram of its channel."""
 
+import contextlib
 import os
+import re
 import socket
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -136,6 +139,14 @@ def test_a_url_that_means_no_place_is_refused(url: str) -> None:
     """With the form that it must have; the stop port is one higher."""
     with pytest.raises(LinkError, match=r"give udp://HOST:PORT"):
         UdpPorts(url, 2)
+
+
+@pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="no IPv6 here")
+def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
+    """IPv6 stands in brackets; the second channel is one port higher."""
+    lost = pytest.raises(LinkError, match=re.escape("lost udp://[::1]:5001: "))
+    with contextlib.closing(UdpPorts("udp://[::1]:5000", 2)) as transport, lost:
+        transport.write(((1, bytes(100_000)),))
 
 
 @pytest.mark.parametrize("name", ["no-such-host.invalid", "robot..local", 64 * "a"])

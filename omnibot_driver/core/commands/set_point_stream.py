@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Final, Protocol
 
 from omnibot_driver.core.commands.actuator import Wanted
-from omnibot_driver.core.commands.orders import EMERGENCY_STOP, STOP, EmergencyStop, Order, Stop
+from omnibot_driver.core.commands.orders import EMERGENCY_STOP, EmergencyStop, Order, Stop
 from omnibot_driver.core.commands.set_points import Setpoint
 from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -27,7 +27,13 @@ STOP_RATE_HZ: Final = 20.0
 
 
 class Encoder(Protocol):
-    """A board's frames."""
+    """A board's frames, as its settings are now."""
+
+    def stop(self) -> Packets:
+        """Stand still."""
+
+    def emergency_stop(self) -> Packets:
+        """The board's own emergency stop, and nothing else."""
 
     def encode(self, order: Order) -> Packets:
         """The frames that say it. Raises CommandRefused where none can."""
@@ -53,12 +59,11 @@ class SetpointStream:
         self.rate_hz = rate_hz
         self.commanded: BodyTwist | None = None
         self._encoder, self._proof = encoder, proof
-        self._stop, self._estop = encoder.encode(STOP), encoder.encode(EMERGENCY_STOP)
         self.connect()
 
     def is_zero(self, order: Order) -> bool:
         """By its frames, which may round to Stop."""
-        return self._encoder.encode(order) == self._stop
+        return self._encoder.encode(order) == self._encoder.stop()
 
     def connect(self) -> None:
         """Nothing has been said."""
@@ -89,7 +94,7 @@ class SetpointStream:
         if self._heard is not None:
             self._heard(packets, now)
         first = dict(reversed(packets))
-        if all(first.get(channel, b"").startswith(stop) for channel, stop in self._stop):
+        if all(first.get(channel, b"").startswith(stop) for channel, stop in self._encoder.stop()):
             self._note_stop(now)
             if self._standing is not EMERGENCY_STOP:
                 self._urgent = False
@@ -132,7 +137,8 @@ class SetpointStream:
         motion = self._motion
         if self._standing is EMERGENCY_STOP:
             self._note_stop(now)
-            return (self._estop + self._stop) * (2 if self._urgent else 1)
+            both = self._encoder.emergency_stop() + self._encoder.stop()
+            return both * (2 if self._urgent else 1)
         if motion is not None and not self._switching:
             if motion.is_zero:
                 self._note_stop(now)
@@ -141,7 +147,7 @@ class SetpointStream:
                 self._stop_at = -math.inf
             return self._encoder.encode(motion.order(now))
         self._note_stop(now)
-        return self._stop
+        return self._encoder.stop()
 
     def _note_stop(self, now: float) -> None:
         self._stop_at = now

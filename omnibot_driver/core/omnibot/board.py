@@ -15,7 +15,12 @@ from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.imu.scale import ACCEL_COUNTS_PER_G, gravity_advice
 from omnibot_driver.core.omnibot import frames
-from omnibot_driver.core.omnibot.command_encoder import EMERGENCY_STOP, STOP, CommandEncoder
+from omnibot_driver.core.omnibot.command_encoder import (
+    EMERGENCY_STOP_PACKETS,
+    STOP,
+    STOP_PACKETS,
+    CommandEncoder,
+)
 from omnibot_driver.core.omnibot.decoder import DecoderStatistics, FrameDecoder
 from omnibot_driver.core.omnibot.modes import Happening
 from omnibot_driver.core.omnibot.outbound import transmission
@@ -36,6 +41,8 @@ TRAITS: Final = Traits(
     unheard_s=0.3,  # it may be restarting
     silence_s=1.5,  # it says something at least once a second
 )
+
+LAST_WORDS: Final = (STOP_PACKETS, EMERGENCY_STOP_PACKETS + STOP_PACKETS)
 
 
 class OmniBot:
@@ -175,8 +182,12 @@ class OmniBot:
 
     def stop(self) -> Packets:
         """The manual's Stop, which stands still whatever the board's control switch says."""
-        return packed(STOP)
+        return self._encoder.stop()
 
     def emergency_stop(self) -> Packets:
         """The manual's E-stop."""
-        return packed(EMERGENCY_STOP)
+        return self._encoder.emergency_stop()
+
+    def last_words(self) -> tuple[Packets, Packets]:
+        """Always the same."""
+        return LAST_WORDS

@@ -24,11 +24,13 @@ from omnibot_driver.core.omnibot.outbound import (
     transmission,
 )
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
-from omnibot_driver.core.packets import Packets
+from omnibot_driver.core.packets import Packets, packed
 from omnibot_driver.core.readings import Vector3
 
 STOP: Final = transmission(frames.encode(frames.STOP))
 EMERGENCY_STOP: Final = transmission(frames.encode(frames.EMERGENCY_STOP))
+STOP_PACKETS: Final = packed(STOP)
+EMERGENCY_STOP_PACKETS: Final = packed(EMERGENCY_STOP)
 
 
 class CommandEncoder:
@@ -63,6 +65,14 @@ class CommandEncoder:
         packets = ((0, data),)
         self._last = order, packets
         return packets
+
+    def stop(self) -> Packets:
+        """The manual's Stop, which stands still whatever the board's control switch says."""
+        return STOP_PACKETS
+
+    def emergency_stop(self) -> Packets:
+        """The manual's E-stop."""
+        return EMERGENCY_STOP_PACKETS
 
     def velocity(self, twist: BodyTwist) -> bytes:
         """Base vector control; Stop when it rounds to nothing."""

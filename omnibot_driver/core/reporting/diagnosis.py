@@ -68,9 +68,13 @@ class Refusals:
 
 
 class Diagnosis:
-    """Asked about once a second; remembers what it needs for rates and for what is recent."""
+    """Asked about once a second; remembers what it needs for rates and for what is recent.
 
-    def __init__(self) -> None:
+    ``to_check``: what may be wrong with a board of which nothing is understood.
+    """
+
+    def __init__(self, to_check: str) -> None:
+        self._to_check = to_check
         self._counts: dict[str, tuple[int, float]] = {}
         self._window: deque[tuple[float, SessionFigures]] = deque()
         self._skewed_since = math.inf
@@ -83,7 +87,7 @@ class Diagnosis:
         self._remember(session, now)
         statuses = [
             self._link(link, now),
-            self._board(session, now),
+            self._board(link, session, now),
             self._stream(link, session, now),
             self._time(session, now),
             self._commands(session, refusals, now),
@@ -128,13 +132,13 @@ class Diagnosis:
         }
         return Status("Link", level, message, values)
 
-    def _board(self, session: SessionFigures, now: float) -> Status:
+    def _board(self, link: LinkFigures, session: SessionFigures, now: float) -> Status:
         restarts = session.tally.restarts
         level, message = {
             "disconnected": (Level.STALE, "not known while the port is closed"),
             "connecting": (
                 Level.ERROR,
-                "nothing is understood from the board: check its power, cable and baudrate",
+                f"nothing is understood from the board: check {self._to_check}",
             ),
             "paused": (Level.WARN, "paused: the service ~/start makes it run"),
             "imu_only": (
@@ -143,6 +147,8 @@ class Diagnosis:
             ),
             "nominal": (Level.OK, "running"),
         }[session.state]
+        if session.state == "connecting" and link.trouble:
+            level, message = Level.STALE, "not known while one of its lines is missing"
         if self._grew("restarts", restarts, now) and level is Level.OK:
             level = Level.WARN
             message = "the board has restarted: unless you reset it, check its power supply"

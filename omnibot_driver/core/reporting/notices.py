@@ -106,12 +106,13 @@ class Notices:
         return [sentence] if sentence and not before else []
 
 
-def why_silent(silence_s: float, *, bytes_came: bool) -> str:
+def why_silent(silence_s: float, *, bytes_came: bool, baudrate: bool) -> str:
     """Why nothing was understood for so long, and what to do."""
     if bytes_came:
         return (
-            f"nothing that comes in makes sense for {silence_s:g} s: check the parameter"
-            " `baudrate`, the cable, and that it is this board"
+            f"nothing that comes in makes sense for {silence_s:g} s: check"
+            f"{' the parameter `baudrate`,' if baudrate else ''} the cable, and that it is this"
+            " board"
         )
     return (
         f"nothing comes from the board for {silence_s:g} s: check its power and the cable,"

@@ -31,6 +31,12 @@ TIMEOUT_S = 0.5
 class Words:
     """An encoder of orders that are their own bytes."""
 
+    def stop(self) -> Packets:
+        return packed(STOP)
+
+    def emergency_stop(self) -> Packets:
+        return packed(ESTOP)
+
     def encode(self, order: Order | bytes) -> Packets:
         if isinstance(order, bytes):
             return packed(order)

@@ -26,7 +26,7 @@ class Robot:
     """A healthy one, in figures; ``seconds`` lets time pass, with a verdict every second."""
 
     def __init__(self) -> None:
-        self.diagnosis = Diagnosis()
+        self.diagnosis = Diagnosis("its power, cable and baudrate")
         self.now = 1000.0
         self.link = LinkFigures(port="/dev/ttyUSB0", opened=1)
         self.refusals = Refusals()
@@ -134,6 +134,17 @@ def test_each_fault_alone_raises_its_own_status(
     robot.seconds(5)
     assert robot.troubles == {name: level}
     assert said in robot.statuses[name].message
+
+
+def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
+    """The link says what is missing."""
+    robot = Robot()
+    robot.connect(trouble="the line 'front' is missing: unplugged")
+    robot.set(state="connecting")
+    robot.seconds(1)
+    assert robot.troubles["Link"] is Level.ERROR
+    assert robot.statuses["Board"].level is Level.STALE
+    assert "one of its lines is missing" in robot.statuses["Board"].message
 
 
 HAPPENINGS = [FAULTS[number] for number in (0, 3, 4, 5, 6, 7, 13, 14)]
@@ -248,7 +259,9 @@ def test_what_a_board_does_not_send_has_no_figures() -> None:
     rates_hz: dict[RateName, float] = {"Odometry": 2.5}
     robot.set(board=BoardFigures(rates_hz=rates_hz))
     robot.count(displacements=0)
-    judged = Diagnosis().judge(robot.link, robot.figures, robot.refusals, robot.now)
+    judged = Diagnosis("its power, cable and baudrate").judge(
+        robot.link, robot.figures, robot.refusals, robot.now
+    )
     assert [status.name for status in judged] == NAMES[:-1]
     stream = next(status.values for status in judged if status.name == "Stream")
     assert {"Odometry rate (Hz)", "Odometry frames lost", "Sequence gaps"} <= set(stream)
