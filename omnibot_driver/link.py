@@ -33,11 +33,10 @@ from omnibot_driver.transports import LinesChanged, Transport
 JOIN_TIMEOUT_S: Final = 3.0
 """Longer than a guard takes to repeat Stop."""
 STANDS_WITHIN_S: Final = 0.5
-"""So long an end waits until the robot is seen to stand; then the guard repeats Stop."""
+"""So long an end waits until the robot is seen to stand, longer where a proof takes longer; then
+the guard repeats Stop."""
 UNGUARDED_S: Final = 1.5
 """So long where no guard does."""
-PROOFS: Final = 2.0
-"""An end waits for at least so many times what a proof takes."""
 SILENCE_S: Final = 0.25
 """So long it then waits, without a word, to see that the last Stop was no damaged one."""
 COUNT_EVERY_S: Final = 1.0
@@ -222,7 +221,7 @@ class Link:
         self._session.leave(now := time.monotonic())
         self._settle()
         alone = self._port is not None and self._keeper is None and not self._port.ends_with_us
-        proof_s = PROOFS * self._session.board.traits.stands_after_s
+        proof_s = self._session.proof_takes_s
         self._await_standstill(now + max(UNGUARDED_S if alone else STANDS_WITHIN_S, proof_s))
         if self._session.stands and self._session.fall_silent(now := time.monotonic()):
             self._await_standstill(now + max(SILENCE_S, proof_s))

@@ -19,6 +19,7 @@ from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.omnibot import OmniBot
 from omnibot_driver.core.requests import Request
 from omnibot_driver.parameters import Parameter, session_settings, table
+from omnibot_driver.parameters.table import DISPENSABLE
 from omnibot_driver.simulator.__main__ import boards as simulated_boards
 from omnibot_driver.simulator.common import options
 
@@ -140,6 +141,26 @@ def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
     assert values["dock_distance"] == 2.0
     with pytest.raises(ParameterError, match="too far"):
         own.check_all({"dock_distance": 3.0})
+
+
+@pytest.mark.parametrize("name", ["guard", "port", "on_exit", "auto_gyro_bias", "max_linear_speed"])
+def test_a_row_that_the_driver_reads_cannot_be_dropped(name: str) -> None:
+    """It says so when the profile is imported, and what may be dropped."""
+    with pytest.raises(ValueError, match=f"few must not be without {name}: .* without axis_signs"):
+        table("few", FEW, without=("baudrate", name))
+
+
+def test_what_may_be_dropped_is_asked_for_by_a_default() -> None:
+    """The driver takes it for granted nowhere but in the boards' own profiles; tools ask first."""
+    indexed = {
+        node.slice.value
+        for path in PACKAGE.rglob("*.py")
+        if path.relative_to(PACKAGE).parts[0] not in ("boards", "tools")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant)
+    }
+    assert "guard" in indexed
+    assert not indexed & DISPENSABLE
 
 
 def test_the_core_takes_a_board_that_lacks_most_parameters() -> None:

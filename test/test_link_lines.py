@@ -9,9 +9,10 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from listener import Listener
+from listener import PATIENCE_S, Listener
 from terminal import Terminal
 from toys.line_board import STOP, LineBoard
+from toys.line_robot import LineRobot
 
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
@@ -21,6 +22,7 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySet
 from omnibot_driver.core.packets import Packets, joined, packed
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link
+from omnibot_driver.simulator.common.serving import ServedBoard
 from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
 
@@ -38,6 +40,34 @@ class MoodyBoard(LineBoard):
         return OTHER_STOP if self.mode.running else STOP
 
 
+def session_of(board: LineBoard) -> Session:
+    settings = SessionSettings(
+        limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
+    )
+    return Session(board, settings, run=False)
+
+
+def link_of(session: Session, openers: list[partial[SerialPort]], listener: Listener) -> Link:
+    return Link(
+        session,
+        partial(Several, openers, retry_s=0.01),
+        "two lines",
+        guard=True,
+        reconnect_interval_s=0.02,
+        deliver=listener.deliver,
+        report=listener.report,
+        failed=listener.failed,
+    )
+
+
+def command(link: Link) -> None:
+    link.command(
+        lambda session, twist, now: session.command_twist(twist, now),
+        BodyTwist(0.2, 0.0, 0.0),
+        (),
+    )
+
+
 class Lines:
     """Both lines of a board that nobody simulates, and a link to them; ``sense`` by a name."""
 
@@ -45,25 +75,10 @@ class Lines:
         self.drive, self.sense = Terminal(), Terminal()
         self.name = folder / "sense"
         self.listener = Listener()
-        self.session = Session(
-            board or LineBoard(),
-            SessionSettings(
-                limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
-            ),
-            run=False,
-        )
+        self.session = session_of(board or LineBoard())
         paths = (self.drive.path, str(self.name))
         self.openers = [partial(SerialPort, path, 115200) for path in paths]
-        self.link = Link(
-            self.session,
-            partial(Several, self.openers, retry_s=0.01),
-            "two lines",
-            guard=True,
-            reconnect_interval_s=0.02,
-            deliver=self.listener.deliver,
-            report=self.listener.report,
-            failed=self.listener.failed,
-        )
+        self.link = link_of(self.session, self.openers, self.listener)
 
     def connect(self) -> None:
         self.name.symlink_to(self.sense.path)
@@ -73,13 +88,6 @@ class Lines:
         self.listener.wait_for(lambda: self.listener.reports[-1:] == [None])
         os.write(self.sense.far, b"d 0 0\n")
         self.come_to_state("nominal")
-
-    def command(self) -> None:
-        self.link.command(
-            lambda session, twist, now: session.command_twist(twist, now),
-            BodyTwist(0.2, 0.0, 0.0),
-            (),
-        )
 
     @property
     def estimates(self) -> list[OdometryEstimate]:
@@ -112,7 +120,7 @@ def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missin
     lines.drive.read_until(5 * STOPS)
     lines.come_to_state("connecting")
     with pytest.raises(CommandRefused, match="the line 'sense' is missing"):
-        lines.command()
+        command(lines.link)
     assert lines.link.blocked
     (report,) = lines.listener.reports
     assert str(report).startswith(f"the line 'sense' is missing: {lines.name} does not exist")
@@ -127,7 +135,7 @@ def test_a_line_that_comes_late_completes_the_board(lines: Lines) -> None:
     lines.drive.read_until(STOPS)
     lines.connect()
     lines.say_that_it_stands()
-    lines.command()
+    command(lines.link)
     lines.drive.read_until(b"v 200 200\n")
 
 
@@ -138,7 +146,7 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
     lines.connect()
     lines.link.start()
     lines.say_that_it_stands()
-    lines.command()
+    command(lines.link)
     lines.drive.read_until(b"v 200 200\n")
     lines.name.unlink()
     lines.sense.close()
@@ -160,7 +168,7 @@ def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
     lines.listener.wait_for(lambda: lines.estimates)
     assert lines.session.state == "connecting"
     with pytest.raises(CommandRefused, match="the line 'drive' is missing"):
-        lines.command()
+        command(lines.link)
     assert missing.args[0] in str(lines.listener.reports)
 
 
@@ -176,3 +184,17 @@ def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> No
         lines.say_that_it_stands()
         lines.drive.read_until(joined(OTHER_STOP))
         assert keeper.last_words == (OTHER_STOP, OTHER_STOP)
+
+
+def test_an_end_waits_until_slow_odometry_shows_that_the_robot_stands() -> None:
+    """It comes each 0.4 s: a proof takes longer than at a faster board."""
+    with ServedBoard(LineRobot()) as robot:
+        lines = [partial(SerialPort, path, 115200) for path in robot.addresses]
+        listener, ours = Listener(), session_of(LineBoard())
+        link = link_of(ours, lines, listener)
+        link.start()
+        listener.wait_for(lambda: ours.state == "nominal")
+        command(link)
+        assert robot.wait_for(lambda board: not board.stands, PATIENCE_S)
+        assert link.close("stop")
+        assert link.stands

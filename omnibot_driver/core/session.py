@@ -293,6 +293,11 @@ class Session:
         """The board has shown that the robot stands, and no motion was commanded since."""
         return self._commands.proof.proved
 
+    @property
+    def proof_takes_s(self) -> float:
+        """How long to wait until the robot is seen to stand, from Stop on."""
+        return self._commands.proof.takes_s
+
     def shutdown_sequence(self, on_exit: OnExit, now: float) -> Packets:
         """The last packets to write before the port is closed."""
         proved = self._commands.quiet and self.stands

@@ -57,6 +57,22 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "angular_velocity_stddev": _has_imu,
 }
 """What a board must be able to do for a common parameter to mean anything."""
+DISPENSABLE: Final = frozenset(
+    {
+        "baudrate",
+        "axis_signs",
+        "odom_linear_scale",
+        "odom_angular_scale",
+        "odom_wheel_drift",
+        "odom_wheel_scale",
+        "odom_wheel_slip",
+        "odom_gap_acceleration",
+        "odom_gap_angular_acceleration",
+        "twist_linear_stddev",
+        "twist_angular_stddev",
+    }
+)
+"""Common parameters that may mean nothing to a board; the driver reads all others on each."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
 """What a board may be left in when the driver ends, besides stopped: what it takes."""
 
@@ -109,7 +125,8 @@ def table(
 ) -> Table:
     """The table of a board that can do this.
 
-    ``own``: rows of its own, by section; ``without``: common ones that mean nothing to it;
+    ``own``: rows of its own, by section; ``without``: those of ``DISPENSABLE`` that mean nothing to
+    it; what its traits have no use for is left out anyway;
     ``changed``: by name, fields of common ones that differ (``{"port": {"default": "udp://"}}``);
     ``checks``: what must hold between its values, besides what must on every board.
     """
@@ -125,6 +142,11 @@ def table(
     common = {row.name for rows in COMMON.values() for row in rows}
     if unknown := {*without, *changes} - common:
         raise ValueError(f"these are no common parameters: {', '.join(sorted(unknown))}")
+    if kept := sorted({*without} - DISPENSABLE):
+        raise ValueError(
+            f"the board {board} must not be without {', '.join(kept)}: the driver reads them on"
+            f" every board that its traits fit; it may be without {', '.join(sorted(DISPENSABLE))}"
+        )
     sections = {
         title: tuple(
             replace(row, **changes.get(row.name, {}))

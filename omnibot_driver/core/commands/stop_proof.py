@@ -21,6 +21,10 @@ SLACK_S: Final = 1e-6
 AT_LEAST: Final = 2
 """Displacements, where one is as long: one alone may be damaged, or be from before the wheels
 turned."""
+PROOFS: Final = 2.0
+"""Wait for so many times what has to be seen."""
+RAREST_S: Final = 1.0
+"""A longer displacement is that of a gap."""
 UNDER_WAY_S: Final = 0.05
 """A displacement that arrives so soon after Stop went out may have ended before Stop arrived."""
 
@@ -34,6 +38,7 @@ class StopProof:
 
     def __init__(self, still_s: float = STILL_S) -> None:
         self._needed_s = still_s - SLACK_S
+        self._period_s = 0.0
         self.owed = False
         self.begin()
 
@@ -56,8 +61,14 @@ class StopProof:
         """The board says that it is paused: its motors are off."""
         self.proved, self.owed = True, False
 
+    @property
+    def takes_s(self) -> float:
+        """How long to wait for a proof, with displacements as rare as they are."""
+        return max(PROOFS * self._needed_s, UNDER_WAY_S + (AT_LEAST + 1) * self._period_s)
+
     def look(self, reading: DisplacementReading, now: float) -> None:
         """A displacement arrived."""
+        self._period_s = min(reading.duration_s or 0.0, RAREST_S)
         if not reading.duration_s or not reading.measured or now < self._stopped_at + UNDER_WAY_S:
             return
         self.measured = True

@@ -46,6 +46,20 @@ def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof)
     assert shown(proof, 0.0, 0.0, 0.0)
 
 
+def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProof) -> None:
+    """Where they come each 0.4 s, the first one after Stop may still be one of motion."""
+    assert proof.takes_s < 0.3
+    rare = DisplacementReading(0.04, 0.0, 0.0, frame="body", duration_s=0.4, lost=0)
+    proof.look(rare, 10.3)
+    still = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.4, lost=0)
+    proof.look(still, 10.7)
+    proof.look(still, 11.1)
+    assert proof.proved
+    assert 1.1 < proof.takes_s < 1.3
+    proof.look(DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=60.0, lost=0), 71.1)
+    assert proof.takes_s < 4.0  # that was a gap
+
+
 def test_one_displacement_alone_is_no_proof_however_long_it_is(proof: StopProof) -> None:
     """Boards with a `delta_period` of 0.1 s send such."""
     long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
