@@ -44,13 +44,17 @@ class BoardFigures:
     """What a board's translator counts, since the driver began.
 
     ``rates_hz``: how often each kind of reading should come that the board sends; ``faults``: how
-    often the framing was lost, with ``discarded_bytes``; ``saturated``: commands that did not fit.
+    often the framing was lost, with ``discarded_bytes``; ``saturated``: commands that did not fit;
+    ``odom_hz``: how often ``odom`` goes out, where that is not with each odometry reading;
+    ``own``: what only this board has to show (its version, voltage, progress), by names for people.
     """
 
     rates_hz: Mapping[RateName, float] = field(default_factory=dict)
     faults: int = 0
     discarded_bytes: int = 0
     saturated: int = 0
+    odom_hz: float | None = None
+    own: Mapping[str, str] = field(default_factory=dict)
 
 
 class Board(Protocol):

@@ -122,6 +122,25 @@ def test_a_wrong_rate_is_no_gap_but_a_wrong_rate(drive: Drive) -> None:
     assert found == ["imu/data_raw comes at 50.00 Hz; it should be 100."]
 
 
+@pytest.mark.parametrize(
+    ("values", "wanted"),
+    [
+        ({"Odometry rate (Hz)": "24.9 of 25"}, "it should be 25"),
+        ({"Odometry rate (Hz)": "4.9 of 5", "Published odometry (Hz)": "20"}, "should be 20"),
+        ({"Odometry rate (Hz)": "nan of nonsense"}, "it should be 25"),
+    ],
+)
+def test_the_rate_that_a_stream_should_have_is_the_one_that_its_driver_says(
+    values: dict[str, str], wanted: str
+) -> None:
+    """Boards differ, and so do their settings."""
+    drive = Drive()
+    drive.statuses.append((1.5, "omnibot_driver: Stream", 0, "complete", values))
+    (found,) = [one for one in judge(drive.log()) if one.text.startswith("odom comes at")]
+    assert wanted in found.text
+    assert (found.level is Level.WARN) is ("20" in wanted)
+
+
 def test_stamps_that_go_back_are_wrong(drive: Drive) -> None:
     """Time does not."""
     drive.odom.stamp_s[100:] -= 0.2

@@ -207,6 +207,7 @@ class LoisEcu:
             faults=self._statistics.faults + self._decoder.group_statistics.damaged_groups,
             discarded_bytes=self._statistics.discarded_bytes,
             saturated=self._saturated,
+            odom_hz=self._settings.odom_rate_hz,
         )
 
     @property

@@ -31,6 +31,8 @@ SKEW_KNOWN_S: Final = 75.0
 BUSY_SHARE: Final = 0.1
 """Of the time that the reader waits for the processor."""
 
+PUBLISHED_ODOMETRY: Final = "Published odometry (Hz)"
+"""As the board's settings say; the rate of its readings is another one."""
 RUNNING: Final = ("nominal", "imu_only")
 OF_KIND: Final[Mapping[RateName, tuple[str, ...]]] = {
     "IMU": ("IMU frames lost", "IMU readings refused"),
@@ -152,7 +154,8 @@ class Diagnosis:
         if self._grew("restarts", restarts, now) and level is Level.OK:
             level = Level.WARN
             message = "the board has restarted: unless you reset it, check its power supply"
-        return Status("Board", level, message, {"Mode": session.state, "Restarts": str(restarts)})
+        values = {"Mode": session.state, "Restarts": str(restarts), **session.board.own}
+        return Status("Board", level, message, values)
 
     def _stream(self, link: LinkFigures, session: SessionFigures, now: float) -> Status:
         tally, refused = session.tally, session.refused
@@ -163,6 +166,7 @@ class Diagnosis:
         waiting = self._waiting_share(link, now)
         doubtful = self._grew("refused", readings_refused, now)
         rates, wanted = self._rates_hz(), session.board.rates_hz
+        odom_hz = session.board.odom_hz
         level, message = Level.OK, "complete"
         if session.state not in RUNNING:
             level, message = Level.STALE, "the board sends no measurements"
@@ -203,6 +207,7 @@ class Diagnosis:
                 f"{name} rate (Hz)": f"{rates[name] if rates else math.nan:.1f} of {want:g}"
                 for name, want in wanted.items()
             },
+            **({} if odom_hz is None else {PUBLISHED_ODOMETRY: f"{odom_hz:g}"}),
             "Framing faults": str(session.board.faults),
             "Bytes discarded": str(session.board.discarded_bytes),
             "IMU frames lost": str(tally.lost_imu),

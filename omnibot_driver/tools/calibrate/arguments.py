@@ -15,19 +15,26 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 NEEDS: Final = {
-    "commission": ("delta_frame", "the OmniBot's wheels and odometry"),
-    "imu": ("gyro_bias", "an IMU"),
-    "scale": ("linear_scale", "a unit of its own for commanded speeds"),
-    "geometry": ("base_radius", "wheels around its centre"),
-    "step": ("linear_scale", "a firmware whose control of a wheel it knows"),
+    "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
+    "imu": (("gyro_bias",), "an IMU"),
+    "scale": (
+        ("linear_scale", "odom_linear_scale"),
+        "a unit of its own for commanded speeds, or a scale of its odometry",
+    ),
+    "geometry": (
+        ("base_radius", "odom_linear_scale"),
+        "wheels around its centre, or a scale of its odometry",
+    ),
+    "step": (("linear_scale",), "a firmware whose control of a wheel it knows"),
 }
-"""By subcommand: a parameter that a driver has where this can be done, and what it stands for."""
+"""By subcommand: parameters one of which a driver has where this can be done, and what they stand
+for."""
 
 
 def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:
     """Raises ToolError where the board of the driver with these parameters lacks what is needed."""
-    parameter, thing = NEEDS[subcommand]
-    if parameter not in parameters:
+    wanted, thing = NEEDS[subcommand]
+    if not any(parameter in parameters for parameter in wanted):
         raise ToolError(
             f"calibrate {subcommand} needs {thing}, which the board {parameters['board']} has not"
         )
@@ -111,20 +118,15 @@ def _scale(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds", type=_positive, default=2.0, help="at each speed (default %(default)s)"
     )
+    _by_tape(parser.add_argument_group("where the board has no unit of its own for speeds"))
 
 
-def _geometry(parser: argparse.ArgumentParser) -> None:
+def _by_tape(parser: argparse._ActionsContainer) -> None:
     parser.add_argument(
         "--side", type=_positive, default=1.0, help="of lines and squares, m (default %(default)s)"
     )
     parser.add_argument(
         "--turns", type=_whole, default=3, help="on the spot, each way (default %(default)s)"
-    )
-    parser.add_argument(
-        "--speed", type=_positive, default=0.2, help="fastest, m/s (default %(default)s)"
-    )
-    parser.add_argument(
-        "--turning", type=_positive, default=0.5, help="fastest, rad/s (default %(default)s)"
     )
     parser.add_argument(
         "--tape",
@@ -137,6 +139,16 @@ def _geometry(parser: argparse.ArgumentParser) -> None:
         type=_positive,
         default=1.0,
         help="how exactly you read a heading, degrees (default %(default)s)",
+    )
+
+
+def _geometry(parser: argparse.ArgumentParser) -> None:
+    _by_tape(parser)
+    parser.add_argument(
+        "--speed", type=_positive, default=0.2, help="fastest, m/s (default %(default)s)"
+    )
+    parser.add_argument(
+        "--turning", type=_positive, default=0.5, help="fastest, rad/s (default %(default)s)"
     )
     parser.add_argument(
         "--without-squares", action="store_true", help="lines and turns only: faster, less certain"

@@ -12,6 +12,7 @@ import numpy as np
 
 from omnibot_driver import boards
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.tools.calibrate import odometry_scale
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.geometry_figure import draw
 from omnibot_driver.tools.calibrate.geometry_fit import Geometry, Reading, fit, rolled
@@ -43,6 +44,8 @@ class Drive:
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     """Raises ToolError."""
+    if "base_radius" not in robot.parameters:
+        return odometry_scale.run(robot, console, arguments)
     console.say(INTRODUCTION)
     drives = plan(arguments.side, arguments.turns, squares=not arguments.without_squares)
     console.confirm(

@@ -119,7 +119,7 @@ class Robot(Listener):
         ``obeys`` the last of these is what is to be found out. Where it is how fast or which way
         the robot moves, the driver's motion monitor must not stop it: ``monitored`` is false.
         """
-        if self.parameters["control_method"] != "velocity":
+        if self.parameters.get("control_method", "velocity") != "velocity":
             raise ToolError(
                 "this needs the board's switch on velocity control and `control_method: velocity`"
             )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from omnibot_driver.tools.calibrate import odometry_scale
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.motion import Bounds, stairs
 from omnibot_driver.tools.calibrate.rest import rest, still
@@ -31,6 +32,8 @@ UNLIKE: Final = 4.0
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     """Raises ToolError."""
     now = robot.parameters
+    if "linear_scale" not in now:
+        return odometry_scale.run(robot, console, arguments)
     scales = (now["linear_scale"], now["linear_scale"], now["angular_scale"])
     linear = min(arguments.speed, now["max_linear_speed"])
     turning = min(arguments.turning, now["max_angular_speed"])

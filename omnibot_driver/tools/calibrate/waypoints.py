@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""CommandPipeline by the odometry, from one pose to the next. Pure."""
+"""Driving by the odometry, from one pose to the next. Pure."""
 
 import math
 from collections.abc import Sequence
@@ -28,6 +28,31 @@ def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
         while number < len(places) and _arrived(pose, places[number]):
             number += 1
         return _towards(pose, places[number], speed, turning) if number < len(places) else None
+
+    return law
+
+
+def straight(way_m: float, speed: float) -> Law:
+    """So far ahead in x alone, as a base with two wheels can; ``speed`` in m/s."""
+
+    def law(_seconds: float, pose: Pose) -> Vector3 | None:
+        left_m = way_m - pose.x_m
+        if left_m < NEAR_M:
+            return None
+        return min(speed, math.sqrt(2 * BRAKING * left_m)), 0.0, 0.0
+
+    return law
+
+
+def turn(angle_rad: float, turning: float) -> Law:
+    """On the spot, to the left where it is positive; ``turning`` in rad/s."""
+    sign = math.copysign(1.0, angle_rad)
+
+    def law(_seconds: float, pose: Pose) -> Vector3 | None:
+        left_rad = sign * (angle_rad - pose.yaw_rad)
+        if left_rad < NEAR_RAD:
+            return None
+        return 0.0, 0.0, sign * min(turning, math.sqrt(2 * ANGULAR_BRAKING * left_rad))
 
     return law
 

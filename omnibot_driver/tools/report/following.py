@@ -39,15 +39,24 @@ class Pair:
 def twists(log: Log) -> Pair:
     """cmd_vel and the twist of odom, without what is not finite."""
     odom = _sampled(log.odom)
+    linear, angular = _scales(log)
+    scales = linear, linear, angular
     return Pair(
         "cmd_vel",
         ("vx", "vy", "yaw rate"),
         ("m/s", "m/s", "rad/s"),
         (1.0, 1.0, 0.143),
-        ("linear_scale", "linear_scale", "angular_scale"),
+        scales,
         log.cmd_vel.only(log.cmd_vel.finite),
         Series(odom.arrived_s, odom.stamp_s, odom.values[:, 3:]),
     )
+
+
+def _scales(log: Log) -> tuple[str, str]:
+    """What is to be set where speeds are off: a robot with two wheels has no unit of its own."""
+    if len(log.wheels) == 2:
+        return "odom_linear_scale", "odom_angular_scale"
+    return "linear_scale", "angular_scale"
 
 
 def pairs(log: Log) -> list[Pair]:
@@ -58,7 +67,7 @@ def pairs(log: Log) -> list[Pair]:
         tuple(map(wheel_name, log.wheels)),
         ("rad/s",) * count,
         (0.029,) * count,
-        ("linear_scale",) * count,
+        _scales(log)[:1] * count,
         log.wheel_cmd.only(log.wheel_cmd.finite),
         _sampled(log.joint_states),
     )

@@ -156,7 +156,8 @@ def spectra(log: Log) -> Figure:
                 )
         dress(axes, unit, title)
         axes.set_xlabel("frequency in Hz")
-        axes.set_xlim(0.0, sensing.RATE_HZ / 2)
+        if len(imu) > 1:
+            axes.set_xlim(0.0, sensing.rate_hz(imu) / 2)
         legend_below(axes)
     return figure
 

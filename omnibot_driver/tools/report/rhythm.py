@@ -3,14 +3,15 @@
 """Timing of a stream: its rate, how even its stamps are, what is missing, how late it arrives."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from omnibot_driver.core.reporting.diagnosis import RUNNING
+from omnibot_driver.core.reporting.diagnosis import PUBLISHED_ODOMETRY, RUNNING
 from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import Array, Log, Series, Span
 
@@ -31,18 +32,43 @@ RECOVERY_S: Final = 0.75
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """What a topic promises. ``lost``: the driver's own counts of what it did not get of it."""
+    """What a topic promises. ``lost``: the driver's own counts of what it did not get of it;
+    ``rates``: its own words on how often it should come, the best first.
+    """
 
     name: str
     rate_hz: float
     running: tuple[str, ...]
     lost: tuple[str, ...]
+    rates: tuple[str, ...]
+
+    def promised(self, log: Log) -> "Stream":
+        """With the rate that the driver of this log last said that it should have."""
+        if not log.alone:
+            return self
+        for key in self.rates:
+            told = [status.values[key] for status in log.diagnostics if key in status.values]
+            with suppress(ValueError):
+                if told and (rate_hz := float(told[-1].rpartition(" of ")[2])) > 0.0:
+                    return replace(self, rate_hz=rate_hz)
+        return self
 
 
-IMU: Final = Stream("imu/data_raw", 100.0, RUNNING, ("IMU frames lost", "IMU readings refused"))
-ODOMETRY: Final = Stream(
-    "odom", 25.0, ("nominal",), ("Odometry frames lost", "Odometry readings refused")
+IMU: Final = Stream(
+    "imu/data_raw",
+    100.0,
+    RUNNING,
+    lost=("IMU frames lost", "IMU readings refused"),
+    rates=("IMU rate (Hz)",),
 )
+ODOMETRY: Final = Stream(
+    "odom",
+    25.0,
+    ("nominal",),
+    lost=("Odometry frames lost", "Odometry readings refused"),
+    rates=(PUBLISHED_ODOMETRY, "Odometry rate (Hz)"),
+)
+"""The rates are those of an OmniBot, for a log in which the driver says nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +94,7 @@ class FrameSchedule:
 
 def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
     """By stamps; what has none is left out."""
+    stream = stream.promised(log)
     stamped = series.only(np.isfinite(series.stamp_s))
     at_s, steps_s = stamped.stamp_s[:-1], np.diff(stamped.stamp_s)
     period_s = float(np.median(steps_s)) if len(steps_s) else 1.0 / stream.rate_hz
@@ -118,6 +145,7 @@ def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
 
 def judge(log: Log, series: Series, stream: Stream) -> Iterator[Finding]:
     """Rate, steps, gaps, arrival."""
+    stream = stream.promised(log)
     rhythm = measure(log, series, stream)
     unstamped = int(np.isnan(series.stamp_s).sum())
     if unstamped:

@@ -2,6 +2,7 @@
 
 """What the IMU tells of itself: gravity and bias at rest, turning and vibration in motion."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -35,7 +36,13 @@ STRONG_VIBRATION_MPS2: Final = 3.0
 VIBRATION_HZ: Final = 5.0
 """Below, it is driving that shows."""
 SEGMENT: Final = 256
-RATE_HZ: Final = 100.0
+
+
+def rate_hz(imu: Series) -> float:
+    """The usual one, by its stamps."""
+    if len(imu) < 2:
+        return math.nan
+    return float(np.round(1.0 / np.median(np.diff(imu.stamp_s)), 1))
 
 
 def at_rest(log: Log, imu: Series) -> Mask:
@@ -74,14 +81,15 @@ class Spectrum:
 
 def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
     """Welch's mean over the stretches without a gap; None where none is long enough."""
-    breaks = np.flatnonzero(np.diff(imu.stamp_s) > 1.5 / RATE_HZ) + 1
+    usual_hz = rate_hz(imu)
+    breaks = np.flatnonzero(np.diff(imu.stamp_s) > 1.5 / usual_hz) + 1
     changes = np.flatnonzero(np.diff(rows.astype(np.int8))) + 1
     edges = np.unique(np.concatenate([[0], breaks, changes, [len(imu)]]))
     total, weight, frequency_hz = np.zeros((SEGMENT // 2 + 1, 6)), 0, np.empty(0)
     for first, last in pairwise(edges):
         if rows[first] and last - first >= SEGMENT:
             frequency_hz, power = signal.welch(
-                imu.values[first:last], RATE_HZ, nperseg=SEGMENT, axis=0
+                imu.values[first:last], usual_hz, nperseg=SEGMENT, axis=0
             )
             total, weight = total + power * (last - first), weight + int(last - first)
     return Spectrum(frequency_hz[1:], np.sqrt(total[1:] / weight)) if weight else None
@@ -113,7 +121,7 @@ def judge(log: Log) -> Iterator[Finding]:
             "Switch the board off and on; if it stays so, the sensor is broken.",
         )
     rest = at_rest(log, imu)
-    if rest.sum() >= LEAST_REST_S * RATE_HZ:
+    if rest.sum() >= LEAST_REST_S * rate_hz(imu):
         yield from _gravity(imu.values[rest, 3:].mean(axis=0))
         if "gyro" not in stuck:
             yield from _bias(imu.values[rest, :3])
@@ -231,7 +239,7 @@ def _turning(log: Log, imu: Series, rest: Mask) -> Iterator[Finding]:
 
 
 def _vibration(imu: Series, rest: Mask) -> Iterator[Finding]:
-    if (~rest).sum() < LEAST_REST_S * RATE_HZ:
+    if (~rest).sum() < LEAST_REST_S * rate_hz(imu):
         return
     moved = spectrum(imu, ~rest)
     if moved is None:

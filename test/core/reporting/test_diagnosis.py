@@ -147,6 +147,16 @@ def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
     assert "one of its lines is missing" in robot.statuses["Board"].message
 
 
+def test_what_only_a_board_has_to_show_stands_with_its_mode() -> None:
+    """As does how often its odometry goes out with what comes in."""
+    robot = Robot()
+    assert "Published odometry (Hz)" not in robot.statuses["Stream"].values
+    robot.set(board=replace(robot.figures.board, own={"Version": "7"}, odom_hz=20.0))
+    robot.seconds(1)
+    assert robot.statuses["Board"].values["Version"] == "7"
+    assert robot.statuses["Stream"].values["Published odometry (Hz)"] == "20"
+
+
 HAPPENINGS = [FAULTS[number] for number in (0, 3, 4, 5, 6, 7, 13, 14)]
 
 

@@ -1,0 +1,167 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""``calibrate geometry`` and ``scale`` of a base that only drives straight and turns: what its
+odometry has to be multiplied by, by a tape measure. Must not know its wheels.
+"""
+
+import argparse
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.tools.calibrate.console import Console
+from omnibot_driver.tools.calibrate.log import Column
+from omnibot_driver.tools.calibrate.motion import Bounds, Law
+from omnibot_driver.tools.calibrate.result import Finding, Result
+from omnibot_driver.tools.calibrate.waypoints import straight, turn
+from omnibot_driver.tools.needs import ToolError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LINES: Final = 2
+"""Two tell whether one was misread."""
+UNLIKE: Final = 4.0
+"""Standard deviations by which two ratios differ that are not the same."""
+NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
+INTRODUCTION: Final = (
+    "You need a tape measure and something to mark the floor with. Before each drive mark where the"
+    " robot's centre is and where the front points; after it you are asked how far it has come, or"
+    " how far it has turned past its mark. Let it go where it goes, and do not push it."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """``wanted``: m straight ahead, or rad where it ``turns``."""
+
+    name: str
+    wanted: float
+    turns: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Ratio:
+    """True over told, in the unit of its drive, with its standard deviation."""
+
+    drive: Drive
+    told: float
+    true: float
+    sigma: float
+
+    @property
+    def value(self) -> float:
+        return self.true / self.told
+
+    @property
+    def value_sigma(self) -> float:
+        return self.sigma / abs(self.told)
+
+
+def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
+    """Raises ToolError."""
+    console.say(INTRODUCTION)
+    drives = plan(arguments.side, arguments.turns)
+    console.confirm(
+        f"The robot will make {len(drives)} drives, within {arguments.side:g} m of where each one"
+        f" begins, at up to {arguments.speed:g} m/s. Is there room for it?"
+    )
+    ratios = []
+    for number, drive in enumerate(drives, 1):
+        console.wait(f"Drive {number} of {len(drives)}: {drive.name}. Mark the floor.")
+        path = _drive(robot, console, drive, arguments)
+        ratios.append(_measure(console, drive, path, arguments))
+    return result(ratios, robot.parameters)
+
+
+def plan(side_m: float, turns: int) -> list[Drive]:
+    """What to drive, one after the other."""
+    number, angle_rad = f"{turns} turns" if turns > 1 else "1 turn", math.tau * turns
+    return [
+        Drive(f"{number} to the left", angle_rad, True),
+        Drive(f"{number} to the right", -angle_rad, True),
+        *[Drive(f"{side_m:g} m forward", side_m, False)] * LINES,
+    ]
+
+
+def _drive(robot: Any, console: Console, drive: Drive, arguments: argparse.Namespace) -> Column:
+    now = robot.parameters
+    speed = min(arguments.speed, now["max_linear_speed"])
+    turning = min(arguments.turning, now["max_angular_speed"])
+    if not (speed and turning):
+        raise ToolError("max_linear_speed or max_angular_speed is 0: the robot may not move")
+    law: Law = turn(drive.wanted, turning) if drive.turns else straight(drive.wanted, speed)
+    seconds = abs(drive.wanted) / (turning if drive.turns else speed) + 5.0
+    bounds = Bounds(
+        speed=speed + 1e-6,
+        turning=turning + 1e-6,
+        way=1.5 * arguments.side + 0.2,
+        turn=(abs(drive.wanted) if drive.turns else 0.0) + 1.0,
+        seconds=3 * seconds,
+    )
+    with console.progress(f"Driving {drive.name}") as told:
+        log = robot.drive(law, bounds, show=lambda s: told(s / seconds))
+    path: Column = log.odometry.pose
+    if not len(path) or not np.isfinite(path).all():
+        raise ToolError("odom gave no finite poses: see what the driver logs")
+    return path
+
+
+def _measure(console: Console, drive: Drive, path: Column, arguments: argparse.Namespace) -> Ratio:
+    first, last = Pose(*path[0]), Pose(*path[-1])
+    if drive.turns:
+        past_deg = console.number(
+            "How far past its mark does the front point, left +, right -", "degrees", -170.0, 170.0
+        )
+        true, sigma = drive.wanted + math.radians(past_deg), math.radians(arguments.angle)
+        return Ratio(drive, last.yaw_rad - first.yaw_rad, true, sigma)
+    come_mm = console.number(
+        "How far has the robot's centre come", "mm", 1.0, 3000.0 * arguments.side
+    )
+    return Ratio(drive, first.way_to(last).way_m, come_mm / 1000.0, arguments.tape / 1000.0)
+
+
+def result(ratios: Sequence[Ratio], now: Mapping[str, Any]) -> Result:
+    """What to show and to write of these; ``now`` are the driver's parameters."""
+    findings, parameters, notes = [], {}, []
+    for name, turns in zip(NAMES, (False, True), strict=True):
+        mine = [one for one in ratios if one.drive.turns is turns]
+        weights = np.array([one.value_sigma**-2 for one in mine])
+        mean = float(weights @ [one.value for one in mine] / weights.sum())
+        sigma = float(weights.sum() ** -0.5)
+        parameters[name] = now[name] * mean
+        findings.append(
+            Finding(
+                name=name,
+                value=now[name] * mean,
+                sigma=now[name] * sigma,
+                unit="rad/rad" if turns else "m/m",
+                before=now[name],
+            )
+        )
+        one, other = mine
+        if abs(one.value - other.value) > UNLIKE * math.hypot(one.value_sigma, other.value_sigma):
+            notes.append(
+                f"{one.drive.name} and {other.drive.name} differ by"
+                f" {abs(one.value / other.value - 1):.1%}: one was misread, or the robot slips."
+            )
+    return Result(
+        findings=findings,
+        parameters=parameters,
+        notes=notes,
+        draw=lambda figure: draw(figure, ratios),
+    )
+
+
+def draw(figure: "Figure", ratios: Sequence[Ratio]) -> None:
+    """True over told, drive by drive."""
+    axes = figure.subplots()
+    names = [f"{number}. {one.drive.name}" for number, one in enumerate(ratios, 1)]
+    values = [one.value for one in ratios]
+    axes.errorbar(names, values, [one.value_sigma for one in ratios], fmt="o", color="tab:blue")
+    axes.axhline(1.0, color="grey", lw=0.8)
+    axes.set(ylabel="true over told by odom", title="What odom has to be multiplied by")
