@@ -3,7 +3,8 @@
 """The fault campaign: ``make faults`` runs it and writes its table into docs/safety.md.
 
 Every scripted fault, random input, random walks over several seeds; with ``--minutes`` a soak of
-random walks alone. Ends with 1 when anything went wrong.
+random walks alone. Drivers wait for real time, so the pieces run side by side, each with drivers
+and boards of its own and in a ROS domain of its own. Ends with 1 when anything went wrong.
 """
 
 import argparse
@@ -13,8 +14,9 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from random import Random
 from typing import Any, Final
@@ -38,7 +40,9 @@ WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
 LOSSES: Final = 30
 """Of each stop on a line that loses bytes towards the board."""
+LOSSES_AT_ONCE: Final = 10
 SOAK_STEPS: Final = 30
+BUSY: Final = ("busy_computer", ())
 
 
 @dataclass(slots=True)
@@ -55,14 +59,55 @@ class Row:
         return f"| {self.name} | {self.tried} | {self.stood_s:.2f} s | {verdict} |"
 
 
-class Campaign:
-    """Rows of the table, and everything anybody complained of."""
+@dataclass(slots=True)
+class Outcome:
+    """Of some pieces: rows of the table, and everything anybody complained of.
+
+    ``published``: messages that were compared with what the board sent; ``wrong`` of them.
+    """
+
+    rows: list[Row] = field(default_factory=list)
+    complaints: list[str] = field(default_factory=list)
+    published: int = 0
+    wrong: int = 0
+
+    def add(self, more: "Outcome") -> None:
+        """Rows of the same name are one."""
+        mine = {row.name: row for row in self.rows}
+        for row in more.rows:
+            if (same := mine.get(row.name)) is None:
+                self.rows.append(row)
+                continue
+            same.tried += row.tried
+            same.stood_s = max(same.stood_s, row.stood_s)
+            same.complaints += row.complaints
+        self.complaints += more.complaints
+        self.published += more.published
+        self.wrong += more.wrong
+
+    def table(self) -> str:
+        """In Markdown."""
+        lines = ["| fault | tried | robot stood after at most | |", "|---|---|---|---|"]
+        lines += [str(row) for row in self.rows]
+        lines += [
+            "",
+            f"{self.published:,} messages of `imu/data_raw` and `odom` were compared with what the "
+            f"board had sent: {self.wrong} were wrong.",
+        ]
+        return "\n".join(lines)
+
+
+class Campaign(Outcome):
+    """One piece of it, in this process."""
 
     def __init__(self) -> None:
-        self.rows: list[Row] = []
-        self.complaints: list[str] = []
-        self.published = self.wrong = 0
+        super().__init__()
         self._folder = tempfile.TemporaryDirectory()
+
+    @property
+    def outcome(self) -> Outcome:
+        """What of it another process may have."""
+        return Outcome(self.rows, self.complaints, self.published, self.wrong)
 
     def rig(self, kind: type[Rig] = Rig, before: str = "") -> Rig:
         return kind(Path(tempfile.mkdtemp(dir=self._folder.name)), before=before)
@@ -96,15 +141,25 @@ class Campaign:
         self.rows.append(Row(name))
         return self.rows[-1]
 
-    def scripted(self) -> None:
-        """Each fault in each round, in one driver's life; then those that end a driver."""
+    def faults_of_the_line(self) -> None:
+        """Each fault in each round, in one driver's life."""
         self._one_life(Rig, survivable, damaged_bytes=True)
+
+    def faults_of_the_network(self) -> None:
         self._one_life(NetworkRig, lambda _: NETWORK, damaged_bytes=False)
+
+    def faults_of_goals(self) -> None:
         self._one_life(GoalRig, lambda _: GOALS, damaged_bytes=False)
-        for name, ending in ENDINGS.items():
-            self._ends(f"the driver ends: {name}", ending, before=ending.before)
-        for name, case in GOAL_ENDINGS.items():
-            self._ends(name, case, kind=GoalRig)
+
+    def ending(self, name: str) -> None:
+        """What ends a driver."""
+        ending = ENDINGS[name]
+        self._ends(f"the driver ends: {name}", ending, before=ending.before)
+
+    def goal_ending(self, name: str) -> None:
+        self._ends(name, GOAL_ENDINGS[name], kind=GoalRig)
+
+    def closed_terminal(self) -> None:
         row = self.row("the driver ends: its terminal is closed")
         for _ in range(ROUNDS):
             terminal_is_closed(
@@ -131,17 +186,15 @@ class Campaign:
             with self.rig(kind, before) as rig:
                 self.run(row, case, rig, again=False)
 
-    def losses(self) -> None:
+    def losses(self, number_of_life: int, numbers: range) -> None:
         """Each stop with losses towards the board that last until the verdict."""
-        for life in LIVES:
-            rows = {
-                name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life
-            }
-            for number in range(LOSSES):
-                with losing_rig(Path(tempfile.mkdtemp(dir=self._folder.name)), number) as rig:
-                    lose(rig, number)
-                    for name, case in life.items():
-                        self.run(rows[name], case, rig, again=False)
+        life = LIVES[number_of_life]
+        rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}
+        for number in numbers:
+            with losing_rig(Path(tempfile.mkdtemp(dir=self._folder.name)), number) as rig:
+                lose(rig, number)
+                for name, case in life.items():
+                    self.run(rows[name], case, rig, again=False)
 
     def busy_computer(self) -> None:
         """Nothing is wrong with the line."""
@@ -160,12 +213,16 @@ class Campaign:
             self.run(row, lambda rig: fuzz(rig, FUZZ, Random(1)), rig)
             self.judge(rig)
 
-    def walks(self, name: str, kind: type[Rig], seeds: range) -> None:
-        row = self.row(name)
-        for seed in seeds:
-            with self.rig(kind) as rig:
-                self.run(row, partial(_walk, seed, STEPS), rig)
-                self.judge(rig)
+    def walk(self, seed: int) -> None:
+        self._walk(f"random walks of {STEPS} faults", Rig, seed)
+
+    def walk_with_goals(self, seed: int) -> None:
+        self._walk(f"with goals: random walks of {STEPS} faults", GoalRig, seed)
+
+    def _walk(self, name: str, kind: type[Rig], seed: int) -> None:
+        with self.rig(kind) as rig:
+            self.run(self.row(name), partial(_walk, seed, STEPS), rig)
+            self.judge(rig)
 
     def soak(self, minutes: float) -> None:
         """Random walks in one driver's life."""
@@ -188,16 +245,57 @@ class Campaign:
         if now_kb > memory_kb * 1.1:
             self.complaints.append(f"memory grew from {memory_kb} to {now_kb} kB")
 
-    def table(self) -> str:
-        """In Markdown."""
-        lines = ["| fault | tried | robot stood after at most | |", "|---|---|---|---|"]
-        lines += [str(row) for row in self.rows]
-        lines += [
-            "",
-            f"{self.published:,} messages of `imu/data_raw` and `odom` were compared with what the "
-            f"board had sent: {self.wrong} were wrong.",
-        ]
-        return "\n".join(lines)
+
+Piece = tuple[str, tuple[Any, ...]]
+"""A method of ``Campaign`` and its arguments."""
+
+
+def losses() -> list[Piece]:
+    """In parts of ten drivers."""
+    starts = range(0, LOSSES, LOSSES_AT_ONCE)
+    return [
+        ("losses", (life, range(start, start + LOSSES_AT_ONCE)))
+        for life in range(len(LIVES))
+        for start in starts
+    ]
+
+
+def pieces() -> list[Piece]:
+    """In the order of the table. The busy computer is none of them: it is to be busy alone."""
+    return [
+        ("faults_of_the_line", ()),
+        ("faults_of_the_network", ()),
+        ("faults_of_goals", ()),
+        *(("ending", (name,)) for name in ENDINGS),
+        *(("goal_ending", (name,)) for name in GOAL_ENDINGS),
+        ("closed_terminal", ()),
+        *losses(),
+        ("random_input", ()),
+        *(("walk", (seed,)) for seed in range(WALKS)),
+        *(("walk_with_goals", (seed,)) for seed in range(GOAL_WALKS)),
+    ]
+
+
+def play(numbered: tuple[int, Piece]) -> Outcome:
+    """One piece, in a process and a ROS domain of its own."""
+    number, (method, arguments) = numbered
+    os.environ["ROS_DOMAIN_ID"] = str(1 + (os.getppid() + number) % 101)
+    rclpy.init()
+    try:
+        campaign = Campaign()
+        getattr(campaign, method)(*arguments)
+        return campaign.outcome
+    finally:
+        rclpy.shutdown()
+
+
+def side_by_side(wanted: list[Piece], processes: int) -> Outcome:
+    """The longest pieces come first."""
+    total = Outcome()
+    with get_context("spawn").Pool(processes, maxtasksperchild=1) as pool:
+        for outcome in pool.imap(play, enumerate(wanted), chunksize=1):
+            total.add(outcome)
+    return total
 
 
 def _walk(seed: int, steps: int, rig: Rig) -> None:
@@ -214,31 +312,26 @@ def main() -> int:
     arguments.add_argument("--minutes", type=float, help="a soak of random walks only")
     arguments.add_argument("--losses", action="store_true", help="stops on a lossy line only")
     arguments.add_argument("--busy", action="store_true", help="a busy computer only")
+    arguments.add_argument(
+        "--processes", type=int, default=os.cpu_count(), help="side by side (default %(default)s)"
+    )
     chosen = arguments.parse_args()
     minutes = chosen.minutes
-    os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
-    rclpy.init()
-    campaign = Campaign()
     if minutes is not None:
-        campaign.soak(minutes)
+        total = side_by_side([("soak", (minutes,))], 1)
     elif chosen.losses:
-        campaign.losses()
+        total = side_by_side(losses(), chosen.processes)
     elif chosen.busy:
-        campaign.busy_computer()
+        total = side_by_side([BUSY], 1)
     else:
-        campaign.scripted()
-        campaign.losses()
-        campaign.busy_computer()
-        campaign.random_input()
-        campaign.walks(f"random walks of {STEPS} faults", Rig, range(WALKS))
-        campaign.walks(f"with goals: random walks of {STEPS} faults", GoalRig, range(GOAL_WALKS))
-    rclpy.shutdown()
-    table = campaign.table()
-    print(f"\n{table}\n", *campaign.complaints, sep="\n")
+        total = side_by_side(pieces(), chosen.processes)
+        total.add(side_by_side([BUSY], 1))
+    table = total.table()
+    print(f"\n{table}\n", *total.complaints, sep="\n")
     if minutes is None and not (chosen.losses or chosen.busy):
         before, rest = DOCUMENT.read_text().split(BEGIN)
         DOCUMENT.write_text(f"{before}{BEGIN}\n{table}\n{END}{rest.split(END)[1]}")
-    return 1 if campaign.complaints else 0
+    return 1 if total.complaints else 0
 
 
 if __name__ == "__main__":
