@@ -47,12 +47,16 @@ class Services:
 
     def _on_estop(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         active = bool(request.data)
-        state, response.message = self._link.call(
-            lambda session, now: (
-                session.state,
-                session.estop(active, now, by="the service ~/estop"),
+        try:
+            state, response.message = self._link.call(
+                lambda session, now: (
+                    session.state,
+                    session.estop(active, now, by="the service ~/estop"),
+                )
             )
-        )
+        except RequestRefused as error:
+            response.success, response.message = False, str(error)
+            return response
         if active and state != DISCONNECTED and self._link.blocked:
             response.message = (
                 "e-stop latched; the port takes nothing: the stop follows when it is open again"

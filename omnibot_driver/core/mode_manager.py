@@ -146,11 +146,11 @@ class ModeManager:
         elif self.phase is Phase.STARTING or (self.phase is Phase.SETTLED and running_wanted):
             self._begin(now)  # it has restarted, and may have slept through what was said so far
 
-    def heard_reset(self, now: float) -> None:
-        """The board, which never pauses, shows that it has obeyed a reset."""
+    def heard_reset(self, now: float, remark: str = "") -> None:
+        """The board, which never pauses, shows that it has obeyed a reset, all but ``remark``."""
         if self.phase is Phase.RESETTING and now - self._said_at >= IN_FLIGHT_S:
             self.output += self._board.wake()
-            self._settle("the board was reset")
+            self._settle(remark or "the board was reset")
 
     @property
     def at_rest(self) -> bool:

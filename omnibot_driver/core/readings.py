@@ -97,7 +97,12 @@ class EStopButtonReading:
 
 @dataclass(frozen=True, slots=True)
 class ResetReading:
-    """The board shows that it has obeyed a reset."""
+    """The board shows that it has obeyed a reset.
+
+    ``remark``: what it does not show, in a sentence; empty where all is shown.
+    """
+
+    remark: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,11 @@ to follow from another. Must not know bytes, nor who commands. A command that ex
 policy's, a robot that does not obey the motion monitor's.
 """
 
+from typing import Final
+
 from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.commands.pipeline import CommandPipeline
+from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.liveness import Liveness
 from omnibot_driver.core.measurement.pipeline import Measured, MeasurementPipeline
 from omnibot_driver.core.mode_manager import CLOSED, ModeManager
@@ -21,6 +24,12 @@ from omnibot_driver.core.readings import (
     ResetReading,
 )
 from omnibot_driver.core.reporter import Reporter
+
+BUTTON_HELD: Final = (
+    "e-stop not released: the e-stop button on the robot was pressed and its release was not"
+    " reported; release the button, then call again. If it is released already, press and release"
+    " it once more"
+)
 
 
 class SafetyStops:
@@ -39,6 +48,8 @@ class SafetyStops:
         self._measurement, self._commanding = measurement, commanding
         self._policy = commanding.policy
         self._liveness, self._reporter = liveness, reporter
+        self._button_held = False
+        """By its last event, which may be from before the line was lost."""
 
     def react(self, measured: list[Measured], now: float) -> None:
         """To what was measured, in its order."""
@@ -58,15 +69,20 @@ class SafetyStops:
                 if self._board.mode.running:  # again, within one read
                     self._policy.halt(now)
                 self._mode_manager.heard_paused(now, continues=reading.continues)
-            elif isinstance(reading, EStopButtonReading) and reading.pressed:
-                self.estop(True, now, by="the button on the robot")
+            elif isinstance(reading, EStopButtonReading):
+                self._button_held = reading.pressed
+                if reading.pressed:
+                    self.estop(True, now, by="the button on the robot")
             elif isinstance(reading, ResetReading):
-                self._mode_manager.heard_reset(now)
+                self._mode_manager.heard_reset(now, reading.remark)
         if self._policy.current is not None:
             notify(commanding.check_goal([], now))
 
     def estop(self, active: bool, now: float, *, by: str) -> str:
-        """Latch or release the e-stop; returns what is so now, in a sentence."""
+        """Latch or release the e-stop; returns what is so now, in a sentence.
+
+        Raises RequestRefused for a release while the button on the robot is held.
+        """
         latched = self._policy.latched
         if active:
             if not latched:
@@ -79,6 +95,8 @@ class SafetyStops:
             return "e-stop latched"
         if not latched:
             return "the e-stop was not latched"
+        if self._button_held:
+            raise RequestRefused(BUTTON_HELD)
         self._commanding.release(now)
         self._reporter.notify([f"e-stop released by {by}"])
         return "e-stop released; the robot stands still until a new command comes"

@@ -256,7 +256,10 @@ class Session:
         self._calibration.measure(token, now)
 
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
-        """Latch or release the e-stop; returns what is so now, in a sentence."""
+        """Latch or release the e-stop; returns what is so now, in a sentence.
+
+        Raises RequestRefused for a release while the button on the robot is held.
+        """
         return self._safety.estop(active, now, by=by)
 
     def reset_odometry(self, now: float) -> None:

@@ -2,9 +2,11 @@
 
 """What a kind of board has and can do: chosen at construction, never asked for each frame."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from omnibot_driver.core.commands.set_points import Authority
+from omnibot_driver.core.motion_monitor.monitor import Fault
 from omnibot_driver.core.requests import Request
 
 
@@ -23,7 +25,8 @@ class Traits:
     ``baudrate``: whether the speed of its line is to be set;
     ``unproved_s``: how long Stop is repeated at most while that is not seen; ``slack_mps``,
     ``slack_radps``: how far its displacements, or its wheels when they speed up, may be off what is
-    commanded on top of what any robot may.
+    commanded on top of what any robot may; ``advice``: what to check when the robot does not move
+    as commanded, where that is more than on any board: the parameters of this one.
     """
 
     channels: tuple[str, ...] = ("",)
@@ -39,6 +42,7 @@ class Traits:
     baudrate: bool = True
     slack_mps: float = 0.0
     slack_radps: float = 0.0
+    advice: Mapping[Fault, str] = field(default_factory=dict)
 
     @property
     def imu(self) -> bool:

@@ -12,7 +12,7 @@ from toys.line_robot import LineRobot
 
 from omnibot_driver.core.board import Mode
 from omnibot_driver.core.commands.stop_proof import StopProof
-from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import Extra
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -158,3 +158,22 @@ def test_a_proof_takes_as_long_as_the_board_needs() -> None:
         proof.look(STANDS, 0.2 * step)
         proved.append(proof.proved)
     assert proved == [False, False, True, True]
+
+
+def test_the_estop_is_not_released_while_the_button_is_held(bench: AnyBench) -> None:
+    """By its last event, also from before the line was lost; the refusal says what to do."""
+    tell(bench, EStopButtonReading(True))
+    with pytest.raises(RequestRefused, match="release the button, then call again"):
+        bench.estop(False)
+    bench.close()
+    bench.open()
+    with pytest.raises(RequestRefused, match="press and release"):
+        bench.estop(False)
+    assert bench.session.estop_active
+    bench.run_until(lambda: bench.session.state == "nominal")
+    tell(bench, EStopButtonReading(False))
+    assert bench.session.estop_active
+    bench.estop(False)
+    assert not bench.session.estop_active
+    bench.drive_on()
+    assert not bench.robot.stands

@@ -11,6 +11,7 @@ from omnibot_driver.core.commands.set_points import Setpoint
 from omnibot_driver.core.imu.gyro_calibration import GyroCalibration
 from omnibot_driver.core.liveness import Liveness
 from omnibot_driver.core.mode_manager import ModeManager, Phase
+from omnibot_driver.core.requests import Request
 
 
 class Interlocks:
@@ -48,7 +49,9 @@ class Interlocks:
             hint = "; the service ~/start makes it run" if phase is Phase.PAUSING else ""
             return f"the board is {phase.value}{hint}"
         if not mode.running:
-            return f"the board is {mode.value}; the service ~/start makes it run"
+            starts = Request.START in self._board.traits.requests
+            hint = "; the service ~/start makes it run" if starts else ""
+            return f"the board is {mode.value}{hint}"
         unheard_s = self._liveness.unheard_s
         if not stands and now - self._liveness.heard_at >= unheard_s:
             return f"nothing was heard from the board for {unheard_s:g} s"

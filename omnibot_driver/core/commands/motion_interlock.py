@@ -20,26 +20,36 @@ class Until(Enum):
     NOTHING = "Motion is allowed"
     RELEASE = "Motion is refused until a zero command, or a pause of `cmd_vel_timeout`"
     START = "Motion is refused until ~/start, as this is the second time within 60 s"
+    ESTOP = (
+        "Motion is refused until the e-stop is latched and released, as this is the second time"
+        " within 60 s"
+    )
 
 
 class MotionInterlock:
-    """``until``: what motion is refused until."""
+    """``until``: what motion is refused until; ``starts``: whether there is a ~/start."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, starts: bool = True) -> None:
+        self._for_good = Until.START if starts else Until.ESTOP
         self.until = Until.NOTHING
         self.trips = 0
         self._tripped_at = self._commanded_at = -math.inf
 
     def trip(self, now: float) -> None:
         """The robot was stopped, as it did not move as commanded."""
-        again = now - self._tripped_at <= AGAIN_S or self.until is Until.START
-        self.until = Until.START if again else Until.RELEASE
+        again = now - self._tripped_at <= AGAIN_S or self.until is self._for_good
+        self.until = self._for_good if again else Until.RELEASE
         self.trips += 1
         self._tripped_at = now
 
     def start(self) -> None:
         """Somebody has looked, and calls ~/start."""
         self.until, self._tripped_at = Until.NOTHING, -math.inf
+
+    def release(self) -> None:
+        """The e-stop was released, which takes the place of ~/start where there is none."""
+        if self.until is Until.ESTOP:
+            self.start()
 
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
         """A motion command arrived, or one to stand still: why it is refused; empty if it is not.
@@ -64,5 +74,10 @@ class MotionInterlock:
             return (
                 "the motion monitor has stopped the robot twice within 60 s; find the cause, then"
                 " call ~/start"
+            )
+        if self.until is Until.ESTOP:
+            return (
+                "the motion monitor has stopped the robot twice within 60 s; find the cause, then"
+                " latch and release the e-stop (service ~/estop)"
             )
         return ""

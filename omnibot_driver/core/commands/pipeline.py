@@ -22,12 +22,13 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose, Signs
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.measurement.pipeline import Estimate
-from omnibot_driver.core.motion_monitor.monitor import ADVICE, Fault, MotionMonitor
+from omnibot_driver.core.motion_monitor.monitor import ADVICE, STOPPED, Fault, MotionMonitor
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
 from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import DisplacementReading
 from omnibot_driver.core.reporting.figures import CommandFigures
+from omnibot_driver.core.requests import Request
 from omnibot_driver.core.settings import SessionSettings
 
 Command = tuple[Setpoint, float]
@@ -59,9 +60,10 @@ class CommandPipeline:
         self._shaper = CommandShaper(
             board, self._actuator, odometry, settings.limits, axis_signs, control
         )
-        self.interlock = MotionInterlock()
+        self.interlock = MotionInterlock(starts=Request.START in board.traits.requests)
         self._board, self._axis_signs = board, axis_signs
         self._monitor = MotionMonitor(board.traits.slack_mps, board.traits.slack_radps)
+        self._advice = {**ADVICE, **board.traits.advice}
         self._obeys = obeys
         self.monitored = settings.motion_monitor
 
@@ -118,6 +120,7 @@ class CommandPipeline:
     def release(self, now: float) -> None:
         """End the e-stop."""
         self.policy.release(now)
+        self.interlock.release()
         self._monitor.release()
 
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
@@ -182,12 +185,12 @@ class CommandPipeline:
         """Stop a robot that moves otherwise than commanded; say what is wrong."""
         if fault is None:
             return []
-        if fault in ADVICE:
+        advice = self._advice.get(fault, "")
+        if fault in STOPPED:
             self.policy.halt(now)
             self.interlock.trip(now)
             seen = "" if fault is Fault.BEYOND_LIMITS else self._seen()
             until = self.interlock.until.value
-            advice = ADVICE[fault]
             if self._board.advice:
                 advice = f"{self._board.advice}; otherwise {advice}"
             return [
@@ -196,7 +199,8 @@ class CommandPipeline:
             ]
         if fault is Fault.UNCOMMANDED:
             self.policy.halt(now)
-        return [fault.value] if self._monitor.is_news(fault) else []
+        said = f"{fault.value}: {advice}" if advice else fault.value
+        return [said] if self._monitor.is_news(fault) else []
 
     def _seen(self) -> str:
         """What was commanded and what was measured, in REP-103's axes."""

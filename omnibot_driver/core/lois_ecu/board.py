@@ -46,6 +46,7 @@ from omnibot_driver.core.lois_ecu.readings import LoisReading
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.stall import StallWatch
 from omnibot_driver.core.lois_ecu.translation import Translation
+from omnibot_driver.core.motion_monitor.monitor import Fault
 from omnibot_driver.core.requests import Request
 from omnibot_driver.core.traits import Traits
 
@@ -63,6 +64,27 @@ TRAITS: Final = Traits(
     unproved_s=2.0,
     slack_mps=0.15,  # a tick in 0.2 s is 0.07 m/s
     slack_radps=1.2,  # with its gains the wheels do not speed up alike
+    advice={
+        Fault.WRONG_WAY: "check `inverted`, and the wiring of motors and encoders",
+        Fault.WRONG_TURN: "check `inverted`, and the wiring of motors and encoders",
+        Fault.TOO_FAST: (
+            "check `wheel_radius` and `ticks_per_revolution`; in duty mode, `duty_scale`"
+        ),
+        Fault.TURNS_TOO_FAST: (
+            "check `track`, `wheel_radius` and `ticks_per_revolution`; in duty mode, `duty_scale`"
+        ),
+        Fault.BEYOND_LIMITS: (
+            "check `wheel_radius`, `track` and `ticks_per_revolution`; in duty mode, `duty_scale`"
+        ),
+        Fault.BLOCKED: (
+            "check motor power, whether the wheels are blocked, the gains that were set, and"
+            " `low_pass`; in duty mode, `duty_scale`"
+        ),
+        Fault.HELD_BY_ESTOP: (
+            "check whether the e-stop button is held, and motor power; the board tells a press"
+            " and a release once"
+        ),
+    },
 )
 CLEAR_AFTER_S: Final = 2.0
 """After a Stop; then RPM 0/0 ends the counting."""
@@ -193,7 +215,7 @@ class LoisEcu:
         if now - translation.last_ticks_at_s > STANDS_AFTER_S:
             return None
         stopped_at_s = self._stopped_at_s
-        if self._driving or now - max(translation.ticked_at_s, stopped_at_s) < STANDS_AFTER_S:
+        if self.driving or now - max(translation.ticked_at_s, stopped_at_s) < STANDS_AFTER_S:
             return False
         self._stood = translation.odometry.counting
         return self._stood or None
@@ -233,7 +255,7 @@ class LoisEcu:
             self._opened = True
             self._writer.begin(now)
             self._recovered_at_s = now
-        data = self._writer.due(now, driving=self._driving)
+        data = self._writer.due(now, driving=self.driving)
         if self._clear_due(now):
             self._stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S
             data += self._lines(outbound.EMERGENCY_STOP)
@@ -256,13 +278,14 @@ class LoisEcu:
     def _recover_at(self) -> float:
         if self._settings.terminal_mode in (TerminalMode.GPS, TerminalMode.COMPASS):
             return math.inf
-        if self._driving:
+        if self.driving:
             return math.inf
         silent_since_s = self._recovered_at_s if self._writer.ignored else self._heard_at_s
         return max(silent_since_s, self._recovered_at_s) + RECOVER_AFTER_S
 
     @property
-    def _driving(self) -> bool:
+    def driving(self) -> bool:
+        """Whether the last set-point moves the robot."""
         return self._said is not None and _moves(self._said)
 
     def _clear_due(self, now: float) -> bool:
@@ -284,7 +307,7 @@ class LoisEcu:
                     self._stopped_at_s = now
                 if isinstance(command, SetRpm):
                     self._clears_left = max(self._clears_left - 1, 0)
-                elif self._driving:
+                elif self.driving:
                     self._clears_left = outbound.CLEARED_TIMES
             self._said = command
 
@@ -354,6 +377,10 @@ class LoisEcu:
         self._decoder.forget_counters()
         self._translation.connect()
         return self._lines(outbound.STOP, Reset())
+
+    def write_settings(self, now: float) -> None:
+        """All of them again: by the manual a reset is one of controllers and interfaces too."""
+        self._writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:
         """Something that may be repeated, until it has surely arrived."""

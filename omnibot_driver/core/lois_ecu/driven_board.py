@@ -18,11 +18,11 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu.board import TRAITS, LoisEcu
-from omnibot_driver.core.lois_ecu.messages import EStopButton, SetLed
+from omnibot_driver.core.lois_ecu.messages import EStopButton, SetLed, Ticks
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import LoisReading, WheelReading
+from omnibot_driver.core.lois_ecu.reset_proof import ResetProof
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
-from omnibot_driver.core.lois_ecu.translation import RESTARTED_TICKS
 from omnibot_driver.core.packets import NO_PACKETS, Packets, joined, packed
 from omnibot_driver.core.readings import (
     DisplacementReading,
@@ -33,9 +33,11 @@ from omnibot_driver.core.readings import (
     ResetReading,
 )
 
-RESET_SHOWN: Final = 2
-"""So many groups of few ticks show that a reset was obeyed: the first may have been on its way."""
-
+RESETS: Final = 8
+RESET_AGAIN_S: Final = 0.9
+"""Longer than a wheel rolls on, and than four groups of ticks take."""
+STEADY_S: Final = 0.3
+"""More than one period of the ticks without a change of the counts."""
 HEARD: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
 """A first message, which tells nothing of motion yet."""
 
@@ -53,7 +55,11 @@ class LoisEcuBoard(Board):
 
     def _connect(self) -> None:
         self._odometry_at = -math.inf
-        self._resets_to_show = 0
+        self._reset_proof: ResetProof | None = None
+        self._reset_seen: Ticks | None = None
+        self._resets_left = 0
+        self._reset_at_s = math.inf
+        self._reset_shown = False
 
     @property
     def settings(self) -> LoisEcuSettings:
@@ -133,23 +139,25 @@ class LoisEcuBoard(Board):
                     readings.append(reading)
                 case FusedOdometry():
                     self._rolled = self._rolled + self._tangent(reading)
-                    readings += self._shown_reset()
                 case WheelReading():
                     pass
                 case EStopButton(pressed):
                     readings.append(EStopButtonReading(pressed))
                 case _:
                     readings.append(ExtraReading(reading))
-        return readings
+        return readings + self._shown_reset()
 
     def _shown_reset(self) -> list[Reading]:
-        ticks = self._ecu.translation.ticks
-        if not self._resets_to_show or ticks is None:
+        proof, known = self._reset_proof, self._ecu.translation
+        if proof is None or known.ticks is None or known.ticks is self._reset_seen:
             return []
-        if max(abs(ticks.left), abs(ticks.right)) > RESTARTED_TICKS:
+        self._reset_seen, now = known.ticks, known.last_ticks_at_s
+        if not proof.look(known.ticks, now):
             return []
-        self._resets_to_show -= 1
-        return [ResetReading()]
+        if not self._reset_shown:
+            self._reset_shown, self._reset_at_s = True, math.inf
+            self._ecu.write_settings(now)
+        return [ResetReading(proof.remark)]
 
     def _tangent(self, fused: FusedOdometry) -> Pose:
         """What both wheels made of the robot since the estimate before."""
@@ -175,12 +183,15 @@ class LoisEcuBoard(Board):
         """When ``due`` or ``elapse`` have something."""
         odometry_at = self._odometry_at if self.mode is Mode.NOMINAL else math.inf
         once_at = -math.inf if self._once else math.inf
-        return min(self._ecu.wake_at, odometry_at, once_at)
+        return min(self._ecu.wake_at, odometry_at, once_at, self._reset_at_s)
 
     def due(self, now: float) -> Packets:
         """Settings, and what clears up after a Stop."""
         once, self._once = self._once, NO_PACKETS
         data = self._ecu.due(now)
+        if now >= self._reset_at_s:
+            data += joined(self._reset())
+            self._say_reset_again(now)
         if data:
             self._ecu.wrote(data, now)
         return packed(data) + once
@@ -191,6 +202,10 @@ class LoisEcuBoard(Board):
 
     def _heard(self, packets: Packets, now: float) -> None:
         self._ecu.wrote(joined(packets), now)
+        if self._ecu.driving:
+            self._reset_proof, self._reset_at_s = None, math.inf
+        elif self._resets_left == RESETS:
+            self._say_reset_again(now)
 
     def encode(self, order: Order) -> Packets:
         """The lines that say it. Raises CommandRefused for a pose."""
@@ -222,9 +237,22 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
-        """Stop, and the board's counters begin anew."""
-        self._resets_to_show = RESET_SHOWN
+        """Stop, and the board's counters begin anew; sent again until they show it."""
+        self._resets_left, self._reset_shown = RESETS, False
+        return self._reset()
+
+    def _reset(self) -> Packets:
+        known = self._ecu.translation
+        steady = known.last_ticks_at_s - known.ticked_at_s >= STEADY_S
+        if self._reset_proof is None:
+            self._reset_proof = ResetProof(known.ticks, steady=steady)
+        else:
+            self._reset_proof.again(known.ticks, steady=steady)
         return packed(self._ecu.reset())
+
+    def _say_reset_again(self, now: float) -> None:
+        self._resets_left -= 1
+        self._reset_at_s = now + RESET_AGAIN_S if self._resets_left else math.inf
 
     # What only this board has
 

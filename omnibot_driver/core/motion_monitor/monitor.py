@@ -7,6 +7,7 @@ neither bytes nor how a robot is stopped. docs/safety.md has the thresholds, and
 """
 
 import math
+from collections.abc import Mapping
 from enum import Enum
 from typing import Final
 
@@ -50,32 +51,35 @@ class Fault(Enum):
         "robot is faster than `fastest_linear_speed` or `fastest_angular_speed`, which it was not"
         " to exceed even when pushed"
     )
-    UNCOMMANDED = (
-        "robot is moving without a command: Stop is sent. If it is not being pushed, call ~/pause"
-        " or switch the motors off by hand, and check the cable"
-    )
-    BLOCKED = (
-        "robot is commanded and does not move: check motor power, whether the wheels are blocked,"
-        " and that `control_method` says where the board's switch stands"
-    )
-    HELD_BY_ESTOP = (
-        "the e-stop is released and the robot is commanded, but it does not move: the board may"
-        " hold the stop itself; call ~/reset"
-    )
+    UNCOMMANDED = "robot is moving without a command"
+    BLOCKED = "robot is commanded and does not move"
+    HELD_BY_ESTOP = "the e-stop is released and the robot is commanded, but it does not move"
 
 
-ADVICE: Final = {
-    Fault.WRONG_WAY: (
-        "check `control_method`, `axis_signs`, `delta_frame` and the wiring of the wheels"
+STOPPED: Final = frozenset(
+    {
+        Fault.WRONG_WAY,
+        Fault.WRONG_TURN,
+        Fault.TOO_FAST,
+        Fault.TURNS_TOO_FAST,
+        Fault.BEYOND_LIMITS,
+    }
+)
+"""Faults of a robot that is driven, and must be stopped."""
+ADVICE: Final[Mapping[Fault, str]] = {
+    Fault.WRONG_WAY: "check the wiring of the wheels",
+    Fault.WRONG_TURN: "check the wiring of the wheels",
+    Fault.TOO_FAST: "check the parameters of the wheels and scales",
+    Fault.TURNS_TOO_FAST: "check the parameters of the wheels and scales",
+    Fault.BEYOND_LIMITS: "check the parameters of the wheels and scales",
+    Fault.UNCOMMANDED: (
+        "Stop is sent. If it is not being pushed, switch the motors off by hand, and check the"
+        " cable"
     ),
-    Fault.WRONG_TURN: "check `control_method`, `axis_signs` and the wiring of the wheels",
-    Fault.TOO_FAST: "check `control_method` and `linear_scale`",
-    Fault.TURNS_TOO_FAST: (
-        "check `control_method` and `angular_scale` (for wheel_cmd, `linear_scale`)"
-    ),
-    Fault.BEYOND_LIMITS: "check `control_method`, `linear_scale` and `angular_scale`",
+    Fault.BLOCKED: "check motor power, and whether the wheels are blocked",
+    Fault.HELD_BY_ESTOP: "check whether the board holds the stop itself",
 }
-"""For each fault of a robot that is driven, and must be stopped."""
+"""What to check on any board; ``Traits.advice`` names the parameters of the one there is."""
 
 
 class MotionMonitor:

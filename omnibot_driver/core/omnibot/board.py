@@ -14,6 +14,7 @@ from omnibot_driver.core.commands.set_point_stream import SetpointStream
 from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.imu.scale import ACCEL_COUNTS_PER_G, gravity_advice
+from omnibot_driver.core.motion_monitor.monitor import Fault
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.command_encoder import (
     EMERGENCY_STOP_PACKETS,
@@ -40,6 +41,26 @@ TRAITS: Final = Traits(
     wheels=("A", "B", "C"),
     unheard_s=0.3,  # it may be restarting
     silence_s=1.5,  # it says something at least once a second
+    advice={
+        Fault.WRONG_WAY: (
+            "check `control_method`, `axis_signs`, `delta_frame` and the wiring of the wheels"
+        ),
+        Fault.WRONG_TURN: "check `control_method`, `axis_signs` and the wiring of the wheels",
+        Fault.TOO_FAST: "check `control_method` and `linear_scale`",
+        Fault.TURNS_TOO_FAST: (
+            "check `control_method` and `angular_scale` (for wheel_cmd, `linear_scale`)"
+        ),
+        Fault.BEYOND_LIMITS: "check `control_method`, `linear_scale` and `angular_scale`",
+        Fault.UNCOMMANDED: (
+            "Stop is sent. If it is not being pushed, call ~/pause or switch the motors off by"
+            " hand, and check the cable"
+        ),
+        Fault.BLOCKED: (
+            "check motor power, whether the wheels are blocked, and that `control_method` says"
+            " where the board's switch stands"
+        ),
+        Fault.HELD_BY_ESTOP: "the board may hold the stop itself; call ~/reset",
+    },
 )
 
 LAST_WORDS: Final = (STOP_PACKETS, EMERGENCY_STOP_PACKETS + STOP_PACKETS)

@@ -69,3 +69,16 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
     interlock.trip(62.0)
     assert interlock.until is Until.RELEASE
     assert interlock.trips == 3
+
+
+def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
+    """After the second trip; a release before it changes nothing."""
+    interlock = MotionInterlock(starts=False)
+    interlock.trip(0.0)
+    interlock.release()
+    assert interlock.until is Until.RELEASE
+    interlock.trip(1.0)
+    assert "latch and release the e-stop" in interlock.reason(TIMEOUT_S)
+    assert not arrives(interlock, 100.0)
+    interlock.release()
+    assert arrives(interlock, 100.1)

@@ -1,0 +1,127 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A whole session with a simulated LOIS ECU: what stops it, what is advised, what a reset shows."""
+
+import pytest
+from any_board import AnyBench, LoisRobot
+
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.requests import Request, RequestDone
+from omnibot_driver.simulator.lois_ecu import SimulatedLois
+
+FIRMWARE = pytest.mark.parametrize("firmware", ["documented", "firmware"])
+
+
+class Bench(AnyBench):
+    """A driver with these settings, and a board with this firmware."""
+
+    def __init__(self, firmware: str, settings: LoisEcuSettings | None = None) -> None:
+        self.lois = LoisRobot(firmware)
+        super().__init__(LoisEcuBoard(settings or LoisEcuSettings()), self.lois)
+        self.open()
+        self.run_until(lambda: self.session.state == "nominal")
+        self.run(1.5)
+
+    @property
+    def board(self) -> SimulatedLois:
+        return self.lois.board
+
+    def reset(self) -> RequestDone:
+        self.session.request(Request.RESET, "token", self.now)
+        self.settle()
+        before = len(self.answers)
+        self.run_until(lambda: len(self.answers) > before)
+        return self.answers[-1]
+
+    @property
+    def answers(self) -> list[RequestDone]:
+        return [event for event in self.events if isinstance(event, RequestDone)]
+
+    def presses(self, pressed: bool) -> None:
+        self.board.press(pressed)
+        self.run(0.5)
+
+
+@FIRMWARE
+def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
+    """The board itself would obey set-points while it is held."""
+    bench = Bench(firmware)
+    bench.drive_on()
+    bench.presses(True)
+    assert bench.session.estop_active
+    with pytest.raises(RequestRefused, match="not released"):
+        bench.estop(False)
+    with pytest.raises(CommandRefused, match="e-stop is latched"):
+        bench.drive()
+    bench.presses(False)
+    assert bench.session.estop_active
+    bench.estop(False)
+    bench.drive_on()
+    assert not bench.robot.stands
+
+
+def test_the_motion_monitor_names_this_boards_parameters() -> None:
+    """And none of another board's; without a ~/start the e-stop's release ends the refusal."""
+    bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=25))
+    for _ in range(2):
+        with pytest.raises(CommandRefused, match="motion monitor"):
+            bench.drive_on(seconds=5.0)
+        bench.run(2.0)
+    told = " ".join(bench.notices)
+    assert "`ticks_per_revolution`" in told
+    assert "control_method" not in told
+    assert "~/start" not in told
+    with pytest.raises(CommandRefused, match="latch and release the e-stop"):
+        bench.drive()
+    bench.estop(True)
+    bench.estop(False)
+    bench.drive()
+    bench.run(0.2)
+    assert bench.session.figures(bench.now).commands.interlock == ""
+
+
+@FIRMWARE
+@pytest.mark.parametrize("seconds", [6.0, 1.2])
+def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
+    """Also by a few ticks, where the wheels stood before."""
+    bench = Bench(firmware)
+    bench.drive_on(0.2, seconds)
+    bench.run(3.0)
+    ticks = bench.board.wheels[0].ticks
+    assert ticks > 2
+    done = bench.reset()
+    assert (done.success, done.message) == (True, "the board was reset")
+    assert [wheel.ticks for wheel in bench.board.wheels] == [0, 0]
+
+
+@FIRMWARE
+def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
+    """The counters were zero before; it is sent more than once all the same."""
+    bench = Bench(firmware)
+    before = len(bench.written)
+    done = bench.reset()
+    assert done.success
+    assert "unconfirmed" in done.message
+    assert "0 and 0 ticks" in done.message
+    sent = b"".join(data for _, data in bench.written[before:])
+    assert sent.count(b":180000000033\n") >= 2
+
+
+@FIRMWARE
+def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
+    """Although there were fewer than twenty ticks."""
+    bench = Bench(firmware)
+    bench.drive_on(0.2, 1.2)
+    bench.run(3.0)
+    assert 2 < bench.board.wheels[0].ticks < 20
+    bench.hears = False
+    bench.session.request(Request.RESET, "token", bench.now)
+    bench.settle()
+    bench.run(1.9)
+    assert not bench.answers
+    bench.hears = True
+    bench.run_until(lambda: bool(bench.answers))
+    assert bench.answers[-1].message == "the board was reset"
+    assert bench.board.wheels[0].ticks == 0
