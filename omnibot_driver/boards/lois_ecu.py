@@ -13,10 +13,11 @@ from omnibot_driver.boards.lois_ecu_parameters import (
     SETTINGS,
     WHEELS,
     WRITTEN,
+    require_checksum_in_terminal_mode,
     require_possible_periods,
 )
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
-from omnibot_driver.core.lois_ecu import PERIOD_OFF
+from omnibot_driver.core.lois_ecu import PERIOD_OFF, TerminalMode
 from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.parameters import table
@@ -42,7 +43,7 @@ PARAMETERS: Final = table(
         "twist_linear_stddev",
         "twist_angular_stddev",
     ),
-    checks=(require_possible_periods,),
+    checks=(require_possible_periods, require_checksum_in_terminal_mode),
 )
 
 
@@ -72,6 +73,7 @@ def settings(values: Mapping[str, Any]) -> LoisEcuSettings:
             if values[name] is not None
         },
         with_sum=values["checksum"],
+        terminal_mode=TerminalMode[values["terminal_mode"].upper()],
         declination_rad=values["magnetic_declination"],
         odom_rate_hz=values["odom_rate"],
     )

@@ -58,9 +58,9 @@ DRIVING: Final = (
         "rpm",
         "",
         "How motion is commanded: as the wheels' RPM, which the board controls, or as the motors'"
-        " duty. In duty mode the robot is driven without speed control, and there is duty_cmd.",
+        " duty. In duty mode the robot is driven without speed control, and there is duty_cmd. A"
+        " change stops the robot first.",
         choices=("rpm", "duty"),
-        fixed=True,
     ),
     Parameter(
         "duty_scale",
@@ -111,6 +111,14 @@ DRIVING: Final = (
         "Noise of the compass, for the covariance of imu/heading.",
         low=1e-6,
         high=10.0,
+    ),
+    Parameter(
+        "terminal_mode",
+        "host",
+        "",
+        "Whose lines the board sends: its own, or those of its GPS or compass, which go to"
+        " ~/terminal (0x11). A change stops the robot first; other modes than host refuse motion.",
+        choices=("host", "gps", "compass"),
     ),
     Parameter(
         "checksum",
@@ -185,6 +193,15 @@ SENT: Final = (
     _period("time_period", "GPS time (0x0e)"),
     _period("date_period", "GPS date (0x0f)"),
 )
+
+
+def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
+    """One setting of the board chooses both, so without checksum there is no terminal mode."""
+    if values["terminal_mode"] != "host" and not values["checksum"]:
+        raise ParameterError(
+            "parameter 'terminal_mode' must be host while 'checksum' is false: in a terminal mode"
+            " the board expects checksums, and would not hear a stop"
+        )
 
 
 def require_possible_periods(values: Mapping[str, Any]) -> None:

@@ -5,17 +5,24 @@
 from collections.abc import Callable, Mapping
 from typing import Any, Final, cast
 
+import rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, TimeReference
-from std_msgs.msg import Bool, Float32MultiArray, Header
+from std_msgs.msg import Bool, Float32MultiArray, Header, String
 from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver import messages
 from omnibot_driver.core.commands.limits import require_finite
 from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.lois_ecu import TerminalLine
 from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
-from omnibot_driver.core.lois_ecu.readings import FixReading, HeadingReading, TimeReading
+from omnibot_driver.core.lois_ecu.readings import (
+    FixReading,
+    HeadingReading,
+    TerminalLeft,
+    TimeReading,
+)
 from omnibot_driver.core.readings import EStopButtonReading
 from omnibot_driver.core.session import Session
 
@@ -24,6 +31,11 @@ FIX_VARIANCE_M2: Final = 0.4**2
 """Of a longitude as a float32; a GPS knows its place less well, but the board does not say how."""
 GPS_VARIANCE_M2: Final = 5.0**2
 ABSENT: Final = [-1.0] + [0.0] * 8
+TERMINAL_DEPTH: Final = 100
+LEFT: Final = (
+    "the board is out of its terminal mode; whether the e-stop button was pressed or released"
+    " meanwhile is unknown: look at it"
+)
 NOT_HEARD: Final = "the board is not heard; connect it and switch it on, then call again"
 
 
@@ -42,14 +54,38 @@ class LoisEcuTopics:
             FixReading: self._publish_fix,
             TimeReading: self._publish_time,
             HeadingReading: self._publish_heading,
+            TerminalLine: self._publish_terminal,
+            TerminalLeft: lambda _left, _stamp_ns: node.get_logger().warning(LEFT),
             EStopButtonReading: lambda button, _stamp_ns: self._button.publish(
                 Bool(data=button.pressed)
             ),
         }
         node.create_service(SetBool, "~/led", self._on_led)
         node.create_service(Trigger, "~/distribute_ball", self._on_ball)
-        if values["drive_mode"] == "duty":
-            node.create_subscription(Float32MultiArray, "duty_cmd", self._on_duty, 1)
+        self._duty: Any = None
+        self._terminal: Any = None
+        self._make_what_the_modes_need()
+        node.add_post_set_parameters_callback(self._apply)
+
+    def _apply(self, changed: list[rclpy.Parameter]) -> None:
+        self._values = {**self._values, **{item.name: item.value for item in changed}}
+        self._make_what_the_modes_need()
+
+    def _make_what_the_modes_need(self) -> None:
+        """Absent means absent: on the executor's thread."""
+        duty, terminal = (
+            self._values["drive_mode"] == "duty",
+            self._values["terminal_mode"] != "host",
+        )
+        if duty and self._duty is None:
+            self._duty = self._node.create_subscription(
+                Float32MultiArray, "duty_cmd", self._on_duty, 1
+            )
+        elif not duty and self._duty is not None:
+            self._node.destroy_subscription(self._duty)
+            self._duty = None
+        if terminal and self._terminal is None:  # it stays: the reader's thread may be using it
+            self._terminal = self._node.create_publisher(String, "~/terminal", TERMINAL_DEPTH)
 
     # From the board
 
@@ -90,6 +126,10 @@ class LoisEcuTopics:
                 linear_acceleration_covariance=ABSENT,
             )
         )
+
+    def _publish_terminal(self, line: TerminalLine, _stamp_ns: int) -> None:
+        if self._terminal is not None:
+            self._terminal.publish(String(data=line.text))
 
     # To the board
 
@@ -136,5 +176,10 @@ class LoisEcuTopics:
                 f"duty_cmd refused: it has {len(duties)} values; send exactly 2, left and right"
             )
         settings = session.board.settings
+        if settings.drive_mode != "duty":
+            raise CommandRefused(
+                "duty_cmd refused: drive_mode is rpm; set it to duty to drive without the speed"
+                " controller"
+            )
         rate_radps = 1.0 / (settings.duty_scale * settings.wheel_radius_m)
         session.command_wheels([duty * rate_radps for duty in duties], now)

@@ -36,15 +36,17 @@ from omnibot_driver.core.lois_ecu.messages import (
     SetRpm,
     SetTerminalMode,
     Stream,
+    TerminalLine,
     TerminalMode,
     Ticks,
 )
 from omnibot_driver.core.lois_ecu.misconfiguration import Suspicion
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.opening import RECOVER_AFTER_S, SettingsWriter
-from omnibot_driver.core.lois_ecu.readings import LoisReading
+from omnibot_driver.core.lois_ecu.readings import LoisReading, TerminalLeft
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.stall import StallWatch
+from omnibot_driver.core.lois_ecu.terminal import ModeChange
 from omnibot_driver.core.lois_ecu.translation import Translation
 from omnibot_driver.core.motion_monitor.monitor import Fault
 from omnibot_driver.core.requests import Request
@@ -104,6 +106,8 @@ class LoisEcu:
         self._statistics = DecoderStatistics()
         self._saturated = 0
         self._opened = False
+        self._change = ModeChange()
+        self._change.want(settings.terminal_mode)
         self.mode = Mode.UNKNOWN
         self._forget_line()
 
@@ -136,6 +140,10 @@ class LoisEcu:
             self._settings.periods_ms,
             self._settings.with_sum,
         )
+        if settings.drive_mode != self._settings.drive_mode:
+            self._change.stop_first(f"drive_mode becomes {settings.drive_mode}")
+        if settings.terminal_mode is not self._settings.terminal_mode:
+            self._change.want(settings.terminal_mode)
         self._settings = self._translation.settings = self._writer.settings = settings
         self._decoder.sum_required = settings.with_sum
         if changed:
@@ -147,6 +155,7 @@ class LoisEcu:
         """The line is new; the settings are written again."""
         self.mode = Mode.UNKNOWN
         self._opened = False
+        self._change.connect()
         self._forget_line()
         self._translation.connect()
 
@@ -162,11 +171,15 @@ class LoisEcu:
     def _understood(self, reports: list[Report], now: float) -> list[LoisReading]:
         restarts = self._translation.restarts
         if reports:
-            if self.mode is Mode.UNKNOWN and self._opened:
+            own = not all(isinstance(report, TerminalLine) for report in reports)
+            if own and self.mode is Mode.UNKNOWN and self._opened:
                 self._writer.begin(now)  # it may have booted, and forgotten what it was told
             self.mode = Mode.NOMINAL
             self._heard_at_s = now
             self._suspicion.understood()
+            if own:
+                self._change.protocol_heard(now)
+                self._decoder.terminal = self._change.terminal
         times = self._decoder.times
         for at, report in zip(times, reports, strict=True):
             if isinstance(report, Ticks):
@@ -180,6 +193,10 @@ class LoisEcu:
         found = self._translation.readings(reports, times, self._decoder.clock_unit, now)
         if self._translation.restarts != restarts:
             self._writer.begin(now)
+        if self._change.left:
+            self._change.left = False
+            self._writer.begin(now)
+            found.append(TerminalLeft())
         return found
 
     def silence(self) -> None:
@@ -256,6 +273,7 @@ class LoisEcu:
             self._writer.begin(now)
             self._recovered_at_s = now
         data = self._writer.due(now, driving=self.driving)
+        data += self._change_mode(now)
         if self._clear_due(now):
             self._stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S
             data += self._lines(outbound.EMERGENCY_STOP)
@@ -265,6 +283,20 @@ class LoisEcu:
             self._writer.begin(now)
         return data
 
+    def _change_mode(self, now: float) -> bytes:
+        """Stop, or the terminal mode, while either of them is to be said."""
+        change = self._change
+        if change.stops(now, stands=bool(self.stands(now))):
+            return self._lines(outbound.STOP)
+        mode = change.due(now, settled=self._writer.done)
+        self._decoder.terminal = change.terminal
+        if mode is None:
+            return b""
+        if mode is TerminalMode.HOST:
+            return self._writer.recovery()
+        self._writer.overwritten = True
+        return self._lines(outbound.STOP, *[SetTerminalMode(mode)] * 3)
+
     @property
     def wake_at(self) -> float:
         """When ``due`` has to be asked again."""
@@ -272,11 +304,12 @@ class LoisEcu:
             return -math.inf
         clear_at = self._stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
         held = self._decoder.resolves_at
-        return min(self._writer.wake_at, clear_at, self._recover_at, held)
+        changes_at = self._change.wake_at
+        return min(self._writer.wake_at, clear_at, self._recover_at, held, changes_at)
 
     @property
     def _recover_at(self) -> float:
-        if self._settings.terminal_mode in (TerminalMode.GPS, TerminalMode.COMPASS):
+        if self._change.sensor_wanted or self._change.terminal:
             return math.inf
         if self.driving:
             return math.inf
@@ -328,6 +361,8 @@ class LoisEcu:
         """Left and right in rad/s; Stop when both round to nothing."""
         settings = self._settings
         left, right = rates_radps
+        if self._change.reason and any(rates_radps):
+            raise CommandRefused(f"motion command refused: {self._change.reason}")
         if settings.drive_mode == "duty":
             percent = settings.wheel_radius_m * settings.duty_scale
             return self.duty((left * percent, right * percent))
@@ -410,18 +445,6 @@ class LoisEcu:
             case RecordKind.HEADING:
                 command = RecordHeading(samples)
         return self._lines(command)
-
-    def terminal_mode(self, mode: TerminalMode, now: float) -> bytes:
-        """Stop, then the mode; back on the protocol the left short correction is written again.
-
-        A press of the button meanwhile is not told by the public firmware.
-        """
-        self._decoder.terminal = mode in (TerminalMode.GPS, TerminalMode.COMPASS)
-        data = self._lines(outbound.STOP, SetTerminalMode(mode))
-        if not self._decoder.terminal:
-            self._writer.begin(now)
-            data += self._writer.recovery()
-        return data
 
     def _lines(self, *commands: Command) -> bytes:
         return outbound.lines(*commands, with_sum=self._settings.with_sum)

@@ -57,7 +57,7 @@ class SettingsWriter:
         self._round_at_s = math.inf
         self._arrivals: deque[float] = deque(maxlen=6)
         self._rounds = 0
-        self._overwritten = False
+        self.overwritten = False
         """The terminal mode was written, and the left short correction with it."""
 
     @property
@@ -133,7 +133,7 @@ class SettingsWriter:
         settings = self.settings
         if not settings.with_sum:
             yield SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
-        if self._overwritten or not settings.with_sum:
+        if self.overwritten or not settings.with_sum:
             yield self._left_short_correction()
         yield SetPeriod(Stream.GPS_DATE, PERIOD_ONCE)
         yield WriteSetting(Setting.RPM_LOW_PASS, settings.low_pass)
@@ -144,7 +144,7 @@ class SettingsWriter:
 
     def recovery(self) -> bytes:
         """For a board that is silent or obeys nothing, whatever it expects."""
-        self._overwritten = True
+        self.overwritten = True
         mode = TerminalMode.HOST if self.settings.with_sum else TerminalMode.HOST_WITHOUT_SUM
         back = SetTerminalMode(mode)
         correction = encode_command(self._left_short_correction(), with_sum=self.settings.with_sum)

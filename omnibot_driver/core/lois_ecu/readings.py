@@ -36,6 +36,11 @@ class HeadingReading:
 
 
 @dataclass(frozen=True, slots=True)
+class TerminalLeft:
+    """The board speaks for itself again; a press of its button meanwhile is unknown."""
+
+
+@dataclass(frozen=True, slots=True)
 class WheelReading:
     """What both wheels turned since the last one, in rad, by ticks where they count."""
 
@@ -54,4 +59,5 @@ LoisReading = (
     | EStopButton
     | Record
     | TerminalLine
+    | TerminalLeft
 )

@@ -21,7 +21,6 @@ from omnibot_driver.core.lois_ecu import (
     SetDuty,
     Setting,
     Stream,
-    TerminalLine,
     TerminalMode,
     encode_command,
     encode_report,
@@ -32,7 +31,6 @@ from omnibot_driver.core.lois_ecu.readings import (
     FixReading,
     HeadingReading,
     TimeReading,
-    WheelReading,
 )
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.readings import DisplacementReading
@@ -377,24 +375,6 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
     assert record.kind is kind
     assert len(record.left) == 21
     assert len(record.right) == (0 if kind is RecordKind.HEADING else 21)
-
-
-def test_terminal_mode_passes_lines_on_and_comes_back() -> None:
-    """It stops first; the left short correction is as before afterwards."""
-    rig = Rig(nominal("firmware"))
-    rig.run(5.0)
-    for _ in range(4):
-        rig.say(rig.driver.terminal_mode(TerminalMode.COMPASS, rig.now))
-        rig.run(0.2)
-    rig.run(2.0)
-    assert any(isinstance(reading, TerminalLine) for reading in rig.readings)
-    for _ in range(4):
-        rig.say(rig.driver.terminal_mode(TerminalMode.HOST, rig.now))
-        rig.run(0.2)
-    rig.readings.clear()
-    rig.run(2.0)
-    assert any(isinstance(reading, WheelReading) for reading in rig.readings)
-    assert rig.board.wheels[0].short_correction == pytest.approx(1.0761719)
 
 
 # What the line carries instead

@@ -14,10 +14,10 @@ from driver_process import Driver
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from probe import Probe
-from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.msg import Log, Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from sensor_msgs.msg import Imu, JointState, NavSatFix, NavSatStatus, TimeReference
-from std_msgs.msg import Bool, Float32MultiArray
+from std_msgs.msg import Bool, Float32MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver.simulator.common.serving import PtyBoard
@@ -279,3 +279,35 @@ def test_it_runs_inside_the_driver_too(firmware: str, start_driver: Start, probe
     assert {"fix", "time_reference", "imu/heading", "estop_button"} <= topics
     assert "imu/data_raw" not in topics
     assert driver.end(signal.SIGINT) == 0
+
+
+def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """Both are parameters of a driver that runs; what they need is there and goes with them."""
+    ecu = ecu_of("firmware", stack, running=True)
+    probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
+    probe.wait_for_state("nominal")
+    lines = probe.listen(String, f"{NODE}/terminal")
+    log = probe.listen(Log, "/rosout")
+    set_parameter(probe, "terminal_mode", "gps")
+    probe.wait_for(lambda: lines and lines[-1].data.startswith("$GPRMC"))
+    set_parameter(probe, "terminal_mode", "host")
+    probe.wait_for(lambda: any("button was pressed or released" in line.msg for line in log))
+    set_parameter(probe, "drive_mode", "duty")
+    publisher = probe.publisher(Float32MultiArray, "duty_cmd")
+    timer = probe.node.create_timer(
+        0.1, lambda: publisher.publish(Float32MultiArray(data=[30.0, 30.0]))
+    )
+    ecu.wait_for(lambda board: [wheel.duty_percent for wheel in board.wheels] == [30, 30])
+    probe.remove(timer)
+
+
+def set_parameter(probe: Probe, name: str, value: str) -> None:
+    """While it runs."""
+    client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
+    assert client.wait_for_service(PATIENCE_S)
+    text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
+    future = client.call_async(SetParameters.Request(parameters=[Parameter(name=name, value=text)]))
+    probe.wait_for_future(future)
+    assert future.result().results[0].successful, future.result().results[0].reason
