@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.core.lois_ecu import Setting, Stream
+from omnibot_driver.core.lois_ecu.messages import MOST_SAMPLES
 from omnibot_driver.parameters import Parameter
 
 SHORTEST_PERIOD_S: Final = 0.05
@@ -119,6 +120,21 @@ DRIVING: Final = (
         "Whose lines the board sends: its own, or those of its GPS or compass, which go to"
         " ~/terminal (0x11). A change stops the robot first; other modes than host refuse motion.",
         choices=("host", "gps", "compass"),
+    ),
+    Parameter(
+        "record_samples",
+        200,
+        "",
+        "Samples of each wheel, or headings, in a record (~/record_rpm, ~/record_torque,"
+        " ~/record_heading). The board completes no more than 1024.",
+        low=1,
+        high=MOST_SAMPLES,
+    ),
+    Parameter(
+        "record_directory",
+        "~/.ros/lois_ecu_records",
+        "",
+        "Where records are written, as CSV.",
     ),
     Parameter(
         "checksum",

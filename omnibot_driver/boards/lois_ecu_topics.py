@@ -13,6 +13,7 @@ from std_msgs.msg import Bool, Float32MultiArray, Header, String
 from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver import messages
+from omnibot_driver.boards.lois_ecu_record_topics import Recorder
 from omnibot_driver.core.commands.limits import require_finite
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.lois_ecu import TerminalLine
@@ -60,6 +61,7 @@ class LoisEcuTopics:
                 Bool(data=button.pressed)
             ),
         }
+        self.publish |= Recorder(node, link, lambda: self._values).publish
         node.create_service(SetBool, "~/led", self._on_led)
         node.create_service(Trigger, "~/distribute_ball", self._on_ball)
         self._duty: Any = None

@@ -13,6 +13,7 @@ from typing import Final
 from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.commands.pipeline import CommandPipeline
 from omnibot_driver.core.events import Event, Notice, StateChanged
+from omnibot_driver.core.long_task import LongTask
 from omnibot_driver.core.measurement.pipeline import MeasurementPipeline
 from omnibot_driver.core.mode_manager import CLOSED, ModeManager, Phase
 from omnibot_driver.core.reporting.figures import SessionFigures
@@ -37,7 +38,9 @@ class Reporter:
         mode_manager: ModeManager,
         measurement: MeasurementPipeline,
         commanding: CommandPipeline,
+        task: LongTask,
     ) -> None:
+        self._task = task
         self._board, self._mode_manager = board, mode_manager
         self._measurement, self._commanding = measurement, commanding
         self._policy, self._calibration = commanding.policy, measurement.inertial.calibration
@@ -68,6 +71,7 @@ class Reporter:
             skew_ppm=self._measurement.skew_ppm,
             commands=self._commanding.figures(now),
             imu=self._measurement.inertial.figures,
+            task=self._task.progress(now),
         )
 
     def notify(self, sentences: Sequence[str]) -> None:
@@ -107,7 +111,11 @@ class Reporter:
 
     def take(self) -> list[Event]:
         """What happened since the last call, in order."""
-        for answers in (self._mode_manager.answers, self._calibration.answers):
+        for answers in (
+            self._mode_manager.answers,
+            self._calibration.answers,
+            self._task.answers,
+        ):
             if answers:
                 self.events += answers
                 answers.clear()

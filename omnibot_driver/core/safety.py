@@ -14,6 +14,7 @@ from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.commands.pipeline import CommandPipeline
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.liveness import Liveness
+from omnibot_driver.core.long_task import LongTask
 from omnibot_driver.core.measurement.pipeline import Measured, MeasurementPipeline
 from omnibot_driver.core.mode_manager import CLOSED, ModeManager
 from omnibot_driver.core.readings import (
@@ -43,11 +44,13 @@ class SafetyStops:
         commanding: CommandPipeline,
         liveness: Liveness,
         reporter: Reporter,
+        task: LongTask,
     ) -> None:
         self._board, self._mode_manager = board, mode_manager
         self._measurement, self._commanding = measurement, commanding
         self._policy = commanding.policy
         self._liveness, self._reporter = liveness, reporter
+        self._task = task
         self._button_held = False
         """By its last event, which may be from before the line was lost."""
 
@@ -88,6 +91,7 @@ class SafetyStops:
             if not latched:
                 self._reporter.notify([f"e-stop latched by {by}"])
             self._policy.latch(now)
+            self._task.give_up("the e-stop was latched meanwhile")
             if self._mode_manager.phase is CLOSED:
                 return "e-stop latched; the port is not open: the stop is sent as soon as it is"
             if self._board.mode is Mode.UNKNOWN:
@@ -118,6 +122,7 @@ class SafetyStops:
         )
         if self._board.mode is not Mode.UNKNOWN:
             self._board.silence()
+            self._task.give_up("the board fell silent meanwhile; check its power and cable")
             self._measurement.restart()
             self.set_out(now)
             self._mode_manager.heard_nothing(now)
@@ -125,6 +130,7 @@ class SafetyStops:
     def stalled(self, seconds: float, now: float) -> None:
         """To a stall of this process: for so long nobody looked after the robot."""
         self._liveness.stalled(now)
+        self._task.give_up("the driver did not run for some time meanwhile; call again")
         self._policy.halt(now)
         self._reporter.notify(
             [

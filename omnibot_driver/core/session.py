@@ -24,6 +24,7 @@ from omnibot_driver.core.geometry.se2 import Pose, Signs
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.liveness import Liveness
+from omnibot_driver.core.long_task import LongTask
 from omnibot_driver.core.measurement.outlier_filter import Refused
 from omnibot_driver.core.measurement.pipeline import MeasurementPipeline
 from omnibot_driver.core.mode_manager import CLOSED, ModeManager
@@ -65,8 +66,11 @@ class Session:
         self._calibration = measurement.inertial.calibration
         liveness = self._liveness = Liveness(board.traits)
         self._interlocks = Interlocks(board, modes, commanding, self._calibration, liveness)
-        reporter = self._reporter = Reporter(board, modes, measurement, commanding)
-        self._safety = SafetyStops(board, modes, measurement, commanding, liveness, reporter)
+        self._task = LongTask()
+        reporter = self._reporter = Reporter(board, modes, measurement, commanding, self._task)
+        self._safety = SafetyStops(
+            board, modes, measurement, commanding, liveness, reporter, self._task
+        )
         self._last: Reading | None = None
         """Of those that were heard and not processed yet."""
 
@@ -112,6 +116,7 @@ class Session:
             self._mode_manager.wake_at,
             self._commands.wake_at,
             self._calibration.wake_at,
+            self._task.wake_at,
         )
 
     # What happens
@@ -150,7 +155,8 @@ class Session:
         self.process(now)
         self._safety.react(self._measurement.release(), now)
         self._mode_manager.closed()
-        self._calibration.give_up("the port was lost meanwhile; call again once it is back")
+        for given_up in (self._calibration.give_up, self._task.give_up):
+            given_up("the port was lost meanwhile; call again once it is back")
         self._commands.discard(now)
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
@@ -215,6 +221,7 @@ class Session:
         self._safety.tick(now)
         self._mode_manager.tick(now)
         self._calibration.tick(now)
+        self._task.tick(now)
 
     def stood_still(self, seconds: float, now: float) -> None:
         """This process, or its watchdog, did not run for so long: no command is current."""
@@ -254,6 +261,23 @@ class Session:
         if reason := self._interlocks.why_not_calibrate():
             raise RequestRefused(reason)
         self._calibration.measure(token, now)
+
+    def begin_task(self, name: str, token: object, limit_s: float, now: float) -> None:
+        """Something that the board takes long for; answered by a RequestDone.
+
+        ``name`` reads well after "a". Raises RequestRefused at once where it cannot be begun.
+        """
+        if reason := self._interlocks.why_not_task():
+            raise RequestRefused(reason)
+        self._task.begin(name, token, limit_s, now)
+
+    def task_is_current(self, token: object) -> bool:
+        """Whether the one with this token is under way, and was not given up."""
+        return self._task.is_current(token)
+
+    def end_task(self, token: object, success: bool, message: str) -> None:
+        """It is done, or has failed."""
+        self._task.end(token, success, message)
 
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
         """Latch or release the e-stop; returns what is so now, in a sentence.
@@ -330,6 +354,9 @@ class Session:
             packets += due
         if now >= self._board.wake_at:
             packets += self._board.due(now)
+        if self._task.active:
+            current = self._commands.current
+            self._task.watch(driven=current is not None and not current.is_zero)
         if self._commands.unconfirmed:
             self._commands.unconfirmed = False
             self._reporter.unconfirmed()

@@ -57,6 +57,18 @@ class Interlocks:
             return f"nothing was heard from the board for {unheard_s:g} s"
         return tripped
 
+    def why_not_task(self) -> str:
+        """Why nothing long is begun."""
+        if self.leaving:
+            return self.why_not_request()
+        if self._mode_manager.phase is Phase.CLOSED:
+            return "the port is not open; connect the board, then call again"
+        if self._policy.latched:
+            return "the e-stop is latched; release it, then call again"
+        if not self._board.mode.running:
+            return f"the board is {self._board.mode.value}; call again when it runs"
+        return ""
+
     def why_not_calibrate(self) -> str:
         """Why the gyro's bias cannot be measured."""
         phase, mode, current = self._mode_manager.phase, self._board.mode, self._policy.current

@@ -8,27 +8,24 @@ it in ``opening``, why set-points look as they do in ``outbound``.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from omnibot_driver.core.board import BoardFigures, Mode
 from omnibot_driver.core.commands.set_points import Authority
-from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu import outbound
 from omnibot_driver.core.lois_ecu.decoder import DecoderStatistics, LoisDecoder
 from omnibot_driver.core.lois_ecu.messages import (
-    MOST_SAMPLES,
     PERIOD_ONCE,
     BoardOdometry,
     Command,
     DistributeBall,
     GpsDate,
-    RecordHeading,
+    Record,
     RecordKind,
-    RecordRpm,
-    RecordTorque,
     Report,
     Reset,
     SetDuty,
@@ -43,7 +40,15 @@ from omnibot_driver.core.lois_ecu.messages import (
 from omnibot_driver.core.lois_ecu.misconfiguration import Suspicion
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.opening import RECOVER_AFTER_S, SettingsWriter
-from omnibot_driver.core.lois_ecu.readings import LoisReading, TerminalLeft
+from omnibot_driver.core.lois_ecu.plausibility import ClockUnit
+from omnibot_driver.core.lois_ecu.readings import (
+    LoisReading,
+    RecordComes,
+    RecordFailed,
+    RecordReading,
+    TerminalLeft,
+)
+from omnibot_driver.core.lois_ecu.record_request import RecordRequest
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.stall import StallWatch
 from omnibot_driver.core.lois_ecu.terminal import ModeChange
@@ -91,6 +96,8 @@ TRAITS: Final = Traits(
 CLEAR_AFTER_S: Final = 2.0
 """After a Stop; then RPM 0/0 ends the counting."""
 CLEAR_AGAIN_S: Final = 0.15
+RECORD_COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
+"""Of an RPM record, by the unit of 0x12's time: the public firmware departs in both."""
 
 
 class LoisEcu:
@@ -120,6 +127,8 @@ class LoisEcu:
         self._stopped_at_s = math.inf
         self._stood = False
         self._stall = StallWatch()
+        self._request = RecordRequest()
+        self._damaged = 0
         self._clears_left = outbound.CLEARED_TIMES
 
     @property
@@ -197,7 +206,7 @@ class LoisEcu:
             self._change.left = False
             self._writer.begin(now)
             found.append(TerminalLeft())
-        return found
+        return self._recorded(found, now, restarted=self._translation.restarts != restarts)
 
     def silence(self) -> None:
         """Nothing was understood for so long that the mode is unknown again."""
@@ -274,6 +283,8 @@ class LoisEcu:
             self._recovered_at_s = now
         data = self._writer.due(now, driving=self.driving)
         data += self._change_mode(now)
+        if (record := self._request.due(now)) is not None:
+            data += self._lines(record)
         if self._clear_due(now):
             self._stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S
             data += self._lines(outbound.EMERGENCY_STOP)
@@ -304,8 +315,8 @@ class LoisEcu:
             return -math.inf
         clear_at = self._stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
         held = self._decoder.resolves_at
-        changes_at = self._change.wake_at
-        return min(self._writer.wake_at, clear_at, self._recover_at, held, changes_at)
+        others_at = min(self._change.wake_at, self._request.wake_at)
+        return min(self._writer.wake_at, clear_at, self._recover_at, held, others_at)
 
     @property
     def _recover_at(self) -> float:
@@ -429,22 +440,45 @@ class LoisEcu:
         """Once; do not repeat it."""
         return self._lines(DistributeBall())
 
-    def record(self, kind: RecordKind, samples: int) -> bytes:
-        """Begin to record. Raises CommandRefused where it could not complete."""
-        if not 0 < samples <= MOST_SAMPLES:
-            raise CommandRefused(
-                f"record refused: {samples} samples; the board completes 1 to {MOST_SAMPLES}"
-            )
+    def record(self, kind: RecordKind, samples: int) -> None:
+        """Begin to record. Raises RequestRefused where it could not complete."""
+        if self._change.reason:
+            raise RequestRefused(f"record refused: {self._change.reason}")
+        self._request.begin(kind, samples)
         self._decoder.expect_record(kind, samples, 0 if kind is RecordKind.HEADING else samples)
-        command: Command
-        match kind:
-            case RecordKind.RPM:
-                command = RecordRpm(samples, samples)
-            case RecordKind.TORQUE:
-                command = RecordTorque(samples, samples)
-            case RecordKind.HEADING:
-                command = RecordHeading(samples)
-        return self._lines(command)
+        self._damaged = self._decoder.group_statistics.damaged_records
+
+    def _recorded(
+        self, found: list[LoisReading], now: float, *, restarted: bool
+    ) -> list[LoisReading]:
+        """With the record that was awaited, or why it is not going to come."""
+        request = self._request
+        if request.kind is None:
+            return found
+        if self._decoder.in_record:
+            request.arrives()
+            self._heard_at_s = now
+        for place, reading in enumerate(found):
+            if isinstance(reading, Record):
+                request.end()
+                unit = self._decoder.clock_unit
+                found[place] = RecordReading(
+                    reading,
+                    None if unit is None else RECORD_COUNT_S[unit],
+                    self._settings.ticks_per_revolution,
+                )
+                return found
+        failed = ""
+        if restarted:
+            failed = "the board has restarted; call again"
+        elif self._change.reason:
+            failed = self._change.reason
+        elif self._decoder.group_statistics.damaged_records != self._damaged:
+            failed = "a line of it was lost on its way; call again"
+        if not failed:
+            return found or ([RecordComes()] if self._decoder.in_record else [])
+        request.end()
+        return [*found, RecordFailed(failed)]
 
     def _lines(self, *commands: Command) -> bytes:
         return outbound.lines(*commands, with_sum=self._settings.with_sum)

@@ -64,6 +64,11 @@ class LoisDecoder:
         """When ``feed`` should be called at the latest, also without bytes."""
         return self._assembler.resolves_at
 
+    @property
+    def in_record(self) -> bool:
+        """Whether the lines of a record are coming."""
+        return self._assembler.in_record
+
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
         """A record of so many samples was asked for; one that was not asked for is dropped."""
         self._assembler.expect_record(kind, left, right)

@@ -18,7 +18,7 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu.board import TRAITS, LoisEcu
-from omnibot_driver.core.lois_ecu.messages import EStopButton, SetLed, Ticks
+from omnibot_driver.core.lois_ecu.messages import EStopButton, RecordKind, SetLed, Ticks
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import LoisReading, WheelReading
 from omnibot_driver.core.lois_ecu.reset_proof import ResetProof
@@ -259,6 +259,10 @@ class LoisEcuBoard(Board):
     def set_led(self, on: bool, now: float) -> None:
         """Said until it has surely arrived."""
         self._ecu.say(SetLed(on), now)
+
+    def record(self, kind: RecordKind, samples: int) -> None:
+        """Begin to record; a RecordReading or a RecordFailed comes of it. Raises RequestRefused."""
+        self._ecu.record(kind, samples)
 
     def distribute_ball(self) -> None:
         """Said once, as each is another ball; a lost line is not noticed."""

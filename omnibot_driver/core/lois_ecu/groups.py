@@ -61,11 +61,13 @@ Timed = tuple[float, Report]
 class GroupStatistics:
     """Counts since they were made.
 
-    ``damaged_groups``: groups and records that were dropped; ``implausible``: groups that were
+    ``damaged_groups``: groups and records that were dropped, ``damaged_records`` of them records;
+    ``implausible``: groups that were
     whole and cannot be true; ``unknown_lines``: right lines that say nothing.
     """
 
     damaged_groups: int = 0
+    damaged_records: int = 0
     implausible: int = 0
     unknown_lines: int = 0
 
@@ -102,6 +104,11 @@ class Assembler:
     def resolves_at(self) -> float:
         """When a group that is held comes out if nothing follows it; infinity without one."""
         return self._at + QUIET_S if self._code is not None and not self._done else math.inf
+
+    @property
+    def in_record(self) -> bool:
+        """Whether the lines of a record are coming."""
+        return self._record_code is not None
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
         """A record of so many samples was asked for; one that was not is dropped."""
@@ -245,8 +252,7 @@ class Assembler:
     def _break_record(self) -> list[Timed]:
         """Something else came before its end."""
         if self._record_code is not None:
-            self.statistics.damaged_groups += 1
-            self._begin_record(None)
+            self._drop_record()
         return []
 
     def _sample(self, code: int, payload: int) -> list[Record]:
@@ -260,12 +266,17 @@ class Assembler:
                 self._record.append(payload)
             return []
         record = None if self._record_damaged else self._whole_record(code)
-        self._begin_record(None)
         if record is None:
-            self.statistics.damaged_groups += 1
+            self._drop_record()
             return []
+        self._begin_record(None)
         self._expected = None
         return [record]
+
+    def _drop_record(self) -> None:
+        self.statistics.damaged_groups += 1
+        self.statistics.damaged_records += 1
+        self._begin_record(None)
 
     def _whole_record(self, code: int) -> Record | None:
         if self._expected is None:

@@ -36,6 +36,27 @@ class HeadingReading:
 
 
 @dataclass(frozen=True, slots=True)
+class RecordReading:
+    """A record that was asked for. ``count_s``: unit of an RPM record, None while it is unknown."""
+
+    record: Record
+    count_s: float | None
+    ticks_per_revolution: int
+
+
+@dataclass(frozen=True, slots=True)
+class RecordComes:
+    """Lines of a record that was asked for came in; a whole one takes up to 1.3 s."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordFailed:
+    """A record that was asked for is not going to come; ``reason``: why, and what to do."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class TerminalLeft:
     """The board speaks for itself again; a press of its button meanwhile is unknown."""
 
@@ -58,6 +79,9 @@ LoisReading = (
     | HeadingReading
     | EStopButton
     | Record
+    | RecordReading
+    | RecordComes
+    | RecordFailed
     | TerminalLine
     | TerminalLeft
 )

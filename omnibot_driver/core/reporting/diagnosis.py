@@ -155,6 +155,8 @@ class Diagnosis:
             level = Level.WARN
             message = "the board has restarted: unless you reset it, check its power supply"
         values = {"Mode": session.state, "Restarts": str(restarts), **session.board.own}
+        if session.task:
+            values["Under way"] = session.task
         return Status("Board", level, message, values)
 
     def _stream(self, link: LinkFigures, session: SessionFigures, now: float) -> Status:

@@ -60,7 +60,10 @@ class ImuFigures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionFigures:
-    """``skew_ppm``: how much faster the board's clock runs than ours."""
+    """``skew_ppm``: how much faster the board's clock runs than ours.
+
+    ``task``: what is under way that takes the board long, and since when; empty where nothing is.
+    """
 
     state: str
     tally: StreamStatistics
@@ -69,3 +72,4 @@ class SessionFigures:
     skew_ppm: float
     commands: CommandFigures
     imu: ImuFigures
+    task: str = ""

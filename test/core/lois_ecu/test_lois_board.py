@@ -10,13 +10,12 @@ import pytest
 from lois_drives import Rig, nominal
 
 from omnibot_driver.core.board import Mode
-from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu import (
     EStopButton,
     GpsDate,
     GpsTime,
-    Record,
     RecordKind,
     SetDuty,
     Setting,
@@ -30,6 +29,8 @@ from omnibot_driver.core.lois_ecu.messages import Heading, SetTerminalMode
 from omnibot_driver.core.lois_ecu.readings import (
     FixReading,
     HeadingReading,
+    RecordFailed,
+    RecordReading,
     TimeReading,
 )
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
@@ -133,11 +134,27 @@ def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
 def test_a_record_that_cannot_complete_is_refused() -> None:
     """More than 1024 samples never end."""
     ecu = started()
-    assert ecu.record(RecordKind.RPM, 100) == b":04006400643e\n"
-    assert ecu.record(RecordKind.HEADING, 3) == b":0c000000036a\n"
     for samples in (0, 1025):
-        with pytest.raises(CommandRefused, match="1 to 1024"):
+        with pytest.raises(RequestRefused, match="1 to 1024"):
             ecu.record(RecordKind.TORQUE, samples)
+
+
+@pytest.mark.parametrize(
+    ("kind", "samples", "line"),
+    [
+        (RecordKind.RPM, 100, b":04006400643e\n"),
+        (RecordKind.TORQUE, 1, b":17000100013c\n"),
+        (RecordKind.HEADING, 3, b":0c000000036a\n"),
+    ],
+)
+def test_a_record_is_asked_for_three_times(kind: RecordKind, samples: int, line: bytes) -> None:
+    """As a line may be lost; in a third of a second, as each makes the board begin anew."""
+    ecu = started()
+    ecu.record(kind, samples)
+    sent = b"".join(ecu.due(0.01 * step) for step in range(100))
+    assert sent.count(line) == 3
+    ecu.record(kind, samples)
+    assert line in b"".join(ecu.due(1.0 + 0.01 * step) for step in range(30))
 
 
 # With a board
@@ -361,20 +378,32 @@ def test_false_headings_at_north_are_refused() -> None:
 @pytest.mark.parametrize("kind", RecordKind)
 @BOTH
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
-    """While the wheels turn."""
+    """While the wheels turn; its unit is that of the firmware, known by the board's clock."""
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 3.0)
-    for _ in range(3):  # the request may be lost
-        rig.say(rig.driver.record(kind, 21))
-        rig.run(7.0)
-        records = [reading for reading in rig.readings if isinstance(reading, Record)]
-        if records:
-            break
-    (record,) = records
-    assert record.kind is kind
-    assert len(record.left) == 21
-    assert len(record.right) == (0 if kind is RecordKind.HEADING else 21)
+    rig.driver.record(kind, 21)
+    rig.run(7.0)
+    (reading,) = [reading for reading in rig.readings if isinstance(reading, RecordReading)]
+    assert reading.record.kind is kind
+    assert len(reading.record.left) == 21
+    assert len(reading.record.right) == (0 if kind is RecordKind.HEADING else 21)
+    assert reading.count_s == (1e-4 if firmware == "firmware" else 1e-7)
+    assert not [reading for reading in rig.readings if isinstance(reading, RecordFailed)]
+
+
+def test_a_record_that_lost_a_line_is_given_up() -> None:
+    """It is dropped whole."""
+    rig = Rig(nominal("firmware"))
+    rig.run(5.0)
+    rig.driver.record(RecordKind.TORQUE, 100)
+    rig.run(9.0)
+    while not rig.driver._decoder.in_record:
+        rig.run(0.01)
+    rig.board.step()
+    rig.run(2.0)
+    assert [reading for reading in rig.readings if isinstance(reading, RecordFailed)]
+    assert not [reading for reading in rig.readings if isinstance(reading, RecordReading)]
 
 
 # What the line carries instead

@@ -11,9 +11,9 @@ from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import Extra
-from omnibot_driver.core.lois_ecu import TerminalLine, TerminalMode
+from omnibot_driver.core.lois_ecu import RecordKind, TerminalLine, TerminalMode
 from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
-from omnibot_driver.core.lois_ecu.readings import TerminalLeft
+from omnibot_driver.core.lois_ecu.readings import RecordFailed, RecordReading, TerminalLeft
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.requests import Request, RequestDone
@@ -245,3 +245,33 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
     bench.drive_on(0.3, 2.0)
     assert bench.board.commands[-1].command == 0x01
     assert not bench.robot.stands
+
+
+@FIRMWARE
+def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
+    """It takes 1.2 s, in which nothing else comes; the robot is driven on."""
+    bench = Bench(firmware)
+    bench.drive_on(0.6, 2.0)
+    board = bench.session.board
+    assert isinstance(board, LoisEcuBoard)
+    board.record(RecordKind.RPM, 1024)
+    while not told(bench, RecordReading):
+        bench.drive(0.6)
+        bench.run(0.05)
+        assert bench.session.state == "nominal"
+    (reading,) = told(bench, RecordReading)
+    assert len(reading.record.left) == len(reading.record.right) == 1024
+
+
+def test_a_terminal_mode_ends_a_record() -> None:
+    """The board would send it into silence."""
+    bench = Bench("firmware")
+    board = bench.session.board
+    assert isinstance(board, LoisEcuBoard)
+    board.record(RecordKind.TORQUE, 500)
+    bench.run(0.5)
+    configure(bench, GPS)
+    bench.run(0.5)
+    assert "terminal_mode is gps" in told(bench, RecordFailed)[0].reason
+    with pytest.raises(RequestRefused, match="terminal_mode is gps"):
+        board.record(RecordKind.TORQUE, 500)

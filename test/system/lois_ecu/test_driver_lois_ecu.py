@@ -7,9 +7,11 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import Driver
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
@@ -301,6 +303,32 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
     )
     ecu.wait_for(lambda board: [wheel.duty_percent for wheel in board.wheels] == [30, 30])
     probe.remove(timer)
+
+
+def test_a_record_is_a_file_and_an_estop_ends_one(
+    start_driver: Start, probe_of: Start, stack: ExitStack, tmp_path: Path
+) -> None:
+    """The answer is its path; what was not recorded whole leaves nothing."""
+    ecu = ecu_of("firmware", stack, running=True)
+    folder = tmp_path / "records"
+    driver = start_driver(
+        ecu.path, board="lois_ecu", record_samples=30, record_directory=str(folder)
+    )
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    answer = probe.call(Trigger, "record_heading")
+    assert answer.success, answer.message
+    assert Path(answer.message).parent == folder
+    assert len(Path(answer.message).read_text().splitlines()) == 31
+    status = probe.listen(DiagnosticArray, "/diagnostics")
+    waiting = probe.call_async(Trigger, "record_rpm")  # for ticks, which do not come
+    probe.wait_for(lambda: "record of RPM: " in str(status[-1:]))
+    assert "record of RPM is under way" in probe.call(Trigger, "record_torque").message
+    assert probe.call(SetBool, "estop", data=True).success
+    ended = waiting.wait()
+    assert not ended.success
+    assert "e-stop" in ended.message
+    assert len(list(folder.iterdir())) == 1
 
 
 def set_parameter(probe: Probe, name: str, value: str) -> None:

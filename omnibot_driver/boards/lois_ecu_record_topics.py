@@ -1,0 +1,101 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The services that make the LOIS ECU record, each answered when its file is there. Wires only."""
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, Final, cast
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from omnibot_driver.boards import lois_ecu_records
+from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.lois_ecu import RecordKind
+from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, RecordReading
+from omnibot_driver.core.requests import RequestDone
+from omnibot_driver.core.session import Session
+
+LONGEST_S: Final = 120.0
+NAMES: Final = {
+    RecordKind.RPM: "record of RPM",
+    RecordKind.TORQUE: "record of torque",
+    RecordKind.HEADING: "record of headings",
+}
+
+
+class Recorder:
+    """``values``: asked for the parameters of the moment; ``publish``: who is told what comes."""
+
+    def __init__(self, node: Node, link: Any, values: Callable[[], Mapping[str, Any]]) -> None:
+        self._node, self._link, self._values = node, link, values
+        self._token: Future | None = None
+        self.publish: dict[type, Callable[[Any, int], None]] = {
+            RecordReading: self._on_record,
+            RecordFailed: self._on_failed,
+            RecordComes: lambda _comes, _stamp_ns: None,  # that it counts as heard is enough
+        }
+        waiting = ReentrantCallbackGroup()
+        for kind in RecordKind:
+            node.create_service(
+                Trigger,
+                f"~/record_{kind.value}",
+                partial(self._on_service, kind),
+                callback_group=waiting,
+            )
+
+    async def _on_service(
+        self, kind: RecordKind, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        answer, samples = Future(), int(self._values()["record_samples"])
+
+        def begin(session: Session, now: float) -> None:
+            session.begin_task(NAMES[kind], answer, LONGEST_S, now)
+            try:
+                cast(LoisEcuBoard, session.board).record(kind, samples)
+            except RequestRefused as error:
+                session.end_task(answer, False, str(error))
+            self._token = answer
+
+        try:
+            self._link.call(begin)
+        except RequestRefused as error:
+            response.success, response.message = False, str(error)
+            return response
+        done: RequestDone = await answer
+        response.success, response.message = done.success, done.message
+        return response
+
+    def _on_failed(self, failed: RecordFailed, _stamp_ns: int) -> None:
+        self._end(self._token, False, f"the record failed: {failed.reason}")
+
+    def _on_record(self, reading: RecordReading, _stamp_ns: int) -> None:
+        """On a thread of its own: a disk may take its time, and the reader does not wait for it."""
+        save = partial(self._save, self._token, reading)
+        threading.Thread(target=save, name="omnibot-record", daemon=True).start()
+
+    def _save(self, token: Future | None, reading: RecordReading) -> None:
+        kind = reading.record.kind
+        folder = Path(self._values()["record_directory"]).expanduser()
+        path = folder / lois_ecu_records.file_name(kind, time.time())
+        try:
+            saved = lois_ecu_records.save(reading, path, partial(self._is_current, token))
+        except Exception as error:  # whoever asked is owed an answer
+            self._end(token, False, f"the {NAMES[kind]} came, but is not saved: {error}")
+            return
+        if saved:
+            if remark := lois_ecu_records.remark(reading):
+                self._node.get_logger().warning(remark)
+            self._end(token, True, str(path.absolute()))
+
+    def _is_current(self, token: Future | None) -> bool:
+        return bool(self._link.call(lambda session, _now: session.task_is_current(token)))
+
+    def _end(self, token: Future | None, success: bool, message: str) -> None:
+        self._link.call(lambda session, _now: session.end_task(token, success, message))

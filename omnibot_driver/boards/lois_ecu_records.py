@@ -1,0 +1,105 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A record of the LOIS ECU as a CSV file: whole under its final name, or not at all.
+
+Knows what was recorded and files. Knows no ROS and no lines.
+"""
+
+import contextlib
+import csv
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from itertools import zip_longest
+from pathlib import Path
+from typing import Final
+
+from omnibot_driver.core.lois_ecu import RecordKind
+from omnibot_driver.core.lois_ecu.readings import RecordReading
+
+SATURATED: Final = 0xFFFF
+"""A tick that took longer than its word can tell."""
+
+Row = tuple[object, ...]
+
+
+def table(reading: RecordReading) -> Iterator[Row]:
+    """The header, then one row for each sample; what is unknown is empty.
+
+    RPM: time from tick to tick in s, and the speed that it means, besides the board's own counts.
+    Torque: counts of a 12 bit ADC, whose scale the board does not tell. Heading: degrees clockwise
+    from magnetic north.
+    """
+    record = reading.record
+    if record.kind is RecordKind.HEADING:
+        yield "sample", "heading_deg"
+        yield from enumerate(record.left)
+        return
+    pairs = enumerate(zip_longest(record.left, record.right, fillvalue=""))
+    if record.kind is RecordKind.TORQUE:
+        yield "sample", "left_adc_counts", "right_adc_counts"
+        yield from ((number, left, right) for number, (left, right) in pairs)
+        return
+    yield (
+        *("sample", "left_tick_s", "right_tick_s", "left_rpm", "right_rpm"),
+        *("left_counts", "right_counts"),
+    )
+    for number, pair in pairs:
+        ticks_s = [_tick_s(count, reading.count_s) for count in pair]
+        rpms = [_rpm(tick_s, reading.ticks_per_revolution) for tick_s in ticks_s]
+        yield (
+            number,
+            *("" if tick_s is None else f"{tick_s:.7f}" for tick_s in ticks_s),
+            *rpms,
+            *pair,
+        )
+
+
+def remark(reading: RecordReading) -> str:
+    """What the file does not tell, in a sentence; empty where it tells all."""
+    if reading.record.kind is not RecordKind.RPM:
+        return ""
+    if reading.count_s is None:
+        return "the record has counts alone: the unit of the board's time is not known yet"
+    slow = (*reading.record.left, *reading.record.right).count(SATURATED)
+    if not slow:
+        return ""
+    longest_s = SATURATED * reading.count_s
+    return f"{slow} ticks of the record took longer than the {longest_s:.4g} s that the board tells"
+
+
+def file_name(kind: RecordKind, at_s: float) -> str:
+    """Of a record that ended then, in s of UTC since 1970."""
+    return f"{kind.value}_{datetime.fromtimestamp(at_s, UTC):%Y%m%dT%H%M%S_%f}.csv"
+
+
+def save(reading: RecordReading, path: Path, wanted: Callable[[], bool] = lambda: True) -> bool:
+    """Whether it is there: it is left out where it is not ``wanted`` any more. Raises OSError."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor, name = tempfile.mkstemp(prefix=f".{path.name}", dir=path.parent)
+    try:
+        with open(descriptor, "w", encoding="utf-8", newline="") as file:
+            os.fchmod(descriptor, 0o644)
+            csv.writer(file, lineterminator="\n").writerows(table(reading))
+            file.flush()
+            os.fsync(descriptor)
+        if wanted():
+            os.replace(name, path)
+            return True
+        os.unlink(name)
+        return False
+    except BaseException:
+        with contextlib.suppress(OSError):
+            os.unlink(name)
+        raise
+
+
+def _tick_s(count: object, count_s: float | None) -> float | None:
+    if count_s is None or not isinstance(count, int) or count in (0, SATURATED):
+        return None
+    return count * count_s
+
+
+def _rpm(tick_s: float | None, ticks_per_revolution: int) -> str:
+    return "" if tick_s is None else f"{60 / (tick_s * ticks_per_revolution):.2f}"

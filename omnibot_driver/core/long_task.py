@@ -1,0 +1,77 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a board is asked for and takes long to do, such as a record: one at a time.
+
+It ends when whoever carries it out says so, with a failure when its time is over, and at once when
+the robot is stopped, the e-stop is latched, or the board is lost. Knows times and sentences, not
+what is done.
+"""
+
+import math
+
+from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.requests import RequestDone
+
+
+class LongTask:
+    """``answers``: those that were not taken yet."""
+
+    def __init__(self) -> None:
+        self.answers: list[RequestDone] = []
+        self._name = ""
+        self._token: object = None
+        self._begun_at = self._ends_at = math.inf
+        self._driven = False
+
+    @property
+    def active(self) -> bool:
+        """Whether one is under way."""
+        return self._ends_at < math.inf
+
+    @property
+    def wake_at(self) -> float:
+        """When ``tick`` has something to do."""
+        return self._ends_at
+
+    def begin(self, name: str, token: object, limit_s: float, now: float) -> None:
+        """From now on. ``name`` reads well after "a". Raises RequestRefused while another is."""
+        if self.active:
+            raise RequestRefused(
+                f"a {self._name} is under way; wait for its answer, then call again"
+            )
+        self._name, self._token, self._driven = name, token, False
+        self._begun_at, self._ends_at = now, now + limit_s
+
+    def is_current(self, token: object) -> bool:
+        """Whether the one with this token is under way."""
+        return self.active and self._token is token
+
+    def end(self, token: object, success: bool, message: str) -> None:
+        """It is done, or failed; nothing where it has ended before."""
+        if self.is_current(token):
+            self.answers.append(RequestDone(token, success, message))
+            self._token, self._begun_at, self._ends_at = None, math.inf, math.inf
+
+    def give_up(self, reason: str) -> None:
+        """Nothing comes of it; nothing where none is under way."""
+        if self.active:
+            self.end(self._token, False, f"the {self._name} failed: {reason}")
+
+    def watch(self, *, driven: bool) -> None:
+        """Whether the robot is commanded to move now: a stop ends it."""
+        if self._driven and not driven:
+            self.give_up("the robot was stopped meanwhile; call again")
+        self._driven = driven
+
+    def tick(self, now: float) -> None:
+        """Time passed."""
+        if now >= self._ends_at:
+            limit_s = self._ends_at - self._begun_at
+            self.give_up(f"the board did not complete it within {limit_s:g} s")
+
+    def progress(self, now: float) -> str:
+        """What is done, and since when; empty while nothing is."""
+        if not self.active:
+            return ""
+        limit_s = self._ends_at - self._begun_at
+        return f"{self._name}: {now - self._begun_at:.0f} s of at most {limit_s:.0f} s"
