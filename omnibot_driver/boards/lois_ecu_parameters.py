@@ -140,20 +140,33 @@ DRIVING: Final = (
         "checksum",
         True,
         "",
-        "Whether the board checks what it is sent. The board is set to it (0x11).",
+        "Whether the board checks what it is sent. The board is set to it (0x11). Fixed, as the last"
+        " words of the guard are in this form.",
         fixed=True,
     ),
 )
 
 
+_RANGES: Final = {
+    "kp": (0.0, 1000.0),
+    "tn": (0.001, 1000.0),
+    "td": (0.0, 1000.0),
+    "short_correction": (0.1, 10.0),
+    "long_correction": (0.1, 10.0),
+    "feed_forward": (0.0, 1000.0),
+}
+"""A wheel runs away with a negative gain, and the controller divides by Tn."""
+
+
 def _setting(name: str, what: str) -> Parameter:
+    low, high = _RANGES[name.partition("_")[2]]
     return Parameter(
         name,
-        0.0,
+        1.0,
         "",
         f"{what}. Unset: the board keeps its own.",
-        low=-1e6,
-        high=1e6,
+        low=low,
+        high=high,
         unset=True,
         calibrated=True,
     )
