@@ -1,15 +1,17 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Starts the driver, the description and robot_localization's filter over odometry and gyro.
+"""Starts the driver, the description and robot_localization's filter over odometry and gyro, or
+over odometry and compass where the board has one.
 
 The filter publishes odom to base_link, so the driver does not. The description is needed: it says
-that the IMU hangs upside down. Takes the arguments of driver.launch.py and description.launch.py.
+how the sensors are mounted, OmniBot's IMU upside down. Takes the arguments of driver.launch.py and
+description.launch.py.
 """
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, PythonExpression
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
@@ -37,12 +39,21 @@ def generate_launch_description() -> LaunchDescription:
         parameter: ParameterValue([prefix, frame], value_type=str)
         for parameter, frame in FRAMES.items()
     }
+    board = LaunchConfiguration("board")
+    file = PythonExpression(
+        ["'ekf.yaml' if '", board, "' == 'omnibot' else 'ekf_", board, ".yaml'"]
+    )
     return LaunchDescription(
         [
             DeclareLaunchArgument(
+                "board",
+                default_value="omnibot",
+                description="Motor board of the robot, for which ekf_params_file is chosen.",
+            ),
+            DeclareLaunchArgument(
                 "ekf_params_file",
                 default_value=PathJoinSubstitution(
-                    [FindPackageShare("omnibot_driver"), "config", "ekf.yaml"]
+                    [FindPackageShare("omnibot_driver"), "config", file]
                 ),
                 description="YAML file with the filter's parameters; the frames are set here.",
             ),

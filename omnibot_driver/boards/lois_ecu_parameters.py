@@ -140,8 +140,8 @@ DRIVING: Final = (
         "checksum",
         True,
         "",
-        "Whether the board checks what it is sent. The board is set to it (0x11). Fixed, as the last"
-        " words of the guard are in this form.",
+        "Whether the board checks what it is sent. The board is set to it (0x11). It cannot change"
+        " while the driver runs, as the last words of the guard are in this form.",
         fixed=True,
     ),
 )
