@@ -121,12 +121,22 @@ class SettingsWriter:
             self._rounds_left -= 1
             self._rounds += 1
             self._round_at_s = max(now, self._round_at_s) + ROUND_S
-            for index, command in enumerate(self.commands()):
+            for index, command in enumerate(self._turned(self._rounds)):
                 self._queue.append((now + index * LINE_S, command))
         data = b""
         while self._queue and now >= self._queue[0][0]:
             data += encode_command(self._queue.popleft()[1], with_sum=self.settings.with_sum)
         return data
+
+    def _turned(self, rounds: int) -> list[Command]:
+        """All of them, each round beginning elsewhere: a round may take as long as the board takes
+        from one group to the next, and then it would be deaf for the same line in each.
+        """
+        found = list(self.commands())
+        first = 0 if self.settings.with_sum else 2  # these two have their order
+        rest = found[first:]
+        place = rounds * len(rest) // ROUNDS % len(rest)
+        return [*found[:first], *rest[place:], *rest[:place]]
 
     def commands(self) -> Iterable[Command]:
         """In the order in which they are written."""

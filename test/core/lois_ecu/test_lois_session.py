@@ -11,7 +11,13 @@ from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import Extra
-from omnibot_driver.core.lois_ecu import RecordKind, TerminalLine, TerminalMode
+from omnibot_driver.core.lois_ecu import (
+    RecordKind,
+    Setting,
+    Stream,
+    TerminalLine,
+    TerminalMode,
+)
 from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordFailed, RecordReading, TerminalLeft
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
@@ -275,3 +281,20 @@ def test_a_terminal_mode_ends_a_record() -> None:
     assert "terminal_mode is gps" in told(bench, RecordFailed)[0].reason
     with pytest.raises(RequestRefused, match="terminal_mode is gps"):
         board.record(RecordKind.TORQUE, 500)
+
+
+OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFFFF)
+
+
+@pytest.mark.parametrize("count", range(1, 13))
+def test_every_setting_arrives_however_many_there_are(count: int) -> None:
+    """A round of them may take as long as the board takes from group to group: then the same line
+    was lost in each of five rounds."""
+    names = [setting for setting in Setting if setting != Setting.RPM_LOW_PASS][:count]
+    quiet = {Stream.TICKS: 200, Stream.ODOMETRY: 200, **OFF}
+    bench = Bench("firmware")
+    written = dict.fromkeys(names, 0.5)
+    configure(bench, LoisEcuSettings(periods_ms=quiet, written=written))
+    bench.run(3.5)
+    arrived = {line.command for line in bench.board.commands if line.payload == 0x3F000000}
+    assert arrived == {int(setting) for setting in names}
