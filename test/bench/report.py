@@ -10,6 +10,7 @@ import argparse
 import os
 import platform
 import sys
+from importlib import import_module
 from pathlib import Path
 
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # users have their bytecode
@@ -22,6 +23,8 @@ from ratios import Figure, table
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "performance.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
+OTHERS = {"lois_ecu": "lois_ecu_bench"}
+"""By the name of the board: the module that measures it."""
 SCALES = (1, 2, 4, 8, 16)
 
 
@@ -59,11 +62,15 @@ def main() -> int:
     """Run, print, write."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
-        "--board", choices=("omnibot",), default="omnibot", help="that this is measured on"
+        "--board", choices=("omnibot", *OTHERS), default="omnibot", help="that is measured"
     )
     arguments.add_argument("--quick", action="store_true")
     chosen = arguments.parse_args()
-    figures, sections = measure(quick=chosen.quick)
+    begin, measured = BEGIN, measure
+    if chosen.board in OTHERS:
+        begin = BEGIN.replace("figures", f"figures of {chosen.board}")
+        measured = import_module(OTHERS[chosen.board]).measure
+    figures, sections = measured(quick=chosen.quick)
     machine = (
         f"{os.cpu_count()} processors, load {os.getloadavg()[2]:.1f} over the last 15 minutes,"
         f" Linux, Python {platform.python_version()}:"
@@ -72,9 +79,9 @@ def main() -> int:
     print(text)
     if not chosen.quick:
         document = DOCUMENT.read_text()
-        before, rest = document.split(BEGIN)
-        after = rest.split(END)[1]
-        DOCUMENT.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}")
+        before, rest = document.split(begin)
+        after = rest.split(END, 1)[1]
+        DOCUMENT.write_text(f"{before}{begin}\n{text}\n{END}{after}")
     return 0 if all(each.goal is None or each.ratio <= each.goal for each in figures) else 1
 
 

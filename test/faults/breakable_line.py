@@ -7,10 +7,12 @@ Knows bytes only as bytes. A ``Damage`` is what happens to those of one tick, or
 
 from collections.abc import Callable
 from random import Random
-from typing import Final
+from typing import Any, Final
+
+from rig_board import RigBoard
 
 from omnibot_driver.simulator.common.board import Packet
-from omnibot_driver.simulator.omnibot import BoardSettings, FaultyLine, LineFaults, SimulatedBoard
+from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
 
 TICK_S: Final = 0.01
 BYTES_PER_TICK: Final = 115
@@ -78,17 +80,19 @@ class BreakableLine:
     tick in which its motors were told to turn.
     """
 
-    channels, tick_s = SimulatedBoard.channels, SimulatedBoard.tick_s
+    tick_s = TICK_S
 
-    def __init__(self, settings: BoardSettings) -> None:
-        self.board = SimulatedBoard(settings)
+    def __init__(self, kind: RigBoard, settings: Any = None) -> None:
+        self.board = kind.make(settings)
+        self.channels = self.board.channels
+        self._kind = kind
         self.to_board = self.from_board = whole
         self.sent: list[bytes] = []
         self.driven_at = -1
 
     @property
     def tick(self) -> int:
-        return self.board.tick
+        return int(self.board.tick)
 
     def heal(self) -> None:
         self.to_board = self.from_board = whole
@@ -98,12 +102,7 @@ class BreakableLine:
 
     def step(self) -> bytes:
         data = self.board.step()
-        sent = []
-        for frame in reversed(self.board.sent):
-            if frame.tick != self.board.tick:
-                break
-            sent.append(frame.data)
-        self.sent += reversed(sent)
+        self.sent += self._kind.sent(self.board)
         if self.board.driven:
             self.driven_at = self.board.tick
         return self.from_board(data)

@@ -30,11 +30,13 @@ from goals import GOAL_ENDINGS, GOALS
 from losses import LIVES, lose, losing_rig
 from other_rigs import GoalRig, NetworkRig
 from rig import Rig
+from rig_board import RigBoard, load
 from stuck import NETWORK
 from walk import walk
 
 DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "safety.md"
 BEGIN, END = "<!-- campaign: begin -->", "<!-- campaign: end -->"
+BOARDS: Final = ("omnibot", "lois_ecu")
 ROUNDS: Final = 2
 WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
@@ -100,8 +102,9 @@ class Outcome:
 class Campaign(Outcome):
     """One piece of it, in this process."""
 
-    def __init__(self) -> None:
+    def __init__(self, kind: RigBoard) -> None:
         super().__init__()
+        self._kind = kind
         self._folder = tempfile.TemporaryDirectory()
 
     @property
@@ -110,7 +113,7 @@ class Campaign(Outcome):
         return Outcome(self.rows, self.complaints, self.published, self.wrong)
 
     def rig(self, kind: type[Rig] = Rig, before: str = "") -> Rig:
-        return kind(Path(tempfile.mkdtemp(dir=self._folder.name)), before=before)
+        return kind(Path(tempfile.mkdtemp(dir=self._folder.name)), self._kind, before=before)
 
     def run(self, row: Row, case: Case[Any], rig: Rig, *, again: bool = True) -> None:
         """One try."""
@@ -170,13 +173,14 @@ class Campaign(Outcome):
     def _one_life(
         self, kind: type[Rig], cases: Callable[[int], dict[str, Case[Any]]], *, damaged_bytes: bool
     ) -> None:
-        rows = {name: self.row(name) for name in cases(0)}
+        rows = {name: self.row(name) for name in cases(0) if name not in self._kind.without}
         with self.rig(kind) as rig:
             self.run(Row("warm-up"), lambda rig: rig.wait_ticks(100), rig)
             descriptors, memory = rig.cost()
             for number in range(ROUNDS):
                 for name, case in cases(number).items():
-                    self.run(rows[name], case, rig)
+                    if name in rows:
+                        self.run(rows[name], case, rig)
             self.judge(rig, damaged_bytes=damaged_bytes)
             self._compare_cost(rig, descriptors, memory)
 
@@ -191,7 +195,8 @@ class Campaign(Outcome):
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}
         for number in numbers:
-            with losing_rig(Path(tempfile.mkdtemp(dir=self._folder.name)), number) as rig:
+            folder = Path(tempfile.mkdtemp(dir=self._folder.name))
+            with losing_rig(folder, self._kind, number) as rig:
                 lose(rig, number)
                 for name, case in life.items():
                     self.run(rows[name], case, rig, again=False)
@@ -276,24 +281,25 @@ def pieces() -> list[Piece]:
     ]
 
 
-def play(numbered: tuple[int, Piece]) -> Outcome:
+def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
     """One piece, in a process and a ROS domain of its own."""
     number, (method, arguments) = numbered
     os.environ["ROS_DOMAIN_ID"] = str(1 + (os.getppid() + number) % 101)
     rclpy.init()
     try:
-        campaign = Campaign()
+        campaign = Campaign(load(board))
         getattr(campaign, method)(*arguments)
         return campaign.outcome
     finally:
         rclpy.shutdown()
 
 
-def side_by_side(wanted: list[Piece], processes: int) -> Outcome:
-    """The longest pieces come first."""
-    total = Outcome()
+def side_by_side(board: str, wanted: list[Piece], processes: int) -> Outcome:
+    """Those that apply to the board. The longest come first."""
+    total, without = Outcome(), load(board).without
+    wanted = [piece for piece in wanted if piece[0] not in without]
     with get_context("spawn").Pool(processes, maxtasksperchild=1) as pool:
-        for outcome in pool.imap(play, enumerate(wanted), chunksize=1):
+        for outcome in pool.imap(partial(play, board), enumerate(wanted), chunksize=1):
             total.add(outcome)
     return total
 
@@ -307,7 +313,7 @@ def main() -> int:
     """Run, print, write."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
-        "--board", choices=("omnibot",), default="omnibot", help="that this is measured on"
+        "--board", choices=BOARDS, default="omnibot", help="that this is measured on"
     )
     arguments.add_argument("--minutes", type=float, help="a soak of random walks only")
     arguments.add_argument("--losses", action="store_true", help="stops on a lossy line only")
@@ -316,21 +322,22 @@ def main() -> int:
         "--processes", type=int, default=os.cpu_count(), help="side by side (default %(default)s)"
     )
     chosen = arguments.parse_args()
-    minutes = chosen.minutes
+    board, minutes = chosen.board, chosen.minutes
     if minutes is not None:
-        total = side_by_side([("soak", (minutes,))], 1)
+        total = side_by_side(board, [("soak", (minutes,))], 1)
     elif chosen.losses:
-        total = side_by_side(losses(), chosen.processes)
+        total = side_by_side(board, losses(), chosen.processes)
     elif chosen.busy:
-        total = side_by_side([BUSY], 1)
+        total = side_by_side(board, [BUSY], 1)
     else:
-        total = side_by_side(pieces(), chosen.processes)
-        total.add(side_by_side([BUSY], 1))
+        total = side_by_side(board, pieces(), chosen.processes)
+        total.add(side_by_side(board, [BUSY], 1))
     table = total.table()
     print(f"\n{table}\n", *total.complaints, sep="\n")
     if minutes is None and not (chosen.losses or chosen.busy):
-        before, rest = DOCUMENT.read_text().split(BEGIN)
-        DOCUMENT.write_text(f"{before}{BEGIN}\n{table}\n{END}{rest.split(END)[1]}")
+        begin = BEGIN if board == "omnibot" else f"<!-- campaign of {board}: begin -->"
+        before, rest = DOCUMENT.read_text().split(begin)
+        DOCUMENT.write_text(f"{before}{begin}\n{table}\n{END}{rest.split(END, 1)[1]}")
     return 1 if total.complaints else 0
 
 

@@ -16,9 +16,6 @@ from typing import Final
 from rig import Rig
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
-from stuck import OLD_COMMAND
-
-STOP: Final = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 
 IN_A_CALLBACK: Final = """
 import ctypes, os, sys, time, rclpy
@@ -75,7 +72,7 @@ class Ending:
         rig.expect_still(since, "the driver ends", self.allowed_s)
         rig.hand.leave()
         heard = bytes(rig.line.board.received)
-        rig.findings.expect(heard.endswith(STOP), f"last it heard {heard[-26:].hex(' ')}")
+        rig.findings.expect(heard.endswith(rig.kind.stop), f"last it heard {heard[-26:].hex(' ')}")
 
 
 def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
@@ -121,7 +118,7 @@ def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
 
 def while_full(end: Callable[[Rig], object], rig: Rig) -> None:
     """The port takes nothing until the driver has gone."""
-    with rig.terminal.full(OLD_COMMAND):
+    with rig.terminal.full(rig.kind.old_command):
         end(rig)
         rig.driver.process.wait()
 

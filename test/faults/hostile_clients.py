@@ -16,19 +16,8 @@ from rclpy.node import Node
 from rig import TIMEOUT_S, Rig
 from std_msgs.msg import Bool, Float32MultiArray
 from std_srvs.srv import SetBool, Trigger
-from stuck import OLD_COMMAND
 
 NONSENSE: Final = (float("nan"), float("inf"), -1.0, 1e12)
-TUNING: Final = (
-    "max_linear_speed",
-    "max_angular_speed",
-    "max_wheel_speed",
-    "max_linear_acceleration",
-    "linear_scale",
-    "cmd_vel_timeout",
-    "command_rate",
-    "reconnect_interval",
-)
 
 
 def two_commanders(rig: Rig) -> None:
@@ -36,7 +25,7 @@ def two_commanders(rig: Rig) -> None:
     publisher = rig.probe.publisher(Float32MultiArray, "wheel_cmd")
     rig.drive()
     for _ in range(40):
-        publisher.publish(Float32MultiArray(data=[5.0, 5.0, 5.0]))
+        publisher.publish(Float32MultiArray(data=[5.0] * rig.kind.wheels))
         rig.wait_ticks(3)
     rig.hand.leave()
     rig.expect_still(rig.line.tick, "two commanders cease")
@@ -90,7 +79,11 @@ def everybody_calls_at_once(rig: Rig) -> None:
         *((Trigger, name, {}) for name in ("start", "reset", "reset_odometry")),
         *((SetBool, name, {"data": data}) for name in ("pause", "estop") for data in (True, False)),
     ]
-    clients = [(rig.probe.client(kind, name), kind.Request(**data)) for kind, name, data in calls]
+    clients = [
+        (rig.probe.client(kind, name), kind.Request(**data))
+        for kind, name, data in calls
+        if name in rig.kind.services
+    ]
     rig.plug()
     since = rig.line.tick
     rounds = []
@@ -101,7 +94,8 @@ def everybody_calls_at_once(rig: Rig) -> None:
         rig.probe.wait_for_future(future)
     rig.expect_still(since, "everybody calls", 1.0)
     rig.probe.call(SetBool, "estop", data=False)
-    rig.probe.call(Trigger, "start")
+    if "start" in rig.kind.services:
+        rig.probe.call(Trigger, "start")
 
 
 def nonsense_for_parameters(rig: Rig) -> None:
@@ -112,7 +106,7 @@ def nonsense_for_parameters(rig: Rig) -> None:
             name=name,
             value=ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value),
         )
-        for name in TUNING
+        for name in rig.kind.tuning
         for value in NONSENSE
     ]
     answer = rig.probe.call(SetParameters, "set_parameters", parameters=parameters)
@@ -147,7 +141,7 @@ def flood_into_a_full_port(rig: Rig) -> None:
     fast.linear.x = 0.4
     rig.drive()
     rig.hand.leave()
-    with rig.terminal.kept_full(OLD_COMMAND):
+    with rig.terminal.kept_full(rig.kind.old_command):
         for _ in range(200):
             for _ in range(10):
                 publisher.publish(fast)

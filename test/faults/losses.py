@@ -14,10 +14,8 @@ from typing import Final
 
 from breakable_line import losing
 from rig import Rig
+from rig_board import RigBoard
 from std_srvs.srv import SetBool
-
-from omnibot_driver.simulator.omnibot import BoardSettings, ReceiverKind
-from omnibot_driver.simulator.omnibot.receivers import FRAMINGS
 
 GRACE_S: Final = 0.1
 """The rig's own, which it adds."""
@@ -27,18 +25,11 @@ ENDED_S: Final = 0.5 - GRACE_S
 RATES: Final = (1e-2, 5e-2)
 GUARD_S: Final = 1.5
 """What the end takes longer if the guard has to repeat Stop."""
-RECEIVERS: Final = [
-    ReceiverKind(framing=framing, letters=letters)
-    for letters in ("between", "anywhere")
-    for framing in FRAMINGS
-]
 
 
-def losing_rig(folder: Path, number: int, **more: float) -> Rig:
-    """A driver on a board of its own kind; the line is whole until the first stop."""
-    receiver = RECEIVERS[number % len(RECEIVERS)]
-    board = BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)
-    return Rig(folder, board=board, **more)
+def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:
+    """A driver on a board of its own; the line is whole until the first stop."""
+    return Rig(folder, kind, settings=kind.lossy(number), **more)
 
 
 def lose(rig: Rig, number: int) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 from commander import Hand, Navigator
 from ports import Server
 from rig import Rig
+from rig_board import RigBoard
 
 from omnibot_driver.simulator.omnibot import BoardSettings
 
@@ -16,8 +17,8 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 class NetworkRig(Rig):
     """The board is behind a server on the network."""
 
-    def __init__(self, folder: Path, **options: Any) -> None:
-        super().__init__(folder, **options)
+    def __init__(self, folder: Path, kind: RigBoard, **options: Any) -> None:
+        super().__init__(folder, kind, **options)
         with socket.create_server(("127.0.0.1", 0)) as server:
             self._number = server.getsockname()[1]
         self.port = f"socket://127.0.0.1:{self._number}"
@@ -35,9 +36,9 @@ class NetworkRig(Rig):
 class GoalRig(Rig):
     """The board's switch stands on position: goals, not velocities."""
 
-    def __init__(self, folder: Path, **options: Any) -> None:
-        board = BoardSettings(control="position")
-        super().__init__(folder, board=board, control_method="position", **options)
+    def __init__(self, folder: Path, kind: RigBoard, **options: Any) -> None:
+        settings = BoardSettings(control="position")
+        super().__init__(folder, kind, settings=settings, control_method="position", **options)
 
     def make_hand(self) -> Hand:
         return Navigator(self.probe, self.odom)

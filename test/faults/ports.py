@@ -24,7 +24,7 @@ from terminal import fill
 
 from omnibot_driver.simulator.common.board import Packet
 from omnibot_driver.simulator.common.running import RunningBoard
-from omnibot_driver.simulator.omnibot import PtyBoard
+from omnibot_driver.simulator.common.serving import PtyBoard
 
 SO_ATTACH_FILTER, SO_DETACH_FILTER = 26, 27
 DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)

@@ -24,13 +24,11 @@ from driver_process import PATIENCE_S, Driver
 from nav_msgs.msg import Odometry
 from ports import Server, Terminal
 from probe import Probe
-from published import imu_key, not_sent, odom_key, sent_imu_key, sent_odom_key, stamp_s
+from published import stamp_s
+from rig_board import RigBoard
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, String
 
-from omnibot_driver.simulator.omnibot import BoardSettings
-
-IDEAL: Final = BoardSettings()
 TIMEOUT_S: Final = 0.5
 """``cmd_vel_timeout``."""
 GRACE_S: Final = 0.1
@@ -67,23 +65,27 @@ class Findings:
 class Rig:
     """Context manager. The driver's port is a symbolic link, as udev makes them.
 
-    ``before``: Python for the driver's process; ``grace_s`` and ``ends_within_s``: how long after
+    ``kind``: of board, with these ``settings`` of its own; ``before``: Python for the driver's
+    process; ``grace_s`` and ``ends_within_s``: how long after
     it has to the robot may be told to stand, and a driver may take to end.
     """
 
     def __init__(
         self,
         folder: Path,
+        kind: RigBoard,
         *,
         grace_s: float = GRACE_S,
         ends_within_s: float = ENDS_WITHIN_S,
         before: str = "",
-        board: BoardSettings = IDEAL,
+        settings: Any = None,
         **parameters: object,
     ) -> None:
-        self._grace_s, self._ends_within_s = grace_s, ends_within_s
-        self._before, self._parameters = before, parameters
-        self.line = BreakableLine(board)
+        self.kind = kind
+        self._grace_s = grace_s + kind.off_within_s
+        self._ends_within_s = ends_within_s + kind.ends_later_s
+        self._before, self._parameters = before, {**kind.parameters, **parameters}
+        self.line = BreakableLine(kind, settings)
         self.findings = Findings()
         self.port = str(folder / "omnibot")
         self._stack = ExitStack()
@@ -105,7 +107,7 @@ class Rig:
             Driver(port=self.port, before=self._before, **self._parameters)
         )
         self.probe = self._stack.enter_context(Probe(self.driver.namespace))
-        self.imu = self.probe.listen(Imu, "imu/data_raw")
+        self.imu = self.probe.listen(Imu, "imu/data_raw") if self.kind.imu else []
         self.odom = self.probe.listen(Odometry, "odom")
         self.states = self.probe.listen(String, "omnibot_driver/state", latched=True)
         self.estops = self.probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
@@ -229,10 +231,7 @@ class Rig:
         """
         imu, odom, sent = list(self.imu), list(self.odom), list(self.line.sent)
         one_in = WRONG_ONE_IN if damaged_bytes else math.inf
-        for what, wrong, out in (
-            ("Imu", not_sent(map(imu_key, imu), map(sent_imu_key, sent)), len(imu)),
-            ("Odometry", not_sent(map(odom_key, odom), map(sent_odom_key, sent)), len(odom)),
-        ):
+        for what, wrong, out in self.kind.not_sent(imu, odom, sent):
             self.findings.wrong += wrong
             self.findings.expect(
                 wrong <= out / one_in, f"{wrong} of {out} {what} messages were never sent"

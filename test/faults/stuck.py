@@ -11,8 +11,6 @@ from other_rigs import NetworkRig
 from rig import TIMEOUT_S, Rig
 from std_srvs.srv import SetBool
 
-OLD_COMMAND: Final = bytes.fromhex("FF FE 01 00 15 00 00 00 64")
-"""0.3 m/s and 0.2 rad/s, as the driver will have said again and again."""
 TAKES_NOTHING: Final = "lost .* while writing: it takes no more bytes"
 LOST: Final = "lost .*retrying"
 
@@ -34,13 +32,13 @@ def full(rig: Rig, *, mute: bool = False) -> None:
     """As after minutes. It takes bytes again while the driver has the port open, or has it not."""
     rig.drive()
     mark = len(rig.driver.lines)
-    with rig.terminal.full(OLD_COMMAND):
+    with rig.terminal.full(rig.kind.old_command):
         if mute:
             rig.line.from_board = cut
         rig.driver.wait_for_line(TAKES_NOTHING, mark)
         rig.hand.leave()
     rig.heal()
-    rig.expect_still(rig.line.tick, "the full port takes bytes again", 0.0)
+    rig.expect_still(rig.line.tick, "the full port takes bytes again", rig.kind.old_bytes_s)
     rig.expect_said_once(TAKES_NOTHING, mark)
 
 
@@ -48,7 +46,7 @@ def full_for_long(rig: Rig) -> None:
     """Nothing helps, so it is opened again and again, and told once; then all is well."""
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)
-    with rig.terminal.kept_full(OLD_COMMAND):
+    with rig.terminal.kept_full(rig.kind.old_command):
         rig.probe.wait_for(lambda: len(rig.states) >= states + 6)  # opened in vain, twice
         rig.wait_for_diagnosis("takes no more bytes")
         rig.hand.leave()
@@ -63,7 +61,7 @@ def estop_into_a_full_port(rig: Rig) -> None:
     rig.hand.leave()
     rig.expect_still(rig.line.tick, "nobody drives")
     rig.wait_ticks(100)  # the line is quiet
-    with rig.terminal.kept_full(OLD_COMMAND):
+    with rig.terminal.kept_full(rig.kind.old_command):
         answer = rig.probe.call(SetBool, "estop", data=True)
         late = any(why in answer.message for why in ("takes nothing", "not open"))
         rig.findings.expect(late, f"it said {answer.message!r}")

@@ -8,6 +8,7 @@ from random import Random
 import pytest
 from cases import Case, survivable
 from fuzz import fuzz
+from omnibot_board import BOARD
 from rig import Rig
 from walk import walk
 
@@ -24,7 +25,7 @@ CASES = {name: case for name, case in survivable(seed=0).items() if name not in 
 def rig(
     _ros: None, tmp_path_factory: pytest.TempPathFactory, lenience: dict[str, float]
 ) -> Iterator[Rig]:
-    with Rig(tmp_path_factory.mktemp("line"), **lenience) as rig:
+    with Rig(tmp_path_factory.mktemp("line"), BOARD, **lenience) as rig:
         yield rig
 
 

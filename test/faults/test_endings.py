@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from endings import ENDINGS, Ending, terminal_is_closed
 from goals import GOAL_ENDINGS
+from omnibot_board import BOARD
 from other_rigs import GoalRig
 from rig import Rig
 
@@ -29,7 +30,7 @@ def test_the_robot_stands_still_however_the_driver_ends(
     ending: Ending, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
     """Stop first, then the port, with the right exit code, in time; by the guard if need be."""
-    with Rig(tmp_path, before=ending.before, **lenience) as rig:
+    with Rig(tmp_path, BOARD, before=ending.before, **lenience) as rig:
         ending(rig)
         assert not rig.findings.take(), rig.driver.output
 
@@ -43,11 +44,11 @@ def test_a_terminal_that_is_closed_ends_the_driver_in_order(
         end(rig)
         assert not rig.findings.take()
 
-    terminal_is_closed(lambda before: Rig(tmp_path, before=before, **lenience), run)
+    terminal_is_closed(lambda before: Rig(tmp_path, BOARD, before=before, **lenience), run)
 
 
 def test_a_goal_ends_with_the_driver(tmp_path: Path, lenience: dict[str, float]) -> None:
     """The board would go on to it."""
-    with GoalRig(tmp_path, **lenience) as rig:
+    with GoalRig(tmp_path, BOARD, **lenience) as rig:
         GOAL_ENDINGS["a goal, and SIGKILL"](rig)
         assert not rig.findings.take(), rig.driver.output

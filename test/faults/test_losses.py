@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from losses import LIVES, lose, losing_rig
+from omnibot_board import BOARD
 
 
 @pytest.mark.parametrize("number", range(len(LIVES)), ids=[", ".join(life) for life in LIVES])
@@ -13,7 +14,7 @@ def test_the_robot_stands_though_bytes_are_lost_on_the_way_to_it(
     number: int, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
     """The line is not healed before the verdict."""
-    with losing_rig(tmp_path, number, **lenience) as rig:
+    with losing_rig(tmp_path, BOARD, number, **lenience) as rig:
         lose(rig, number)
         for case in LIVES[number].values():
             case(rig)

@@ -7,6 +7,7 @@ from random import Random
 
 import pytest
 from goals import GOALS
+from omnibot_board import BOARD
 from other_rigs import GoalRig, NetworkRig
 from stuck import NETWORK
 from walk import walk
@@ -25,7 +26,7 @@ SOME_GOALS = (
 def network(
     _ros: None, tmp_path_factory: pytest.TempPathFactory, lenience: dict[str, float]
 ) -> Iterator[NetworkRig]:
-    with NetworkRig(tmp_path_factory.mktemp("network"), **lenience) as rig:
+    with NetworkRig(tmp_path_factory.mktemp("network"), BOARD, **lenience) as rig:
         rig.wait_ticks(100)
         yield rig
 
@@ -45,7 +46,7 @@ def test_a_server_that_fails_leaves_a_robot_that_stands_and_obeys_again(
 def goals(
     _ros: None, tmp_path_factory: pytest.TempPathFactory, lenience: dict[str, float]
 ) -> Iterator[GoalRig]:
-    with GoalRig(tmp_path_factory.mktemp("goals"), **lenience) as rig:
+    with GoalRig(tmp_path_factory.mktemp("goals"), BOARD, **lenience) as rig:
         rig.wait_ticks(100)
         yield rig
 

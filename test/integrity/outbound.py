@@ -22,6 +22,8 @@ from outbound_runs import RECEIVERS, SCRIPTS, Scores, over, run
 from outbound_scenes import DRIVES, SCENES
 
 DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "integrity.md"
+WITH_SUMS: Final = ("lois_ecu",)
+"""Boards that drop what was damaged on the way to them."""
 BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"
 
 
@@ -182,13 +184,16 @@ def main() -> int:
     """Run, print, write."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
-        "--board", choices=("omnibot",), default="omnibot", help="that this is measured on"
+        "--board", choices=("omnibot", *WITH_SUMS), default="omnibot", help="that is measured"
     )
     arguments.add_argument("--share", type=float, default=1.0)
     arguments.add_argument("--scripts", type=int, default=SCRIPTS)
     arguments.add_argument("--scene", action="append", choices=SCENES, default=[])
     arguments.add_argument("--examples", action="store_true")
     chosen = arguments.parse_args()
+    if chosen.board in WITH_SUMS:
+        print(f"{chosen.board}: outbound lines carry a checksum; tests try all losses of them")
+        return 0
     begin_s = time.monotonic()
     kinds = tuple(chosen.scene) or tuple(SCENES)
     scores, rehearsals = run(chosen.share, chosen.scripts, kinds)

@@ -1,0 +1,56 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The LOIS ECU, for the campaign: lines of text, no IMU, two wheels.
+
+Its motors follow at the next of its control interrupts, 91 ms apart. What it sends is groups of
+which the driver predicts its odometry, so no message is compared with what was sent.
+"""
+
+from typing import Final
+
+from rig_board import RigBoard
+
+from omnibot_driver.simulator.lois_ecu import LoisSettings, SimulatedLois
+
+STOP: Final = b":01000000003b\n"
+
+
+def make(settings: LoisSettings | None) -> SimulatedLois:
+    return SimulatedLois(settings or LoisSettings(running=True))
+
+
+BOARD: Final = RigBoard(
+    name="lois_ecu",
+    make=make,
+    parameters={"board": "lois_ecu"},
+    old_command=b":020014001438\n",  # RPM 20/20
+    stop=STOP,
+    opening=STOP,
+    wheels=2,
+    services=frozenset({"reset", "reset_odometry", "estop"}),
+    tuning=(
+        "max_linear_speed",
+        "max_angular_speed",
+        "max_wheel_speed",
+        "max_linear_acceleration",
+        "cmd_vel_timeout",
+        "command_rate",
+        "reconnect_interval",
+    ),
+    off_within_s=0.1,
+    old_bytes_s=0.5,  # a line at 115200 baud, as it hears it byte by byte
+    ends_later_s=1.5,  # it shows a stand after 0.6 s, which is waited for twice
+    imu=False,
+    without=frozenset(
+        {
+            "~/pause and un-pause",
+            "e-stop into a full port",  # judged by the OmniBot's frames
+            "faults_of_goals",
+            "goal_ending",
+            "random_input",
+            "walk",
+            "walk_with_goals",
+            "busy_computer",
+        }
+    ),
+)

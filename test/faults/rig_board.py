@@ -1,0 +1,52 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the campaign needs of a kind of board, in values; a module ``<board>_board.py`` has each."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any, Final, cast
+
+Sent = Callable[[Any], list[bytes]]
+NOTHING: Final[Mapping[str, object]] = {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigBoard:
+    """``make``: a simulated one with these settings, or the usual; ``parameters``: the driver's.
+
+    ``old_command``: bytes that drive it; ``stop``: what it hears last, however a driver ends;
+    ``opening``: what it hears first on a new line. ``wheels``: how many wheel_cmd has;
+    ``services``: of the common ones; ``tuning``: parameters that refuse nonsense. ``off_within_s``:
+    how long after they are told to, its motors are off; ``old_bytes_s``: how long it takes to hear
+    what a full port has kept; ``ends_later_s``: how much longer its driver takes to end. ``imu``: whether it sends readings of one.
+
+    ``sent``: the frames of its last tick; ``not_sent``: of what was published, by kind, how many
+    messages were never sent, and of how many. ``lossy``: settings of board number n for a line that
+    loses bytes. ``without``: faults that do not apply, and pieces of the campaign.
+    """
+
+    name: str
+    make: Callable[[Any], Any]
+    parameters: Mapping[str, object] = field(default_factory=dict)
+    old_command: bytes
+    stop: bytes
+    opening: bytes
+    wheels: int
+    services: frozenset[str]
+    tuning: tuple[str, ...]
+    off_within_s: float = 0.0
+    old_bytes_s: float = 0.0
+    ends_later_s: float = 0.0
+    imu: bool
+    sent: Sent = lambda _board: []
+    not_sent: Callable[[Iterable[Any], Iterable[Any], list[bytes]], list[tuple[str, int, int]]] = (
+        lambda _imu, _odom, _sent: []
+    )
+    lossy: Callable[[int], Any] = lambda _number: None
+    without: frozenset[str] = frozenset()
+
+
+def load(name: str) -> RigBoard:
+    """Of the board with this name."""
+    return cast(RigBoard, import_module(f"{name}_board").BOARD)

@@ -1,0 +1,150 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The LOIS ECU's part of ``make integrity``: its codec on a line that loses or adds bytes.
+
+The simulated board, which shares no code with the driver, drives in curves; the truth is what the
+decoder makes of the undamaged line. A report is wrong that was not sent there, in its order.
+"""
+
+import os
+from collections import Counter
+from dataclasses import dataclass, fields
+from functools import partial
+from multiprocessing import Pool
+from random import Random
+from typing import Final
+
+from carriage import FAULTS, Fault
+
+from omnibot_driver.core.lois_ecu import LoisDecoder
+from omnibot_driver.core.lois_ecu.messages import Report
+from omnibot_driver.simulator.lois_ecu import QUIRKS, Firmware, LoisSettings, SimulatedLois
+
+TICK_S: Final = 0.01
+STEER_EVERY: Final = 100
+"""Ticks."""
+LEAST_DELIVERED: Final = {"1 byte in 1,000 lost": 0.9, "1 byte in 100 lost": 0.5}
+"""Of the reports of the undamaged line; with these faults none may be wrong."""
+
+Stream = list[bytes]
+"""What comes in each tick."""
+
+
+@dataclass(slots=True)
+class Score:
+    """Counts; they add up. ``sent``: reports of the undamaged line."""
+
+    lines: int = 0
+    lines_out: int = 0
+    sent: int = 0
+    out: int = 0
+    wrong: int = 0
+
+    def __iadd__(self, other: "Score") -> "Score":
+        for name in (field.name for field in fields(self)):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        return self
+
+
+def drive(firmware: Firmware, seed: int, seconds: float) -> Stream:
+    """What a board sends that is commanded another pair of wheel speeds each second."""
+    random = Random(f"{firmware} {seed}")
+    board = SimulatedLois(LoisSettings(quirks=QUIRKS[firmware], seed=seed, running=True))
+    stream = []
+    board.receive(b":233f80000066\n")  # low-pass 1: else nothing turns
+    for tick in range(round(seconds / TICK_S)):
+        if tick % STEER_EVERY == 0:
+            left, right = (random.randrange(5, 40) for _ in range(2))
+            text = f":02{left:04x}{right:04x}"
+            check = 0
+            for character in text.encode():
+                check ^= character
+            board.receive(f"{text}{check:02x}\n".encode())
+        stream.append(board.step())
+    return stream
+
+
+def decode(stream: Stream) -> tuple[list[Report], int]:
+    """All reports, and how many lines were right."""
+    decoder, found = LoisDecoder(), list[Report]()
+    for tick, data in enumerate(stream):
+        found += decoder.feed(data, tick * TICK_S)
+    found += decoder.flush(len(stream) * TICK_S)
+    return found, decoder.statistics.lines
+
+
+def damaged(stream: Stream, fault: Fault, random: Random) -> Stream:
+    """The same, less the bytes that are lost, with those that are added."""
+    whole = b"".join(stream)
+    ends, at = [], 0
+    for data in stream:
+        at += len(data)
+        ends.append(at)
+    pieces, number = [bytearray() for _ in stream], 0
+    for origin in fault(len(whole), random):
+        while origin >= 0 and origin >= ends[number]:
+            number += 1
+        pieces[number].append(whole[origin] if origin >= 0 else random.randrange(256))
+    return [bytes(piece) for piece in pieces]
+
+
+def score(truth: list[Report], lines: int, stream: Stream) -> Score:
+    """In order: a report that comes out was sent after the one before it, or it is wrong."""
+    found, lines_out = decode(stream)
+    result = Score(lines=lines, lines_out=lines_out, sent=len(truth), out=len(found))
+    left = Counter(map(repr, truth))
+    at = 0
+    for report in found:
+        text = repr(report)
+        if not left[text]:  # NaN is equal to no other
+            result.wrong += 1
+            continue
+        place = next((n for n in range(at, len(truth)) if repr(truth[n]) == text), None)
+        if place is None:
+            result.wrong += 1
+        else:
+            at = place + 1
+    return result
+
+
+def one(seconds: float, job: tuple[Firmware, int]) -> dict[tuple[str, str], Score]:
+    """One stream with each fault."""
+    firmware, seed = job
+    stream = drive(firmware, seed, seconds)
+    truth, lines = decode(stream)
+    return {
+        (fault, firmware): score(
+            truth, lines, damaged(stream, line, Random(f"{firmware} {seed} {fault}"))
+        )
+        for fault, line in FAULTS.items()
+        if not fault.startswith("none")
+    }
+
+
+def measure(seconds: float, seeds: range) -> tuple[list[str], bool]:
+    """Rows of the table, and whether every bound holds."""
+    jobs = [(firmware, seed) for seed in seeds for firmware in QUIRKS]
+    total: dict[tuple[str, str], Score] = {}
+    with Pool(os.cpu_count()) as pool:
+        for scores in pool.imap_unordered(partial(one, seconds), jobs):
+            for key, found in scores.items():
+                total.setdefault(key, Score()).__iadd__(found)
+    lines = [
+        f"{len(seeds)} streams of {seconds:g} s of each firmware:",
+        "",
+        "| fault | firmware | lines delivered | reports delivered | reports wrong | bound | |",
+        "|---" * 7 + "|",
+    ]
+    all_hold = True
+    for (fault, firmware), found in total.items():
+        least = LEAST_DELIVERED.get(fault, 0.0)
+        delivered = (found.out - found.wrong) / max(1, found.sent)
+        holds = not least or (not found.wrong and delivered >= least)
+        all_hold &= holds
+        bound = f"none wrong, {least:.0%} delivered" if least else "none"
+        wrong = f"1 in {found.out / found.wrong:,.0f}" if found.wrong else f"0 of {found.out:,}"
+        lines.append(
+            f"| {fault} | {firmware} | {found.lines_out / found.lines:.2%} | {delivered:.2%} |"
+            f" {wrong} | {bound} | {'holds' if holds else '**missed**'} |"
+        )
+    return lines, all_hold
