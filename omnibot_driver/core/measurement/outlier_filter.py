@@ -129,7 +129,7 @@ class OutlierFilter:
 
     def _admit_displacement(self, reading: DisplacementReading, stamp_s: float) -> list[Stamped]:
         before_s, self._displaced_at_s = self._displaced_at_s, stamp_s
-        seconds = reading.duration_s
+        seconds = reading.duration_s or None  # two that arrive at once tell of no time
         if seconds is None:
             self._motion_leaps.forget()
             seconds = None if before_s is None else stamp_s - before_s
@@ -137,7 +137,7 @@ class OutlierFilter:
             self._refuse(reading)
             return []
         was_flip = leaps = False
-        if reading.duration_s is not None:
+        if reading.duration_s:
             square_s2 = reading.duration_s * reading.duration_s
             turn = self.limits.fastest_radps2 * square_s2
             way = self.limits.fastest_mps2 * square_s2
