@@ -258,7 +258,8 @@ class Rig:
             )
         )
         self.findings.expect(  # what framing made up of damaged bytes may be among them
-            refused <= len(imu) / one_in, f"{refused} readings were refused, and no bit was flipped"
+            refused <= (len(imu) or len(odom)) / one_in,
+            f"{refused} readings were refused, and no bit was flipped",
         )
         backwards = sum(stamp_s(b) <= stamp_s(a) for a, b in pairwise(imu))
         self.findings.expect(backwards == 0, f"{backwards} imu stamps do not increase")

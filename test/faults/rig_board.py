@@ -19,7 +19,8 @@ class RigBoard:
     ``opening``: what it hears first on a new line. ``wheels``: how many wheel_cmd has;
     ``services``: of the common ones; ``tuning``: parameters that refuse nonsense. ``off_within_s``:
     how long after they are told to, its motors are off; ``old_bytes_s``: how long it takes to hear
-    what a full port has kept; ``ends_later_s``: how much longer its driver takes to end. ``imu``: whether it sends readings of one.
+    what a full port has kept; ``ends_later_s``: how much longer its driver takes to end. ``imu``:
+    whether it sends readings of one.
 
     ``sent``: the frames of its last tick; ``not_sent``: of what was published, by kind, how many
     messages were never sent, and of how many. ``lossy``: settings of board number n for a line that
