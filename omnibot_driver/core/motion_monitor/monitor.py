@@ -105,8 +105,8 @@ class MotionMonitor:
         """This is commanded from now on; None: a goal, the way to which is the board's own."""
         if setpoint is self._history.current:
             return
-        if setpoint is not None and not setpoint.faster_than(0.0, 0.0):
-            setpoint = AT_REST
+        if setpoint == AT_REST:
+            setpoint = AT_REST  # itself, by which the history knows it
         self._history.add(setpoint, now)
         if setpoint is not AT_REST:
             self._has_stood = False

@@ -18,9 +18,9 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.outbound import (
+    ZEROS_BEFORE_MOTION,
     begins_with_a_letter,
     harmless,
-    motion,
     transmission,
 )
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
@@ -117,7 +117,7 @@ class CommandEncoder:
                 " one of these numbers into a command to start, pause or reset the board: choose"
                 " another goal, or call ~/reset, which begins a new frame where the robot stands"
             )
-        return motion(frames.command(frames.VELOCITY_MODE, *harmless(counts)))
+        return ZEROS_BEFORE_MOTION + frames.command(frames.VELOCITY_MODE, *harmless(counts))
 
     def _drive(self, mode: int, counts: Vector3) -> bytes:
         a, b, c = counts
@@ -125,4 +125,4 @@ class CommandEncoder:
             self.saturated += 1
             a, b, c = slow(counts, MAX_WORD)
         words = harmless((a, b, c))
-        return motion(frames.command(mode, *words)) if any(words) else STOP
+        return ZEROS_BEFORE_MOTION + frames.command(mode, *words) if any(words) else STOP

@@ -58,11 +58,6 @@ def transmission(*parts: bytes) -> bytes:
     return b"".join([ZEROS + part for part in parts])
 
 
-def motion(frame: bytes) -> bytes:
-    """A frame that commands motion, as it goes out."""
-    return ZEROS_BEFORE_MOTION + frame
-
-
 def harmless(counts: tuple[float, float, float]) -> Words:
     """The nearest words, within ``MAX_WORD``, whose bytes are no letter and make no header."""
     a, b, c = counts
