@@ -137,8 +137,7 @@ class Link:
         It may be gone by now: the reader is woken by what the caller finds here.
         """
         with self._changed:
-            port = self._port
-            return self._write_error is not None or bool(port is not None and port.missing)
+            return self._write_error is not None
 
     def command(
         self, action: Callable[[Session, T, float], None], wish: T, sent_ns: Sequence[int]

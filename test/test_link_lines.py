@@ -121,11 +121,11 @@ def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missin
     lines.come_to_state("connecting")
     with pytest.raises(CommandRefused, match="the line 'sense' is missing"):
         command(lines.link)
-    assert lines.link.blocked
     (report,) = lines.listener.reports
     assert str(report).startswith(f"the line 'sense' is missing: {lines.name} does not exist")
     assert lines.link.figures()[0].trouble == report
-    lines.link.call(lambda session, now: session.estop(True, now))
+    answer = lines.link.call(lambda session, now: session.estop(True, now))
+    assert answer.endswith("the line 'sense' is missing: only the lines that are there hear it")
     lines.drive.read_until(20 * STOPS)
 
 

@@ -94,6 +94,8 @@ class SafetyStops:
             self._task.give_up("the e-stop was latched meanwhile")
             if self._mode_manager.phase is CLOSED:
                 return "e-stop latched; the port is not open: the stop is sent as soon as it is"
+            if missing := self._reporter.missing:
+                return f"e-stop latched; {missing}: only the lines that are there hear it"
             if self._board.mode is Mode.UNKNOWN:
                 return "e-stop latched; nothing comes from the board: nobody knows if it hears us"
             return "e-stop latched"

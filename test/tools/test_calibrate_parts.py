@@ -31,9 +31,19 @@ commands = st.tuples(speeds, speeds, speeds)
 
 def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
     """Look at the same thing for two seconds."""
-    obedience = Obedience(topic)
+    obedience = Obedience(topic, PARAMETERS.by_name)
     for tick in range(200):
         obedience.look(tick / 100, 0.01, command, measured)
+
+
+def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
+    """What it is told of the first second comes later; and it has no scales to be checked."""
+    obedience = Obedience("cmd_vel", {"odom_rate": 20.0})
+    still, ahead = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
+    for tick in range(250):
+        obedience.look(tick / 100, 0.01, ahead, still)
+    with pytest.raises(ToolError, match="check the motors' power, and what the driver logs"):
+        obedience.look(3.5, 0.01, ahead, still)
 
 
 def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:

@@ -6,7 +6,7 @@ Pure. A law says what is commanded at a time, given where the odometry is; None 
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -24,8 +24,11 @@ and rad/s for ``cmd_vel``, rad/s of A, B, C for ``wheel_cmd``."""
 
 LOOK_S: Final = 1.0
 """How long a robot is watched before it is said not to obey."""
+SLOW_LOOK_S: Final = 3.0
+"""Where the odometry is predicted from rare measurements."""
 OBEYED_PART: Final = 0.2
 """A robot that does less than this part of what it is told does not move."""
+SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
 """Slower commands may be lost in friction: m/s and rad/s, rad/s of a wheel."""
 
@@ -94,13 +97,16 @@ class Bounds:
 class Obedience:
     """Whether the robot does what it is told, roughly, second by second."""
 
-    def __init__(self, topic: Topic) -> None:
+    def __init__(self, topic: Topic, parameters: Mapping[str, object]) -> None:
+        """``parameters``: the driver's, which tell what its board has."""
         self._topic = topic
+        self._look_s = SLOW_LOOK_S if "odom_rate" in parameters else LOOK_S
+        self._has_scales = "linear_scale" in parameters
         self._began_s = math.nan
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
 
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
-        """Raises ToolError once the robot has not moved for a second in which it was told to.
+        """Raises ToolError once the robot has not moved for a while in which it was told to.
 
         ``seconds`` since the last look; ``measured`` has the units of ``command``.
         """
@@ -111,16 +117,15 @@ class Obedience:
         ):
             self._told[number] += told * seconds
             self._done[number] += done * seconds
-        if now_s - self._began_s < LOOK_S:
+        if now_s - self._began_s < self._look_s:
             return
         told_ways, done_ways = self._told, self._done
         self._began_s, self._told, self._done = now_s, [0.0, 0.0], [0.0, 0.0]
         for told, done, plain in zip(told_ways, done_ways, PLAIN[self._topic], strict=True):
-            if told > plain * LOOK_S and not done >= OBEYED_PART * told:  # NaN is no motion
+            if told > plain * self._look_s and not done >= OBEYED_PART * told:  # NaN is no motion
                 raise ToolError(
                     f"the robot does not move when told ({self._topic}): check the motors' power,"
-                    " the switch of the board, `linear_scale` and `angular_scale`, and what the"
-                    " driver logs"
+                    f"{SCALES if self._has_scales else ''} and what the driver logs"
                 )
 
     def _sizes(self, values: Vector3) -> tuple[float, float]:

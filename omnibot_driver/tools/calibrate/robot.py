@@ -164,7 +164,7 @@ class Robot(Listener):
         obeys: bool,
         show: Callable[[float], object],
     ) -> None:
-        first, obedience = self._pose, Obedience(topic)
+        first, obedience = self._pose, Obedience(topic, self.parameters)
         began_s = last_s = time.monotonic()
         command, wanted = HALT, law(0.0, Pose())
         while wanted is not None or command != HALT:
