@@ -18,6 +18,7 @@ from omnibot_driver.core.packets import Packet, Packets, joined
 from omnibot_driver.transports import READ_TIMEOUT_S, WRITE_TIMEOUT_S, LinesChanged, Transport
 from omnibot_driver.transports.wake_up import WakeUp
 
+FULL: Final = f"it takes no more bytes for {WRITE_TIMEOUT_S:g} s"
 RETRY_S: Final = 0.5
 """A missing line is tried so often: that disturbs none of the others."""
 
@@ -114,8 +115,9 @@ class Several:
         now = time.monotonic()
         with self._writing:
             for line, data in self._shared_out(packets):
-                line.write(data, now)
-            waits = any(line.waits for line in self._lines)
+                if not line.write(data, now):
+                    self._miss(line, FULL)
+            waits = self._changed or any(line.waits for line in self._lines)
         if waits:
             self._wake_up.ring()
 
@@ -181,7 +183,7 @@ class Several:
                 if line.descriptor is None or not (line.waits or line.watched):
                     continue
                 if not line.flush(now):
-                    self._miss(line, f"it takes no more bytes for {WRITE_TIMEOUT_S:g} s")
+                    self._miss(line, FULL)
                 line.watched = bool(line.waits)
                 mask = select.POLLIN | (select.POLLOUT if line.waits else 0)
                 self._arrivals.modify(line.descriptor, mask)
@@ -233,17 +235,17 @@ class Line:
         self.port, (self.descriptor,) = port, port.descriptors
         self.trouble, self.waits, self.watched = "", b"", False
 
-    def write(self, data: bytes, now: float) -> None:
-        """Behind what waits. One that hangs gets what it has room for: see ``flush``."""
+    def write(self, data: bytes, now: float) -> bool:
+        """Behind what waits: see ``flush``. One that hangs gets what it has room for."""
         if self.port is None:
-            return
+            return True
         if self.trouble:
             self.port.write_if_room(((0, data),))
-            return
+            return True
         if not self.waits:
             self._full_since = now
         self.waits += data
-        self.flush(now)
+        return self.flush(now)
 
     def flush(self, now: float) -> bool:
         """Write what waits. False when it was in vain for too long; then nothing of it is sent."""

@@ -140,6 +140,18 @@ def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Severa
     assert heard(ends.far[0], b"new").strip(b"x") == b"new"
 
 
+def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
+    ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the reader has something else to do."""
+    os.set_blocking(ends.near[0], False)
+    fill(ends.near[0])
+    monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
+    lines.write(((0, b"old"),))
+    assert list(lines.missing) == [0]
+    assert list(changed(lines)) == [0]
+
+
 def test_what_a_full_line_does_not_take_at_once_follows_in_order(
     ends: Ends, lines: Several
 ) -> None:
