@@ -90,7 +90,13 @@ class SimulatedLois:
         )
         # A disc whose levels the corrections that the board has from the beginning make equal.
         self._encoders = tuple(
-            Encoder(settings.steps, long / (short + long)) for short, long in CORRECTIONS
+            Encoder(
+                settings.steps,
+                long / (short + long),
+                noise=settings.mark_noise,
+                random=Random(f"marks {settings.seed} {long}"),
+            )
+            for short, long in CORRECTIONS
         )
         self._inbound: deque[int] = deque()
         self._in_credit = 0.0

@@ -5,6 +5,7 @@
 Speeds in RPM, efforts in percent of duty. Knows time steps, not commands nor the wire.
 """
 
+from collections import deque
 from dataclasses import dataclass, replace
 from math import copysign, exp, floor
 from random import Random
@@ -24,6 +25,9 @@ class Motor:
         self._step_s = self._part = 0.0
         self._load_percent, self._random = load_percent, random
         self._load = random.gauss(0.0, load_percent)
+        self._on_the_way: deque[float] = deque()
+        self._lagged_rpm = 0.0
+        self._gap = 0.0
 
     def advance(self, duty_percent: float, dt_s: float) -> float:
         """Turns of the wheel in this time."""
@@ -31,7 +35,9 @@ class Motor:
             self.rpm = 0.0
             return 0.0
         settings = self._settings
-        if not (duty_percent or self.rpm):
+        if settings.dead_time_s:
+            duty_percent = self._late(duty_percent, dt_s)
+        if not (duty_percent or self.rpm or self._lagged_rpm):
             return 0.0
         if dt_s != self._step_s:
             self._step_s, self._part = dt_s, 1 - exp(-dt_s / settings.time_constant_s)
@@ -45,21 +51,47 @@ class Motor:
             final = copysign(effort * settings.rpm_per_percent, duty_percent)
         else:
             final = 0.0
+        if settings.second_time_constant_s:
+            part = 1 - exp(-dt_s / settings.second_time_constant_s)
+            self._lagged_rpm += (final - self._lagged_rpm) * part
+            if not final and abs(self._lagged_rpm) < 1e-3:
+                self._lagged_rpm = 0.0
+            final = self._lagged_rpm
         before = self.rpm
         self.rpm += (final - before) * self._part
         if not final:
             slower = max(abs(self.rpm) - settings.friction_rpm_per_s * dt_s, 0.0)
             self.rpm = copysign(slower, self.rpm) if slower else 0.0
-        return (before + self.rpm) / 2 * dt_s / 60
+        return self._through_gap((before + self.rpm) / 2 * dt_s / 60)
+
+    def _late(self, duty_percent: float, dt_s: float) -> float:
+        """What was ordered a dead time ago."""
+        self._on_the_way.append(duty_percent)
+        if len(self._on_the_way) <= round(self._settings.dead_time_s / dt_s):
+            return 0.0
+        return self._on_the_way.popleft()
+
+    def _through_gap(self, turns: float) -> float:
+        """What the wheel turns when the motor does."""
+        backlash = self._settings.backlash_turns
+        if not backlash:
+            return turns
+        gap = self._gap + turns
+        self._gap = min(max(gap, 0.0), backlash)
+        return gap - self._gap
 
 
 class Encoder:
     """Edges of a disc whose marks are ``short`` of a whole period wide, the rest long."""
 
-    def __init__(self, steps: int, short: float) -> None:
+    def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
         self._periods = 0.0
         self._per_turn = steps / 2
         self._short = short
+        # Two neighbours that are off their places make a way from one to the other.
+        self._off = [
+            noise / 2 / 2**0.5 * random.gauss(0.0, 1.0) for _ in range(steps if noise else 1)
+        ]
 
     def turn(self, turns: float) -> tuple[float, bool, int] | None:
         """The edge that was passed: when (as part of the step), if a long level ended, and in
@@ -71,13 +103,19 @@ class Encoder:
             return None
         forward = after > before
         edge = level_after if forward else level_before
-        at = edge // 2 + (self._short if edge % 2 else 0.0)
+        at = self._place(edge)
         is_long = (edge % 2 == 0) is forward
         return (at - before) / (after - before), is_long, 1 if forward else -1
 
+    def _place(self, edge: int) -> float:
+        """Of a mark, in periods."""
+        return edge // 2 + (self._short if edge % 2 else 0.0) + self._off[edge % len(self._off)]
+
     def _level(self, periods: float) -> int:
-        whole = floor(periods)
-        return 2 * whole + (1 if periods - whole >= self._short else 0)
+        level = 2 * floor(periods) - 1
+        while periods >= self._place(level + 1):
+            level += 1
+        return level
 
 
 @dataclass(frozen=True, slots=True)

@@ -84,13 +84,17 @@ class MotorSettings:
     """Of first order with dry friction.
 
     rpm_per_percent: beyond the dead zone; friction_rpm_per_s: how fast it slows down without power,
-    besides the time constant.
+    besides the time constant. second_time_constant_s, dead_time_s: of the power stage, before the
+    motor; backlash_turns: of the wheel, between motor and encoder.
     """
 
     rpm_per_percent: float = 0.66
     dead_zone_percent: float = 6.0
     time_constant_s: float = 0.12
     friction_rpm_per_s: float = 60.0
+    second_time_constant_s: float = 0.0
+    dead_time_s: float = 0.0
+    backlash_turns: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +104,8 @@ class LoisSettings:
     wheel_radius_scale, track_scale: true over nominal. slip: standard deviation in m of the way of
     a wheel after 1 m. load_percent: of duty, standard deviation of what the ground takes, changing
     within half a second. start_latitude_deg ...: where x = y = 0 is; x is east.
-    heading_noise_deg: of each raw heading. running: it has booted already.
+    mark_noise: of the encoders' marks, standard deviation of the way from one to the next, as part
+    of it. heading_noise_deg: of each raw heading. running: it has booted already.
     """
 
     quirks: Quirks = FIRMWARE
@@ -112,6 +117,7 @@ class LoisSettings:
     track_scale: float = 1.0
     slip: float = 0.0
     load_percent: float = 0.0
+    mark_noise: float = 0.0
     motors: tuple[MotorSettings, MotorSettings] = (MotorSettings(), MotorSettings())
     start_latitude_deg: float = 48.1
     start_longitude_deg: float = 11.5

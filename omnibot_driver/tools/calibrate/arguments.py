@@ -14,6 +14,8 @@ from omnibot_driver.tools.needs import ToolError
 PARTS: Final = ("board", "wheels", "imu")
 
 
+GAINS: Final = "left_kp"
+"""A driver that has it lets the gains of a wheel's controller be set, and records its ticks."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),
@@ -25,7 +27,7 @@ NEEDS: Final = {
         ("base_radius", "odom_linear_scale"),
         "wheels around its centre, or a scale of its odometry",
     ),
-    "step": (("linear_scale",), "a firmware whose control of a wheel it knows"),
+    "step": (("linear_scale", GAINS), "a firmware whose control of a wheel it knows"),
 }
 """By subcommand: parameters one of which a driver has where this can be done, and what they stand
 for."""
@@ -178,6 +180,27 @@ def _step(parser: argparse.ArgumentParser) -> None:
         metavar=("K_FF", "K_VP", "K_VI"),
         help="what the firmware was built with (default: the manual's 40 10 1.5)",
     )
+    tuning = parser.add_argument_group("on a board whose gains are parameters")
+    for name, default, words in (
+        ("records", 24, "starts at full duty that are recorded"),
+        ("responses", 3, "steps of the set-point that are recorded with the same gains"),
+        ("samples", 120, "ticks of each wheel in a record"),
+    ):
+        tuning.add_argument(
+            f"--{name}", type=_whole, default=default, help=f"{words} (default %(default)s)"
+        )
+    for name, value, words in (
+        ("overshoot", 5.0, "most of a step, %%"),
+        ("band", 5.0, "within which a step is over, %%"),
+        ("destination", 50.0, "of the step, %% of the speed at full duty"),
+        ("settling", 2.0, "within which a step is to be over, s"),
+        ("phase-margin", 60.0, "least, degrees"),
+        ("control-frequency", 11.0, "of the controller in the firmware, Hz"),
+    ):
+        tuning.add_argument(
+            f"--{name}", type=_positive, default=value, help=f"{words} (default %(default)s)"
+        )
+    tuning.add_argument("--gain-optimum", action="store_true", help="without phase margin: Td is 0")
 
 
 def _positive(text: str) -> float:

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
+from pathlib import Path
 from typing import Any, Final
 
 import rclpy
@@ -22,9 +23,11 @@ from rclpy.exceptions import InvalidNamespaceException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import Float32MultiArray
+from std_srvs.srv import Trigger
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.readings import Vector3
+from omnibot_driver.tools.calibrate.client import ANSWER_WITHIN_S
 from omnibot_driver.tools.calibrate.interruption import Interruption
 from omnibot_driver.tools.calibrate.listener import ODOMETRY, Listener
 from omnibot_driver.tools.calibrate.log import Log
@@ -34,6 +37,9 @@ from omnibot_driver.tools.needs import ToolError
 PERIOD_S: Final = 0.02
 """Between commands."""
 STANDS_WITHIN_S: Final = 3.0
+ASKED_WITHIN_S: Final = 0.6
+"""A record is asked for more than once in this time, as lines are lost."""
+STOPPING_S: Final = 3.0
 STOOD_S: Final = 0.3
 """Standing for so long is standing still."""
 STANDING: Final = 0.01
@@ -141,6 +147,39 @@ class Robot(Listener):
         if not stands:
             raise ToolError(UNRULY)
         return self.log
+
+    def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
+        """Have the driver record, command this meanwhile, then stand still; the file it made.
+
+        The record is asked for while the robot stands, and has begun when it starts. Raises
+        ToolError as `drive` does, and with the driver's reason where nothing was recorded.
+        """
+        self._begin(("nominal",))
+        publisher = self._node.create_publisher(Float32MultiArray, topic, 1)
+        client = self._node.create_client(Trigger, f"{self.driver}/{service}")
+        began_s, answer = time.monotonic(), None
+        try:
+            if not self._wait(client.service_is_ready, ANSWER_WITHIN_S):
+                raise ToolError(f"{self.driver} does not offer ~/{service}")
+            answer = client.call_async(Trigger.Request())
+            with self._unmonitored():
+                try:
+                    while not answer.done():
+                        self._spin(PERIOD_S)
+                        self._require_sound()
+                        if time.monotonic() - began_s > ASKED_WITHIN_S:
+                            publisher.publish(Float32MultiArray(data=command))
+                finally:
+                    for _ in range(round(STOPPING_S / PERIOD_S)):
+                        publisher.publish(Float32MultiArray(data=[0.0] * len(command)))
+                        self._hear(PERIOD_S)
+        finally:
+            self._node.destroy_publisher(publisher)
+            self._node.destroy_client(client)
+        done: Any = answer.result()
+        if not done.success:
+            raise ToolError(f"{service}: {done.message}")
+        return Path(done.message)
 
     @contextmanager
     def _unmonitored(self) -> Iterator[None]:

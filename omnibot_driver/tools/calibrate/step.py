@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from omnibot_driver.core.readings import Vector3
+from omnibot_driver.tools.calibrate import pi_step
+from omnibot_driver.tools.calibrate.arguments import GAINS
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.motion import Bounds, Law, stairs
 from omnibot_driver.tools.calibrate.result import Result
@@ -26,6 +28,8 @@ RUN_UP_S: Final = 2.0
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     """Record, fit, tune."""
+    if GAINS in robot.parameters:
+        return pi_step.run(robot, console, arguments)
     wheels = [WHEELS.index(name) for name in _wheels(arguments.wheels)]
     levels = _levels(robot.parameters, arguments)
     _law, seconds = _to_and_fro(levels, arguments)

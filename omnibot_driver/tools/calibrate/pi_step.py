@@ -1,0 +1,184 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""``calibrate step`` for a board that records ticks and takes gains: encoders, plant, controller.
+
+Wheels turn freely at a constant duty: the levels of their encoders. They start at full duty: the
+plant. Then they make a step of their set-point with the gains that they had and with those found,
+from which the dead time follows; with it the gains are found anew, and their step is the proof.
+"""
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from omnibot_driver.tools.calibrate.console import Console
+from omnibot_driver.tools.calibrate.pi_loop import Loop
+from omnibot_driver.tools.calibrate.pi_result import Measured, WheelTuned, result_of
+from omnibot_driver.tools.calibrate.pi_tuning import (
+    LEAST_DEAD_S,
+    Goals,
+    Steps,
+    Tuned,
+    dead_time_s,
+    tune,
+)
+from omnibot_driver.tools.calibrate.result import Result
+from omnibot_driver.tools.calibrate.tick_fit import Column, Plant, PlantFit, fit
+from omnibot_driver.tools.calibrate.tick_records import SIDES, Levels, levels, read, response
+from omnibot_driver.tools.needs import ToolError
+
+FREE_PERCENT: Final = 50.0
+FULL_PERCENT: Final = 100.0
+FIRST_RPM: Final = 30.0
+"""Of the steps before there is a plant."""
+ROUNDS: Final = 3
+WRITTEN_WITHIN_S: Final = 4.0
+"""Settings are repeated, as the board acknowledges nothing."""
+
+Records = dict[str, list[Column]]
+"""By side."""
+
+
+def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
+    """Record, fit, tune, and measure what came of it."""
+    goals = Goals(
+        overshoot=arguments.overshoot / 100,
+        band=arguments.band / 100,
+        destination=arguments.destination / 100,
+        settled_s=arguments.settling,
+        phase_margin_deg=None if arguments.gain_optimum else arguments.phase_margin,
+    )
+    total = 1 + arguments.records + (1 + ROUNDS) * arguments.responses
+    console.confirm(
+        f"Both wheels will turn at up to full duty, {total} times for some seconds."
+        " Is the robot on a box, both wheels off the ground, nothing near them?"
+    )
+    names = ["drive_mode", "record_samples", *_names("kp", "tn", "td")]
+    names += _names("short_correction", "long_correction")
+    before = {name: robot.parameters[name] for name in names}
+    with console.progress("records") as show:
+        bench = _Bench(robot, lambda count: show(count / total), arguments.responses)
+        try:
+            wheels = _found(bench, arguments, goals)
+        except BaseException:
+            _restore(bench, before, names)
+            raise
+        worse = [wheel.name for wheel in wheels if wheel.worse]
+        gains = [name for side in worse for name in _names("kp", "tn", "td", sides=(side,))]
+        _restore(bench, before, ["drive_mode", "record_samples", *gains])
+    found = _corrections({wheel.name: wheel.levels for wheel in wheels})
+    found |= _gains({wheel.name: wheel.tuned for wheel in wheels if wheel.name not in worse})
+    return result_of(wheels, goals, found)
+
+
+class _Bench:
+    """The robot as it records; ``show`` is told how many records are done."""
+
+    def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:
+        self.robot, self._show, self._responses, self._done = robot, show, responses, 0
+        self.ticks = int(robot.parameters["ticks_per_revolution"])
+
+    def set(self, values: Mapping[str, Any]) -> None:
+        """And wait until the board has them."""
+        self.robot.set_parameters(values)
+        self.robot.rest(WRITTEN_WITHIN_S)
+
+    def record(self, topic: str, command: Sequence[float], count: int = 1) -> Records:
+        """From standstill, each of them."""
+        found: Records = {side: [] for side in SIDES}
+        for _ in range(count):
+            for side, column in read(self.robot.record("record_rpm", topic, command)).items():
+                found[side].append(column)
+            self._done += 1
+            self._show(self._done)
+        return found
+
+    def steps(self, rpm: Sequence[float]) -> Records:
+        """Of the set-point."""
+        rates = [one * 2 * np.pi / 60 for one in rpm]
+        return self.record("wheel_cmd", rates, self._responses)
+
+
+def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[WheelTuned]:
+    ticks = bench.ticks
+    loop = Loop(1.0 / arguments.control_frequency, ticks, LEAST_DEAD_S)
+    bench.set({"drive_mode": "rpm", "record_samples": arguments.samples})
+    was = bench.steps([FIRST_RPM] * 2)
+    corrections = _encoders(bench)
+    starts = bench.record("duty_cmd", [FULL_PERCENT] * 2, arguments.records)
+    fits = {side: fit(starts[side], ticks) for side in SIDES}
+    plants = {side: _plant(fits[side], corrections[side]) for side in SIDES}
+    loops = dict.fromkeys(SIDES, loop)
+    tuned: dict[str, Tuned] = {}
+    shown: Records = {}
+    made: dict[str, list[Steps]] = {side: [] for side in SIDES}
+    for _ in range(ROUNDS):
+        tuned = {side: tune(plants[side], loops[side], goals) for side in SIDES}
+        bench.set({"drive_mode": "rpm", **_gains(tuned)})
+        shown = bench.steps([tuned[side].target_rpm for side in SIDES])
+        for side in SIDES:
+            made[side].append((tuned[side].gains, tuned[side].target_rpm, shown[side]))
+            loops[side] = replace(loop, dead_s=dead_time_s(plants[side], loop, made[side]))
+    return [
+        WheelTuned(
+            side,
+            corrections[side],
+            fits[side],
+            plants[side],
+            loops[side],
+            tuned[side],
+            Measured([response(one, ticks) for one in was[side]]),
+            Measured([response(one, ticks) for one in shown[side]]),
+        )
+        for side in SIDES
+    ]
+
+
+def _encoders(bench: _Bench) -> dict[str, Levels]:
+    """Measured with both corrections at 1, as a record is of corrected times."""
+    ones = dict.fromkeys(_names("short_correction", "long_correction"), 1.0)
+    bench.set({"drive_mode": "duty", **ones})
+    free = bench.record("duty_cmd", [FREE_PERCENT] * 2)
+    found = {side: levels(free[side][0][len(free[side][0]) // 4 :], bench.ticks) for side in SIDES}
+    bench.set(_corrections(found))
+    return found
+
+
+def _plant(found: PlantFit, free: Levels) -> Plant:
+    """With the static speeds at two duties: a line, which meets standstill at the dead zone."""
+    slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
+    if slope <= 0.0:
+        raise ToolError(
+            f"a wheel turns at {free.rpm:.0f} RPM with half duty and at {found.final_rpm:.0f} with"
+            " full: is something in its way, or the battery weak?"
+        )
+    dead_zone = FULL_PERCENT - found.final_rpm / slope
+    return Plant(slope, found.slow_s, found.fast_s, float(np.clip(dead_zone, 0.0, 50.0)))
+
+
+def _names(*parts: str, sides: Sequence[str] = SIDES) -> list[str]:
+    return [f"{side}_{part}" for side in sides for part in parts]
+
+
+def _corrections(found: Mapping[str, Levels]) -> dict[str, float]:
+    return {
+        f"{side}_{level}_correction": round(float(value), 5)
+        for side, one in found.items()
+        for level, value in (("short", one.short), ("long", one.long))
+    }
+
+
+def _gains(tuned: Mapping[str, Tuned]) -> dict[str, float]:
+    return {
+        f"{side}_{name}": round(float(value), 4)
+        for side, one in tuned.items()
+        for name, value in (("kp", one.gains.kp), ("tn", one.gains.tn_s), ("td", one.gains.td_s))
+    }
+
+
+def _restore(bench: _Bench, before: Mapping[str, Any], names: Sequence[str]) -> None:
+    """What was unset cannot be known: it stays until driver and board are started anew."""
+    bench.robot.set_parameters({name: before[name] for name in names if before[name] is not None})

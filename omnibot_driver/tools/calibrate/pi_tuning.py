@@ -1,0 +1,150 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Gains of a band-limited PI controller for a plant: its slowest pole is compensated, then the gain
+is as high as the goals allow.
+
+Tn is the plant's slow time constant. Kp, and Td where a phase margin is wanted, are those with
+which a step is over soonest (the time until it stays in its band, and the integral of its error),
+of all that overshoot by the goal at most. The dead time of a plant is found afterwards, from a step
+that was made with such gains.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from omnibot_driver.tools.calibrate.pi_loop import (
+    STEP_S,
+    Loop,
+    PiGains,
+    Traits,
+    answer,
+    phase_margin_deg,
+    traits,
+)
+from omnibot_driver.tools.calibrate.tick_fit import Column, Plant
+from omnibot_driver.tools.calibrate.tick_records import Response, response
+from omnibot_driver.tools.needs import ToolError
+
+SECONDS: Final = 4.0
+CANDIDATES: Final = 48
+ROUNDS: Final = 2
+DEAD_S: Final = np.arange(0.0, 0.101, 0.005)
+FIRST_TICKS: Final = (0.1, 0.3, 0.5, 0.7, 0.9)
+OVER_S: Final = 1.5
+LEAST_DEAD_S: Final = 0.02
+TDS: Final = (0.0, 0.5, 1.0)
+"""Of the control period."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goals:
+    """``overshoot``, ``band``: parts of the speed; ``destination``: part of the speed at full duty
+    that the step leads to; ``settled_s``: a warning where it takes longer. Without
+    ``phase_margin_deg`` the gain optimum: Td = 0, and the overshoot alone limits the gain.
+    """
+
+    overshoot: float = 0.05
+    band: float = 0.05
+    destination: float = 0.5
+    settled_s: float = 2.0
+    phase_margin_deg: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Tuned:
+    """The gains, and what they do to a step to ``target_rpm``."""
+
+    gains: PiGains
+    target_rpm: float
+    overshoot: float
+    settled_s: float
+    error_s: float
+    phase_margin_deg: float
+
+
+def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
+    """Raises ToolError where no gain keeps to the goals."""
+    target = target_of(plant, goals)
+    tds = [0.0] if goals.phase_margin_deg is None else [part * loop.period_s for part in TDS]
+    low, high = 0.02, 5.0
+    best: tuple[float, float] | None = None
+    scale = 1.0 / plant.rpm_per_percent
+    for _ in range(ROUNDS):
+        kps, used = np.meshgrid(scale * np.geomspace(low, high, CANDIDATES), tds, indexing="ij")
+        gains = PiGains(kps, plant.slow_s, used)
+        found = traits(answer(plant, gains, loop, target, SECONDS), target, goals.band)
+        # Up to the first gain that overshoots too much: far above it, saturation hides it again.
+        tame = np.logical_and.accumulate(found.overshoot <= goals.overshoot, axis=0)
+        allowed = np.isfinite(found.settled_s) & tame
+        if goals.phase_margin_deg is not None:
+            margin = phase_margin_deg(plant, gains, loop, target)
+            allowed &= margin >= goals.phase_margin_deg
+        if not allowed.any():
+            break
+        cost = np.where(allowed, found.settled_s + found.error_s, np.inf)
+        place = np.unravel_index(int(np.argmin(cost)), cost.shape)
+        best = float(kps[place]), float(used[place])
+        factor = (high / low) ** (2.0 / (CANDIDATES - 1))
+        low, high, tds = best[0] / scale / factor, best[0] / scale * factor, [best[1]]
+    if best is None:
+        raise ToolError(
+            f"no gain keeps a step to {target:.0f} RPM within {goals.overshoot:.0%} of overshoot"
+            f" and a band of {goals.band:.0%}: allow more, or another destination"
+        )
+    return told(plant, PiGains(best[0], plant.slow_s, best[1]), loop, goals)
+
+
+def target_of(plant: Plant, goals: Goals) -> float:
+    """Whole RPM."""
+    return float(max(round(goals.destination * plant.final_rpm(100.0)), 5))
+
+
+def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
+    """What these gains do."""
+    target = target_of(plant, goals)
+    found: Traits = traits(answer(plant, gains, loop, target, SECONDS), target, goals.band)
+    return Tuned(
+        gains,
+        target,
+        float(found.overshoot),
+        float(found.settled_s),
+        float(found.error_s),
+        float(phase_margin_deg(plant, gains, loop, target)),
+    )
+
+
+Steps = tuple[PiGains, float, Sequence[Column]]
+"""Gains, the set-point in RPM, and what was recorded with them."""
+
+
+def dead_time_s(plant: Plant, loop: Loop, made: Sequence[Steps]) -> float:
+    """The dead time with which the loop answers its steps as these records show it.
+
+    ``LEAST_DEAD_S`` at least: one that is taken for too short makes a step overshoot.
+    """
+    costs = np.zeros(len(DEAD_S))
+    for gains, target_rpm, records in made:
+        shown = [response(record, loop.ticks_per_revolution) for record in records]
+        for place, dead_s in enumerate(DEAD_S):
+            told_rpm = answer(plant, gains, replace(loop, dead_s=dead_s), target_rpm, OVER_S + 1.0)
+            ticks = np.cumsum(told_rpm) * STEP_S * loop.ticks_per_revolution / 60
+            models = [_recorded(ticks, first, loop.ticks_per_revolution) for first in FIRST_TICKS]
+            costs[place] += sum(min(_unlike(one, model) for model in models) for one in shown)
+    return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)
+
+
+def _recorded(ticks: Column, first: float, ticks_per_revolution: int) -> Response:
+    """What a record of this answer would show; ``first``: where the first mark is."""
+    marks = np.arange(first, ticks[-1])
+    at_s = np.interp(marks, ticks, STEP_S * np.arange(1, len(ticks) + 1))
+    return response(np.diff(at_s, prepend=0.0), ticks_per_revolution)
+
+
+def _unlike(shown: Response, model: Response) -> float:
+    """Mean square of how much two answers differ, as part of the speed, until the step is over."""
+    times_s = shown.times_s[shown.times_s < OVER_S]
+    told_rpm = np.interp(times_s, model.times_s, model.rpm)
+    return float(np.mean((shown.rpm[: len(times_s)] / told_rpm - 1.0) ** 2))

@@ -1,0 +1,111 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Records of the times between a wheel's ticks, and what they say of its encoder.
+
+Pure calculation on columns of a CSV file with the header that the driver writes.
+"""
+
+import csv
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from omnibot_driver.tools.calibrate.tick_fit import Column
+from omnibot_driver.tools.needs import ToolError
+
+SIDES: Final = ("left", "right")
+UNTOLD: Final = 0.2
+"""Part of the times that may be missing."""
+UNLIKE: Final = 1.5
+"""Times the usual one: an edge was missed, or came late."""
+SMOOTHED: Final = 4
+"""Ticks: marks are off their places, but the sum of some ways is not off by more."""
+
+
+def read(path: Path) -> dict[str, Column]:
+    """By side: times between ticks in s. Raises ToolError for a file that tells too little."""
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        columns = {side: [row[f"{side}_tick_s"] for row in rows] for side in SIDES}
+    except (OSError, KeyError, ValueError) as error:
+        raise ToolError(f"the record {path} cannot be read: {error}") from error
+    for told in columns.values():
+        if not told or sum(not one for one in told[1:]) > UNTOLD * len(told):
+            raise ToolError(
+                f"the record {path} has ticks that took longer than the board can tell, or its unit"
+                " is not known: with a unit of 100 ns wheels have to turn faster than 152 RPM"
+            )
+    return {
+        side: np.array([float(one) if one else np.nan for one in told])
+        for side, told in columns.items()
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """``short``, ``long``: factors that make both levels of an encoder as long as their mean, with
+    their standard deviation. ``rpm``: how fast the wheel turned.
+    """
+
+    short: float
+    long: float
+    sigma: float
+    rpm: float
+
+
+def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
+    """Of a wheel that turns freely at a constant duty, with both corrections at 1.
+
+    Levels come in turn, and it shows which is the shorter. Where an edge was missed the turn begins
+    anew. Raises ToolError where nothing is regular.
+    """
+    usual = float(np.nanmedian(ticks_s))
+    good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)
+    ways: tuple[list[float], list[float]] = ([], [])
+    for run in _runs(ticks_s, good):
+        even, odd = run[::2], run[1::2]
+        shorter, longer = (even, odd) if even.mean() <= odd.mean() else (odd, even)
+        ways[0].extend(shorter)
+        ways[1].extend(longer)
+    if min(map(len, ways)) < 20:
+        raise ToolError("the ticks of the free-spinning record are not regular: record it again")
+    short_s, long_s = (float(np.mean(one)) for one in ways)
+    mean_s = (short_s + long_s) / 2
+    spread = max(np.std(one) / np.sqrt(len(one)) for one in ways) / mean_s
+    return Levels(
+        mean_s / short_s, mean_s / long_s, float(spread), 60 / (mean_s * ticks_per_revolution)
+    )
+
+
+def _runs(ticks_s: Column, good: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -> Iterable[Column]:
+    """Ten and more regular ones in a row."""
+    begin = 0
+    for place in range(len(ticks_s) + 1):
+        if place == len(ticks_s) or not good[place]:
+            if place - begin >= 10:
+                yield ticks_s[begin:place]
+            begin = place + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """A step as a record shows it: ``times_s`` from the first tick on, ``rpm`` smoothed."""
+
+    times_s: Column
+    rpm: Column
+
+
+def response(ticks_s: Column, ticks_per_revolution: int) -> Response:
+    """Without the first tick, in whose time the wheel stood."""
+    times_s = ticks_s[1:].copy()
+    times_s[~np.isfinite(times_s)] = np.nanmedian(times_s)
+    ends_s = np.concatenate(([0.0], np.cumsum(times_s)))
+    passed_s = ends_s[SMOOTHED:] - ends_s[:-SMOOTHED]
+    return Response(
+        (ends_s[SMOOTHED:] + ends_s[:-SMOOTHED]) / 2,
+        60.0 * SMOOTHED / (ticks_per_revolution * passed_s),
+    )

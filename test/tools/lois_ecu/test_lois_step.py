@@ -1,0 +1,189 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""``calibrate step`` of a LOIS ECU: encoders, plants and gains that were not known."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lois_robot import SimulatedRobot, random_motors
+
+from omnibot_driver.boards.lois_ecu import PARAMETERS
+from omnibot_driver.boards.lois_ecu_records import save
+from omnibot_driver.core.lois_ecu import Record, RecordKind
+from omnibot_driver.core.lois_ecu.readings import RecordReading
+from omnibot_driver.tools.calibrate import pi_step, step
+from omnibot_driver.tools.calibrate.arguments import command_line, require_able
+from omnibot_driver.tools.calibrate.console import Console
+from omnibot_driver.tools.calibrate.pi_loop import Loop, PiGains, answer, phase_margin_deg, traits
+from omnibot_driver.tools.calibrate.pi_tuning import Goals, dead_time_s, told, tune
+from omnibot_driver.tools.calibrate.tick_fit import Column, Plant, fit, speed, turned
+from omnibot_driver.tools.calibrate.tick_records import levels, read
+from omnibot_driver.tools.needs import ToolError
+
+TICKS = 60
+LOOP = Loop(0.091, TICKS)
+PLANT = Plant(0.66, 0.3, 0.1, 6.0)
+
+
+def starts(plant: Plant, count: int, ticks: int = 150, seed: int = 1) -> list[Column]:
+    """Times between ticks from standstill at full duty, over marks that are off their places."""
+    random = np.random.default_rng(seed)
+    times_s = np.arange(0.0, 6.0, 1e-4)
+    way = plant.final_rpm(100.0) * TICKS / 60 * turned(times_s, plant.slow_s, plant.fast_s)
+    off = 0.07 * random.standard_normal(TICKS)
+    found = []
+    for _ in range(count):
+        marks = random.random() + np.arange(ticks)
+        marks += off[(np.arange(ticks) + random.integers(TICKS)) % TICKS]
+        at_s = np.interp(marks, way, times_s)
+        found.append(np.round(np.diff(at_s, prepend=-1.0), 4))
+    return found
+
+
+@pytest.mark.parametrize("fast_s", [0.0, 0.1, 0.3])
+def test_a_plants_speed_is_the_change_of_its_way(fast_s: float) -> None:
+    """Also of first order, and with two equal time constants."""
+    times_s = np.linspace(0.0, 3.0, 3001)
+    slope = np.gradient(turned(times_s, 0.3, fast_s), times_s)
+    assert slope[1:-1] == pytest.approx(speed(times_s, 0.3, fast_s)[1:-1], abs=2e-3)
+    assert speed(times_s, 0.3, fast_s)[-1] == pytest.approx(1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("slow_s", [0.2, 0.45])
+def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
+    """Of second order, with marks that are off by 10 % from one to the next."""
+    planted = Plant(0.62, slow_s, 0.4 * slow_s, 5.0)
+    found = fit(starts(planted, 8), TICKS)
+    assert found.order == 2
+    assert found.slow_s == pytest.approx(slow_s, rel=0.1)
+    assert found.fast_s == pytest.approx(0.4 * slow_s, abs=3 * found.sigmas[2])
+    assert found.final_rpm == pytest.approx(planted.final_rpm(100.0), rel=0.005)
+    assert found.slow_s == pytest.approx(slow_s, abs=4 * found.sigmas[1])
+
+
+def test_records_that_are_too_short_are_refused() -> None:
+    """With what to do."""
+    with pytest.raises(ToolError, match="record_samples"):
+        fit([one[:20] for one in starts(PLANT, 3)], TICKS)
+
+
+@pytest.mark.parametrize("begins", [0, 1])
+def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
+    """In spite of edges that were missed."""
+    random = np.random.default_rng(2)
+    ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
+    ticks_s[[40, 41, 120]] *= 2.0
+    found = levels(ticks_s, TICKS)
+    assert found.short == pytest.approx(1 / 0.93, abs=0.01)
+    assert found.long == pytest.approx(1 / 1.07, abs=0.01)
+    assert found.rpm == pytest.approx(60 / (0.03 * TICKS), rel=0.02)
+
+
+@pytest.mark.parametrize("margin", [None, 60.0])
+@pytest.mark.parametrize("overshoot", [0.02, 0.1])
+def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> None:
+    """The slowest pole is compensated; Td is 0 in the gain optimum."""
+    goals = Goals(overshoot=overshoot, phase_margin_deg=margin)
+    found = tune(PLANT, LOOP, goals)
+    assert found.gains.tn_s == PLANT.slow_s
+    assert found.overshoot <= overshoot
+    assert math.isfinite(found.settled_s)
+    if margin is None:
+        assert found.gains.td_s == 0.0
+    else:
+        assert found.phase_margin_deg >= margin
+
+
+def test_goals_that_nothing_meets_are_told() -> None:
+    """A plant that is much faster than its controller."""
+    slow = Loop(1.0, TICKS, 0.5)
+    with pytest.raises(ToolError, match="allow more"):
+        tune(Plant(0.66, 0.02, 0.0), slow, Goals(overshoot=0.0, band=0.001, phase_margin_deg=89.9))
+
+
+def test_a_phase_margin_is_that_of_the_open_loop() -> None:
+    """By hand: what is left of Kp K / (s Tn) with all lags small crosses 1 at Kp K / Tn."""
+    loop = Loop(1e-6, 10**9)
+    plant = Plant(1.0, 0.5, 0.0)
+    margin = phase_margin_deg(plant, PiGains(1.0, 0.5, 0.0), loop, 1000.0)
+    assert float(margin) == pytest.approx(90.0, abs=1.0)
+    late = phase_margin_deg(plant, PiGains(1.0, 0.5, 0.0), Loop(1e-6, 10**9, 0.2), 1000.0)
+    assert float(late) == pytest.approx(90.0 - math.degrees(2.0 * 0.2), abs=1.5)
+
+
+def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
+    """Within 10 ms; a short one is not believed."""
+    gains = tune(PLANT, LOOP, Goals()).gains
+    for dead_s in (0.03, 0.06):
+        rpm = answer(PLANT, gains, Loop(0.091, TICKS, dead_s), 31.0, 4.0)
+        ticks = np.cumsum(rpm) * 1e-3 * TICKS / 60
+        at_s = np.interp(np.arange(0.4, ticks[-1]), ticks, 1e-3 * np.arange(1, len(ticks) + 1))
+        found = dead_time_s(PLANT, LOOP, [(gains, 31.0, [np.diff(at_s, prepend=0.0)])])
+        assert found == pytest.approx(dead_s, abs=0.011)
+
+
+def test_traits_of_an_answer_are_read_off_it() -> None:
+    """A swing that dies out."""
+    times_s = np.arange(0.0, 4.0, 1e-3)
+    rpm = 40.0 * (1 - np.exp(-3 * times_s) * np.cos(6 * times_s))
+    found = traits(rpm, 40.0, 0.05)
+    assert float(found.overshoot) == pytest.approx(math.exp(-math.pi / 2) * 1.118, abs=0.03)
+    last = times_s[np.abs(rpm - 40.0) > 2.0][-1]
+    assert float(found.settled_s) == pytest.approx(last, abs=2e-3)
+
+
+def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
+    """By the manual the unit is 100 ns, in which no tick of a usual wheel fits."""
+    record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
+    path = tmp_path / "rpm.csv"
+    save(RecordReading(record, 1e-7, TICKS), path)
+    with pytest.raises(ToolError, match="152 RPM"):
+        read(path)
+
+
+def test_whoever_has_gains_as_parameters_can_do_it() -> None:
+    """By what the driver offers, whatever its board is called."""
+    values = PARAMETERS.check_all({})
+    require_able("step", values)
+    with pytest.raises(ToolError, match="wheels around its centre"):
+        require_able("geometry", values)
+
+
+def test_a_robot_is_calibrated_from_its_records(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Marks that are 10 % off, wheels that differ, dead time, backlash: corrections, plant, gains,
+    and a step that overshoots as wanted; all of it in the driver and in the file."""
+    monkeypatch.setattr(pi_step, "ROUNDS", 1)
+    motors = random_motors(0)
+    robot = SimulatedRobot(tmp_path, motors)
+    words = ["step", "--yes", "--records", "5", "--responses", "1", "--samples", "100"]
+    result = step.run(robot, Console(yes=True), command_line().parse_args(words))
+    found = {finding.name: finding for finding in result.findings}
+    for side, motor in zip(("left", "right"), motors, strict=True):
+        slow = found[f"{side}: slow time constant"].value
+        assert slow == pytest.approx(motor.time_constant_s, rel=0.15)
+        measured = found[f"{side}: overshoot, measured"]
+        assert isinstance(measured.value, float)
+        assert isinstance(measured.before, float)
+        assert measured.value < measured.before
+        assert f"The {side} wheel: a step to" in " ".join(result.notes)
+    names = {f"{side}_{gain}" for side in ("left", "right") for gain in ("kp", "tn", "td")}
+    levels_of = {f"{side}_{n}_correction" for side in ("left", "right") for n in ("short", "long")}
+    assert set(result.parameters) == names | levels_of
+    assert {name: robot.parameters[name] for name in result.parameters} == result.parameters
+    assert robot.parameters["drive_mode"] == "rpm"
+    robot.rest(3.0)
+    gains = robot.board.wheels[1].controller.gains
+    assert gains.kp == pytest.approx(result.parameters["right_kp"])
+    assert gains.td == pytest.approx(result.parameters["right_td"])
+    assert all(name in PARAMETERS.calibrated for name in result.parameters)
+
+
+def test_what_is_worse_than_before_is_told_as_it_is() -> None:
+    """Of the same plant, by what a step does."""
+    good = tune(PLANT, LOOP, Goals()).gains
+    slow = PiGains(0.05, 2.0, 1.0)
+    assert told(PLANT, slow, LOOP, Goals()).error_s > told(PLANT, good, LOOP, Goals()).error_s
