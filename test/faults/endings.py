@@ -54,7 +54,8 @@ os.close(terminal)
 class Ending:
     """``exit_codes``: what is right. Whatever happens, Stop is the last that the board heard.
 
-    ``allowed_s``, ``late_s``: how long the robot may drive on, and the process live on.
+    ``allowed_s``, ``late_s``: how long the robot may drive on, and the process live on; ``full``:
+    the port is, of old commands.
     """
 
     end: Callable[[Rig], object]
@@ -62,6 +63,7 @@ class Ending:
     before: str = ""
     allowed_s: float = 0.0
     late_s: float = 0.0
+    full: bool = False
 
     def __call__(self, rig: Rig) -> None:
         """While the robot drives."""
@@ -69,7 +71,8 @@ class Ending:
         self.end(rig)
         since = rig.line.tick
         rig.expect_ended(*self.exit_codes, late_s=self.late_s)
-        rig.expect_still(since, "the driver ends", self.allowed_s)
+        old_s = rig.kind.old_bytes_s if self.full else 0.0
+        rig.expect_still(since, "the driver ends", self.allowed_s + old_s)
         rig.hand.leave()
         heard = bytes(rig.line.board.received)
         rig.findings.expect(heard.endswith(rig.kind.stop), f"last it heard {heard[-26:].hex(' ')}")
@@ -152,15 +155,16 @@ ENDINGS: Final[dict[str, Ending]] = {
         by_signals(signal.SIGINT), (1,), HANGS, allowed_s=0.5, late_s=4.0
     ),
     "an exception in the reader": Ending(by_topic, (1,), before=IN_THE_READER),
-    "SIGINT, the port full": Ending(partial(while_full, by_signals(signal.SIGINT))),
+    "SIGINT, the port full": Ending(partial(while_full, by_signals(signal.SIGINT)), full=True),
     "an exception, the port full": Ending(
         partial(while_full, by_topic),
         (1,),
         IN_A_CALLBACK.format("1 / 0"),
+        full=True,
     ),
     "SIGKILL": Ending(by_signals(signal.SIGKILL), (-signal.SIGKILL,)),
     "SIGKILL, the port full": Ending(
-        partial(while_full, by_signals(signal.SIGKILL)), (-signal.SIGKILL,)
+        partial(while_full, by_signals(signal.SIGKILL)), (-signal.SIGKILL,), full=True
     ),
     "a segmentation fault": Ending(
         by_topic, (-signal.SIGSEGV,), IN_A_CALLBACK.format("ctypes.string_at(0)")

@@ -38,8 +38,9 @@ BOARD: Final = RigBoard(
         "reconnect_interval",
     ),
     off_within_s=0.1,
-    old_bytes_s=0.5,  # a line at 115200 baud, as it hears it byte by byte
+    old_bytes_s=1.8,  # 20 kB at 115200 baud, which it hears byte by byte
     ends_later_s=1.5,  # it shows a stand after 0.6 s, which is waited for twice
+    deaf_s=0.6,  # lines are lost while it sends; a lost port is open again after 0.5 s
     imu=False,
     without=frozenset(
         {

@@ -19,8 +19,9 @@ class RigBoard:
     ``opening``: what it hears first on a new line. ``wheels``: how many wheel_cmd has;
     ``services``: of the common ones; ``tuning``: parameters that refuse nonsense. ``off_within_s``:
     how long after they are told to, its motors are off; ``old_bytes_s``: how long it takes to hear
-    what a full port has kept; ``ends_later_s``: how much longer its driver takes to end. ``imu``:
-    whether it sends readings of one.
+    what a full port has kept; ``ends_later_s``: how much longer its driver takes to end;
+    ``deaf_s``: how long it may miss what is said on one line, so that the next one has to tell it.
+    ``imu``: whether it sends readings of one.
 
     ``sent``: the frames of its last tick; ``not_sent``: of what was published, by kind, how many
     messages were never sent, and of how many. ``lossy``: settings of board number n for a line that
@@ -39,6 +40,7 @@ class RigBoard:
     off_within_s: float = 0.0
     old_bytes_s: float = 0.0
     ends_later_s: float = 0.0
+    deaf_s: float = 0.0
     imu: bool
     sent: Sent = lambda _board: []
     not_sent: Callable[[Iterable[Any], Iterable[Any], list[bytes]], list[tuple[str, int, int]]] = (

@@ -106,7 +106,7 @@ def server_closes_one_direction(rig: NetworkRig) -> None:
     since, mark = rig.line.tick, len(rig.driver.lines)
     rig.server.close_from_here()
     rig.hand.leave()
-    rig.expect_still(since, "closed in one direction", 0.0)
+    rig.expect_still(since, "closed in one direction", rig.kind.deaf_s)
     rig.probe.wait_for_state("nominal")
     rig.expect_said_once(LOST, mark)
 
