@@ -6,8 +6,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-for folder in ("core", "tools/lois_ecu"):
-    sys.path.append(str(Path(__file__).parents[1] / folder))
+sys.path.append(str(Path(__file__).parents[1] / "core"))
+sys.path.append(str(Path(__file__).parents[1] / "tools/lois_ecu"))
 
 from lois_robot import SimulatedRobot, random_motors
 
