@@ -24,6 +24,10 @@ from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver.simulator.common.serving import PtyBoard
 from omnibot_driver.simulator.lois_ecu import QUIRKS, LoisSettings, SimulatedLois
+from omnibot_driver.tools.calibrate.interruption import Interruption
+from omnibot_driver.tools.calibrate.robot import connect
+from omnibot_driver.tools.calibrate.tick_records import read
+from omnibot_driver.tools.needs import ToolError
 
 Start = Callable[..., Any]
 PATIENCE_S: Final = 30.0
@@ -339,3 +343,27 @@ def set_parameter(probe: Probe, name: str, value: str) -> None:
     future = client.call_async(SetParameters.Request(parameters=[Parameter(name=name, value=text)]))
     probe.wait_for_future(future)
     assert future.result().results[0].successful, future.result().results[0].reason
+
+
+def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
+    start_driver: Start, stack: ExitStack, tmp_path: Path
+) -> None:
+    """The file has the ticks of both wheels from their start on; a refusal is told as it is."""
+    ecu = ecu_of("firmware", stack, running=True)
+    driver = start_driver(
+        ecu.path,
+        board="lois_ecu",
+        record_samples=40,
+        record_directory=str(tmp_path),
+        cmd_vel_timeout=3.0,
+    )
+    driver.wait_for_line("state: nominal")
+    with Interruption() as interruption, connect(driver.namespace, [], interruption) as robot:
+        path = robot.record("record_rpm", "wheel_cmd", [3.0, 3.0])
+        ecu.stands_for_good()
+        found = read(path)
+        assert [len(found[side]) for side in ("left", "right")] == [40, 40]
+        assert robot.parameters["motion_monitor"] is True
+        robot.call("estop", on=True)
+        with pytest.raises(ToolError, match="e-stop"):
+            robot.record("record_rpm", "wheel_cmd", [3.0, 3.0])
