@@ -2,6 +2,7 @@
 
 """The LOIS ECU, a control unit for differential drives, and nothing else."""
 
+from omnibot_driver.core.lois_ecu.codec import decode_command, encode_command, encode_report
 from omnibot_driver.core.lois_ecu.decoder import DecoderStatistics, LoisDecoder
 from omnibot_driver.core.lois_ecu.messages import (
     PERIOD_OFF,
@@ -30,9 +31,6 @@ from omnibot_driver.core.lois_ecu.messages import (
     TerminalMode,
     Ticks,
     WriteSetting,
-    decode_command,
-    encode_command,
-    encode_report,
 )
 
 __all__ = [

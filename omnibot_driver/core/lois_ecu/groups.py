@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from operator import eq
 from typing import Final
 
+from omnibot_driver.core.lois_ecu.codec import single_report
 from omnibot_driver.core.lois_ecu.lines import MARKER, Line, signed, to_float, unsigned_pair
 from omnibot_driver.core.lois_ecu.messages import (
     HEADING_END,
@@ -30,7 +31,6 @@ from omnibot_driver.core.lois_ecu.messages import (
     RecordKind,
     Report,
     Ticks,
-    single_report,
 )
 from omnibot_driver.core.lois_ecu.plausibility import (
     ClockUnit,

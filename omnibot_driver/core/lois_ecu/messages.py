@@ -1,30 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every message of the manual's table as a value, and its lines.
+"""Every message of the manual's table as a value. How it is written in lines is in ``codec``.
 
-Source: the ECU's manual, table of messages; for the order of words within a payload and for 0x21 to
-0x23 the public firmware. What the host sends is a ``Command``, what the ECU sends a ``Report``;
-some command bytes are both. Units are in the names; what a count means in SI units is known
-elsewhere.
+Source: the ECU's manual, table of messages; for 0x21 to 0x23 the public firmware. What the host
+sends is a ``Command``, what the ECU sends a ``Report``; some command bytes are both. Units are in
+the names; what a count means in SI units is known elsewhere.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Final
-
-from omnibot_driver.core.errors import FrameError
-from omnibot_driver.core.lois_ecu.lines import (
-    MARKER,
-    Line,
-    encode_line,
-    from_float,
-    from_pair,
-    line_of,
-    signed_pair,
-    to_float,
-    unsigned_pair,
-)
 
 PERIOD_ONCE: Final = 0xFFFE
 """Instead of a period in ms: send the message once, then never."""
@@ -308,144 +293,3 @@ Report = (
     | Record
     | TerminalLine
 )
-
-
-def encode_command(command: Command, *, with_sum: bool = True) -> bytes:
-    """The one line that says it. Raises FrameError when a value does not fit or is no period."""
-    code, payload = _said(command)
-    return encode_line(code, payload, with_sum=with_sum)
-
-
-def _said(command: Command) -> tuple[int, int]:
-    match command:
-        case SetDuty(left, right):
-            return Code.DUTY, _words(left, right)
-        case SetRpm(left, right):
-            return Code.RPM, _words(left, right)
-        case SetLed(on):
-            return Code.LED, int(on)
-        case RecordRpm(left, right):
-            return Code.RECORD_RPM, _samples(left) << 16 | _samples(right)
-        case RecordTorque(left, right):
-            return Code.RECORD_TORQUE, _samples(left) << 16 | _samples(right)
-        case RecordHeading(samples):
-            return Code.RECORD_HEADING, _samples(samples)
-        case WriteSetting(setting, number):
-            return setting, from_float(number)
-        case SetPeriod(stream, period_ms):
-            if not 0 < period_ms <= PERIOD_OFF:
-                raise FrameError(f"{period_ms} ms is no period: 1 to 65533, 0xfffe or 0xffff")
-            return stream, period_ms
-        case SetTerminalMode(mode):
-            return Code.TERMINAL_MODE, mode
-        case Reset():
-            return Code.RESET, 0
-        case DistributeBall():
-            return Code.DISTRIBUTE_BALL, 0
-
-
-def _words(left: int, right: int) -> int:
-    if not (-0x8000 <= left <= 0x7FFF and -0x8000 <= right <= 0x7FFF):
-        raise FrameError(f"{left} and {right} do not fit two signed words of 16 bits")
-    return from_pair(left, right)
-
-
-def _samples(count: int) -> int:
-    if not 0 <= count <= MOST_SAMPLES:
-        raise FrameError(f"{count} samples cannot be recorded: 0 to {MOST_SAMPLES}")
-    return count
-
-
-def decode_command(data: bytes, *, with_sum: bool = True) -> Command:
-    """What the one line of a host says. Raises FrameError when it says nothing."""
-    line = line_of(data, sum_required=with_sum)
-    if line is None or (not with_sum and len(data.replace(b"\r", b"")) != 12):
-        raise FrameError(f"not one whole line: {data!r}")
-    made = _COMMANDS.get(line.command)
-    try:
-        if made is not None:
-            return made(line.payload)
-        if line.command in Setting.__members__.values():
-            return WriteSetting(Setting(line.command), to_float(line.payload))
-        if line.command in Stream.__members__.values():
-            return SetPeriod(Stream(line.command), line.payload & 0xFFFF)
-    except ValueError as error:
-        raise FrameError(f"no value of this command: {data!r}") from error
-    raise FrameError(f"no command that a host sends: {data!r}")
-
-
-_COMMANDS: Final[dict[int, Callable[[int], Command]]] = {
-    Code.DUTY: lambda payload: SetDuty(*signed_pair(payload)),
-    Code.RPM: lambda payload: SetRpm(*signed_pair(payload)),
-    Code.LED: lambda payload: SetLed(payload & 0xFFFF != 0),
-    Code.RECORD_RPM: lambda payload: RecordRpm(*unsigned_pair(payload)),
-    Code.RECORD_TORQUE: lambda payload: RecordTorque(*unsigned_pair(payload)),
-    Code.RECORD_HEADING: RecordHeading,
-    Code.TERMINAL_MODE: lambda payload: SetTerminalMode(TerminalMode(payload & 0xFF)),
-    Code.RESET: lambda _: Reset(),
-    Code.DISTRIBUTE_BALL: lambda _: DistributeBall(),
-}
-
-
-def encode_report(report: Report) -> bytes:
-    """All lines of one report, as the board sends it. Raises FrameError when a value is too big."""
-    match report:
-        case EStopButton(pressed):
-            return encode_line(Code.ESTOP_BUTTON, int(pressed))
-        case GpsPosition(latitude, longitude):
-            return _group(Code.GPS_POSITION, [from_float(latitude), from_float(longitude)])
-        case GpsTime(hours, minutes, seconds):
-            return encode_line(Code.GPS_TIME, hours << 16 | minutes << 8 | seconds)
-        case GpsDate(year, month, day):
-            return encode_line(Code.GPS_DATE, year << 16 | month << 8 | day)
-        case Heading(heading_deg):
-            return encode_line(Code.HEADING, heading_deg & 0xFFFF)
-        case Ticks(time_counts, left, right):
-            return _group(Code.TICKS, [time_counts, left & MARKER, right & MARKER])
-        case BoardOdometry():
-            code = Code.TICKS if report.appended else Code.ODOMETRY
-            numbers = (
-                *(report.x_m, report.y_m, report.yaw_rad),
-                *(report.dx_mps, report.dy_mps, report.yaw_rate_radps),
-            )
-            return _group(code, [from_float(number) for number in numbers])
-        case Record():
-            return _encode_record(report)
-        case TerminalLine(text):
-            return text.encode("latin-1") + b"\r\n"
-
-
-def _group(code: int, payloads: list[int]) -> bytes:
-    return b"".join(encode_line(code, payload) for payload in (MARKER, *payloads))
-
-
-def _encode_record(record: Record) -> bytes:
-    if record.kind is RecordKind.HEADING:
-        padded = (*record.left, HEADING_PADDING) if len(record.left) % 2 else record.left
-        pairs = zip(padded[::2], padded[1::2], strict=True)
-        payloads = [from_pair(first, second) for first, second in pairs]
-        return b"".join(
-            encode_line(Code.RECORD_HEADING, payload) for payload in (*payloads, HEADING_END)
-        )
-    code = Code.RECORD_RPM if record.kind is RecordKind.RPM else Code.RECORD_TORQUE
-    longest = max(len(record.left), len(record.right))
-    left, right = ((*one, *[10] * (longest - len(one))) for one in (record.left, record.right))
-    payloads = [from_pair(*pair) for pair in zip(left, right, strict=True)]
-    return b"".join(encode_line(code, payload) for payload in (*payloads, RECORD_END))
-
-
-def single_report(line: Line) -> Report | None:
-    """What a line reports that is a report by itself; None if it reports nothing, or nonsense."""
-    payload = line.payload
-    low = payload & 0xFFFF
-    high, middle, last = payload >> 16, low >> 8, low & 0xFF
-    match line.command:
-        case Code.ESTOP_BUTTON if payload <= 1:
-            return EStopButton(payload == 1)
-        case Code.GPS_TIME if high < 24 and middle < 60 and last <= 60:
-            return GpsTime(high, middle, last)
-        case Code.GPS_DATE if high < 100 and middle <= 12 and last <= 31:
-            return GpsDate(high, middle, last)
-        case Code.HEADING if payload <= 0xFFFF and -180 <= signed_pair(payload)[1] < 360:
-            return Heading(signed_pair(payload)[1])
-    return None

@@ -19,6 +19,7 @@ from itertools import pairwise
 from statistics import median
 from typing import Final
 
+from omnibot_driver.core.lois_ecu.codec import encode_command
 from omnibot_driver.core.lois_ecu.messages import (
     PERIOD_ONCE,
     Command,
@@ -28,7 +29,6 @@ from omnibot_driver.core.lois_ecu.messages import (
     Stream,
     TerminalMode,
     WriteSetting,
-    encode_command,
 )
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 

@@ -21,13 +21,12 @@ are preceded by RPM 0/0.
 
 from typing import Final
 
+from omnibot_driver.core.lois_ecu.codec import decode_command, encode_command
 from omnibot_driver.core.lois_ecu.lines import LENGTH, LENGTH_WITHOUT_SUM
 from omnibot_driver.core.lois_ecu.messages import (
     Command,
     SetDuty,
     SetRpm,
-    decode_command,
-    encode_command,
 )
 
 STOP: Final = SetDuty(0, 0)
