@@ -1,0 +1,44 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The MART motion controller in software, as its manual describes it or as its public server is.
+
+Shares no code with the driver: a misread manual must not cancel out. ``MartServer`` is pure:
+``receive(datagram, port, sender, now)``, ``advance(now)`` and ``copy()``. ``SimulatedMart`` is the
+same for ports, ``sim://`` and bad networks.
+"""
+
+from omnibot_driver.simulator.mart.board import CHANNELS, SimulatedMart
+from omnibot_driver.simulator.mart.motion import Kind
+from omnibot_driver.simulator.mart.options import add_options, from_arguments
+from omnibot_driver.simulator.mart.server import COMMAND, STOP, MartServer, Reply
+from omnibot_driver.simulator.mart.settings import (
+    DOCUMENTED,
+    FIRMWARE,
+    QUIRKS,
+    SOURCE,
+    Firmware,
+    MartSettings,
+    Quirks,
+)
+
+TITLE = "MART motion controller"
+
+__all__ = [
+    "CHANNELS",
+    "COMMAND",
+    "DOCUMENTED",
+    "FIRMWARE",
+    "QUIRKS",
+    "SOURCE",
+    "STOP",
+    "TITLE",
+    "Firmware",
+    "Kind",
+    "MartServer",
+    "MartSettings",
+    "Quirks",
+    "Reply",
+    "SimulatedMart",
+    "add_options",
+    "from_arguments",
+]

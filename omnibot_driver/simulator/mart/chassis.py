@@ -1,0 +1,152 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The motor board, its two motors, and the robot that they move.
+
+Knows registers (0 full forward, 128 stop, 255 full backward), volts and metres. Must not know
+commands, nor why it moves.
+"""
+
+from math import cos, exp, inf, pi, sin
+
+from omnibot_driver.simulator.mart.settings import MartSettings
+
+STOP = 128
+STEP_S = 0.01
+RAMPS_PER_S = 40.0
+"""The board changes what it applies each 25 ms, by its acceleration."""
+STANDS_MPS = 0.003
+RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
+
+
+class Chassis:
+    """``right``, ``left``: registers. Speeds in m/s; the true pose in m and rad, unwrapped.
+
+    counts: of the right wheel since the last reset. way_m: driven in all, of either sign.
+    """
+
+    def __init__(self, settings: MartSettings) -> None:
+        self._settings = settings
+        self._alpha = 1.0 - exp(-STEP_S / settings.motor_lag_s)
+        self._per_count = settings.encoder_sign / settings.metres_per_count
+        self._track_m = settings.track_m
+        self._noise = (settings.seed * 2_654_435_761 + 12_345) & 0x7FFFFFFF
+        self.x_m = self.y_m = self.yaw_rad = self.way_m = 0.0
+        self.motor_status = settings.motor_status
+        self.silent = settings.motor_board_silent
+        self.stuck_left = settings.stuck in ("left", "both")
+        self.stuck_right = settings.stuck in ("right", "both")
+        self.volts = settings.volts
+        self.power_cycle()
+
+    def power_cycle(self) -> None:
+        """Of the motor board; the wheels stop."""
+        self.right = self.left = STOP
+        self._applied_right = self._applied_left = 0.0
+        self.right_mps = self.left_mps = 0.0
+        self.counts = 0.0
+        self.acceleration = 5
+        self.settle()
+
+    def settle(self) -> None:
+        """Take over volts and faults that were changed."""
+        settings = self._settings
+        speed = settings.speed_mps_per_unit * self.volts / settings.nominal_volts
+        half = settings.motor_inequality / 2
+        stopped_right = self.stuck_right or self.motor_status & RIGHT_FAULTS
+        stopped_left = self.stuck_left or self.motor_status & LEFT_FAULTS
+        self._gain_right = 0.0 if stopped_right else speed * (1 - half)
+        self._gain_left = 0.0 if stopped_left else speed * (1 + half)
+
+    def copy(self) -> "Chassis":
+        """An independent one."""
+        new = Chassis.__new__(Chassis)
+        new.__dict__.update(self.__dict__)
+        return new
+
+    def set(self, right: int, left: int) -> None:
+        """Write both registers; a board whose line is cut hears nothing."""
+        if not self.silent:
+            self.right, self.left = right & 0xFF, left & 0xFF
+
+    def accelerate(self, units: int) -> None:
+        """How fast it obeys from now on."""
+        if not self.silent:
+            self.acceleration = units
+
+    def reset_encoders(self) -> None:
+        """To zero."""
+        if not self.silent:
+            self.counts = 0.0
+
+    @property
+    def encoder(self) -> int:
+        """What the board tells; 0 where its line is cut."""
+        return 0 if self.silent else int(self.counts)
+
+    @property
+    def powered(self) -> bool:
+        """Whether the motors are told to turn."""
+        return self.right != STOP or self.left != STOP
+
+    @property
+    def moving(self) -> bool:
+        """Whether a wheel turns."""
+        return self.right_mps != 0.0 or self.left_mps != 0.0
+
+    @property
+    def rests(self) -> bool:
+        """Nothing changes as time passes."""
+        return not (self.powered or self.moving or self._applied_right or self._applied_left)
+
+    @property
+    def error_bits(self) -> int:
+        """What the board tells of its state."""
+        return self.motor_status | (64 if self.volts > 30 else 0) | (128 if self.volts < 16 else 0)
+
+    def step(self) -> float:
+        """Let 10 ms pass; the turn rate in deg/s, with the shaking of a robot that moves."""
+        slew = self.acceleration * RAMPS_PER_S * STEP_S
+        wanted = STOP - self.right
+        applied = self._applied_right
+        if applied != wanted:
+            applied = (
+                min(applied + slew, wanted) if applied < wanted else max(applied - slew, wanted)
+            )
+            self._applied_right = applied
+        right = self.right_mps + (applied * self._gain_right - self.right_mps) * self._alpha
+        if not applied and -STANDS_MPS < right < STANDS_MPS:
+            right = 0.0
+        wanted = STOP - self.left
+        applied = self._applied_left
+        if applied != wanted:
+            applied = (
+                min(applied + slew, wanted) if applied < wanted else max(applied - slew, wanted)
+            )
+            self._applied_left = applied
+        left = self.left_mps + (applied * self._gain_left - self.left_mps) * self._alpha
+        if not applied and -STANDS_MPS < left < STANDS_MPS:
+            left = 0.0
+        self.right_mps, self.left_mps = right, left
+        if right == 0.0 == left:
+            return 0.0
+        self.counts += right * STEP_S * self._per_count
+        rate = (right - left) / self._track_m
+        way = (right + left) / 2 * STEP_S
+        middle = self.yaw_rad + rate * STEP_S / 2
+        self.x_m += way * cos(middle)
+        self.y_m += way * sin(middle)
+        self.yaw_rad += rate * STEP_S
+        self.way_m += abs(way)
+        self._noise = noise = (self._noise * 1_103_515_245 + 12_345) & 0x7FFFFFFF
+        shaking = (noise / 0x40000000 - 1.0) * 1.7 * self._settings.gyro_noise_dps
+        return rate * (180 / pi) + shaking
+
+
+def sight_m(chassis: Chassis, front_m: float, rear_m: float, *, backward: bool) -> float:
+    """How far a sonar sees: to a wall across x in front of it or behind it."""
+    along = cos(chassis.yaw_rad + (pi if backward else 0.0))
+    if along > 0.3:
+        return (front_m - chassis.x_m) / along
+    if along < -0.3:
+        return (chassis.x_m + rear_m) / -along
+    return inf

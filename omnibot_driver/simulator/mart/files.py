@@ -1,0 +1,70 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The files that the server keeps of motions, and its log.
+
+Knows their form. Must not know when they are sent.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from omnibot_driver.simulator.mart.motion import Kind, Motion
+
+if TYPE_CHECKING:
+    from omnibot_driver.simulator.mart.server import MartServer
+
+ROWS = 2000
+SPINS = (Kind.SPIN, Kind.CONTROLLED_SPIN)
+_NAMES = {
+    Kind.LINEAR: "LinearMotionSensorData",
+    Kind.REFERENCE: "RefMotionData",
+    Kind.SPIN: "SpinSensorData",
+    Kind.CONTROLLED_SPIN: "MCSpinSensorData",
+    Kind.CONTROLLED_LINEAR: "TLinearMotionSensorData",
+    Kind.MEASURED_LINEAR: "MCLinearMotionSensorData",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class FileNote:
+    """Enough to write a file: its head, and how many samples it has. ``is_turn``: of a spin."""
+
+    name: str
+    is_turn: bool
+    head: tuple[str, ...]
+    rows: int
+    angle_deg: float
+    encoder: int
+
+    @property
+    def content(self) -> bytes:
+        """Its text in Latin-1: 0xb0 is the sign of a degree."""
+        lines = [*self.head, ""]
+        for row in range(self.rows):
+            part = (row + 1) / self.rows
+            rate = 100.0 * self.angle_deg / self.rows
+            lines.append(f"{10 * (row + 1)},,{rate:.4f},{int(self.encoder * part)}")
+        return ("\r\n".join(lines) + "\r\n").encode("latin-1")
+
+
+def note_of(server: "MartServer", motion: Motion) -> FileNote:
+    """The file of a motion that is over."""
+    head = (
+        server.date,
+        "Gyro Z bias (\u00b0/sec): 0.000",
+        f"Max speed: {motion.speed}",
+        f"Direction: {'backward' if motion.backward else 'forward'}",
+        f"Motion error: {motion.error}",
+        f"Voltage: {server.chassis.volts:f}",
+        f"Samples: {motion.sample_count}",
+        "",
+        "Timestamp (msec),Note,Raw Gyro Z (\u00b0/sec),Encoder count",
+    )
+    return FileNote(
+        f"{_NAMES[motion.kind]}{int(server.clock_s)}.csv",
+        motion.kind in SPINS,
+        head,
+        min(motion.sample_count, ROWS),
+        motion.angle_deg,
+        server.chassis.encoder,
+    )

@@ -1,0 +1,89 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the server remembers of a kind of motion; its texts, speeds and times.
+
+Values alone. Must not know what changes them.
+"""
+
+from enum import IntEnum
+
+SAMPLE_S = 0.01
+START_SAMPLES, STOP_SAMPLES, STILL_SAMPLES = 60, 75, 15
+SLOW_STOP_SAMPLES = 188
+FAST_REGISTER = 45
+"""A register below it is so fast that RM stops gently."""
+SETUP_S = 0.05
+BIAS_SAMPLE_S = 0.0105
+LOST_AT_START_S, LOST_S = 0.5, 1.5
+REAR_CLEARANCE_IN, FRONT_CLEARANCE_IN = 15, 19
+INCHES_PER_M = 1 / 0.0254
+
+MPU_LOST = "MPU6050 connection lost"
+CONFLICT = "fail conflicting action in progress"
+NOT_SUPPORTED = "fail command not supported"
+
+
+class Kind(IntEnum):
+    """Each has a state of its own on the server."""
+
+    LINEAR = 0
+    """F, B."""
+    REFERENCE = 1
+    """RM."""
+    SPIN = 2
+    """R, L."""
+    CONTROLLED_SPIN = 3
+    """MCR, MCL."""
+    CONTROLLED_LINEAR = 4
+    """TF, TB, PTF."""
+    MEASURED_LINEAR = 5
+    """MCF, MCB."""
+
+
+SPEEDS = {"NORMAL": 30, "FAST": 60, "SLOW": 20}
+STOP_OFFSET_DEG = {"NORMAL": 3.16, "SLOW": 0.7}
+SMALL_SPIN_DEG = 10
+TOP_SPEED_INPS = {"NORMAL": 0.64 * 12, "SLOW": 0.34 * 12}
+RAMPS_S = {"NORMAL": (0.3, 0.12), "SLOW": (0.2, 0.08)}
+"""Acceleration and deceleration, as calibrated."""
+
+
+class Motion:
+    """Of one kind; what it was like stays when it is over.
+
+    running: in progress, so that others are refused. posts: unread notices that it started or
+    stopped. error: of this motion. right, left: what the server believes of the registers.
+    encoder: as it was read last, of which the next sample knows. sampled_s: time of the last sample of the IMU, or -1. angle_deg: of spins and straight moves.
+    released: the stop port ended it.
+    """
+
+    def __init__(self, kind: Kind) -> None:
+        self.kind = kind
+        self.running = self.starting = self.stopping = self.watching = self.released = False
+        self.posts = 0
+        self.clearance_in = FRONT_CLEARANCE_IN
+        self.reported_in = 0.0
+        self.speed, self.word, self.backward = 0, "NORMAL", False
+        self.docking = self.no_clearance = False
+        self.target, self.limited, self.stop_after_s = 0, True, 0.0
+        self.begin(0.0)
+        self.starting = False
+
+    def begin(self, now: float) -> None:
+        """A new one: nothing has happened yet."""
+        self.error = ""
+        self.starting, self.stopping, self.watching, self.released = True, False, True, False
+        self.right = self.left = 128
+        self.samples = self.same = self.encoder = self.last_encoder = self.sample_count = 0
+        self.sampled_s = -1.0
+        self.started_s = self.moved_s = self.stopped_s = now
+        self.angle_deg = self.last_rate = self.angle_sum = self.last_angle = 0.0
+        self.correction = 0
+        self.first_sample = True
+        self.stop_samples = STOP_SAMPLES
+
+    def copy(self) -> "Motion":
+        """An independent one."""
+        new = Motion.__new__(Motion)
+        new.__dict__.update(self.__dict__)
+        return new

@@ -1,0 +1,114 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a user may choose about a simulated MART controller, besides its seed and its network.
+
+Knows words and their meaning. Must not know what runs the board.
+"""
+
+import argparse
+from collections.abc import Callable
+from math import inf, isnan
+from typing import get_args
+
+from omnibot_driver.simulator.mart.board import SimulatedMart
+from omnibot_driver.simulator.mart.settings import QUIRKS, Firmware, MartSettings, Stuck
+
+_DEFAULT = MartSettings()
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Let the parser know them all."""
+    parser.add_argument(
+        "--firmware",
+        choices=get_args(Firmware),
+        default="firmware",
+        help="whether it does what the manual says (documented), what the public server was seen to"
+        " do (firmware, the default), or that and what only its source says (source)",
+    )
+    for name, number, metavar, effect in _NUMBERS:
+        default = getattr(_DEFAULT, name)
+        shown = "never" if default == inf else f"{default:g}"
+        parser.add_argument(
+            f"--{_WORDS.get(name, name).replace('_', '-')}",
+            dest=name,
+            type=number,
+            default=default,
+            metavar=metavar,
+            help=f"{effect} (default {shown})",
+        )
+    parser.add_argument(
+        "--stuck",
+        choices=get_args(Stuck),
+        default=_DEFAULT.stuck,
+        help="motors that do not turn (default none)",
+    )
+    parser.add_argument(
+        "--encoder-inverted", action="store_true", help="the encoder counts down forward"
+    )
+    parser.add_argument(
+        "--motor-board-silent", action="store_true", help="the motor board does not answer or obey"
+    )
+    parser.add_argument(
+        "--reference-start-fails", action="store_true", help="RM is answered by fail, and moves"
+    )
+
+
+def from_arguments(arguments: argparse.Namespace) -> SimulatedMart:
+    """The board that was chosen."""
+    return SimulatedMart(
+        MartSettings(
+            quirks=QUIRKS[arguments.firmware],
+            seed=arguments.seed,
+            encoder_sign=-1 if arguments.encoder_inverted else 1,
+            motor_board_silent=arguments.motor_board_silent,
+            reference_start_fails=arguments.reference_start_fails,
+            stuck=arguments.stuck,
+            **{name: getattr(arguments, name) for name, *_ in _NUMBERS},
+        )
+    )
+
+
+def _within(low: float, high: float) -> Callable[[str], float]:
+    def number(text: str) -> float:
+        value = float(text)
+        if isnan(value) or not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a number from {low:g} to {high:g}")
+        return value
+
+    return number
+
+
+def _bits(text: str) -> int:
+    value = int(text, 0)
+    if not 0 <= value <= 255:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number from 0 to 255")
+    return value
+
+
+_WORDS = {
+    "speed_mps_per_unit": "speed_per_unit",
+    "metres_per_count": "metres_per_count",
+    "track_m": "track",
+    "gyro_bias_dps": "gyro_bias",
+    "gyro_noise_dps": "gyro_noise",
+    "imu_dies_s": "imu_dies",
+    "imu_returns_s": "imu_returns",
+    "front_m": "front",
+    "rear_m": "rear",
+    "dock_m": "dock",
+}
+_NUMBERS: tuple[tuple[str, Callable[[str], float], str, str], ...] = (
+    ("speed_mps_per_unit", _within(0.0001, 1.0), "M/S", "of a speed unit, at 24 V"),
+    ("metres_per_count", _within(1e-6, 1.0), "M", "of an encoder count"),
+    ("track_m", _within(0.01, 10.0), "M", "between the wheels"),
+    ("volts", _within(0.0, 40.0), "V", "of the battery; the speed grows with them"),
+    ("motor_inequality", _within(-1.0, 1.0), "PART", "how much faster the left motor is"),
+    ("gyro_bias_dps", _within(-50.0, 50.0), "DEG/S", "that the server finds with SB"),
+    ("gyro_noise_dps", _within(0.0, 50.0), "DEG/S", "of a sample while the robot moves"),
+    ("imu_dies_s", _within(0.0, inf), "SECONDS", "when the IMU dies"),
+    ("imu_returns_s", _within(0.0, inf), "SECONDS", "when it lives again"),
+    ("front_m", _within(0.0, inf), "M", "from the start to a wall in front"),
+    ("rear_m", _within(0.0, inf), "M", "from the start to a wall behind"),
+    ("dock_m", _within(0.0, inf), "M", "from the start to the dock in front"),
+    ("motor_status", _bits, "BITS", "of MCSTAT; 4, 8: tripped, 16, 32: short"),
+)

@@ -1,0 +1,380 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The server: two ports, a thread for each, a timer while something moves, and the time.
+
+Pure: datagrams and times in, replies out; the same settings and input give the same output. It
+goes from event to event, so a robot that stands costs nothing. Must not know sockets or real time,
+nor which commands there are.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from math import inf
+from typing import Any, NamedTuple
+
+from omnibot_driver.simulator.mart import alarms, commands, stop_port, wire
+from omnibot_driver.simulator.mart.chassis import STEP_S, Chassis, sight_m
+from omnibot_driver.simulator.mart.files import FileNote
+from omnibot_driver.simulator.mart.imu import Imu
+from omnibot_driver.simulator.mart.motion import INCHES_PER_M, Kind, Motion
+from omnibot_driver.simulator.mart.settings import MartSettings
+
+COMMAND, STOP = 0, 1
+"""The ports, by their place."""
+QUEUE_LENGTH, REMEMBERED, LOG_LINES = 256, 10_000, 10_000
+SONAR_SETTLES_S = 0.165
+"""Three readings confirm that something is near."""
+FARTHEST_IN = 254
+QUICK_S = 0.0005
+
+Sender = object
+Then = Callable[..., None]
+
+
+class Reply(NamedTuple):
+    """A datagram that leaves a port at this time, and for whom."""
+
+    at_s: float
+    port: int
+    sender: Sender
+    data: bytes
+
+
+class _Later(NamedTuple):
+    at_s: float
+    then: Then
+    args: tuple[Any, ...]
+
+
+class _Waiter(NamedTuple):
+    port: int
+    kind: Kind
+    then: Then | None
+    args: tuple[Any, ...]
+
+
+class MartServer:
+    """The controller with its robot. ``now_s``: simulated time, since construction.
+
+    crashed: why the server is not there any more; empty while it runs. hung: the command port will
+    not answer again, whatever happens. stop_port_hung: the stop port hears nothing any more.
+    blocked: the command port waits for samples of the IMU. received: all that came to either port,
+    with its time. motions: what the server knows of each kind. executed: commands begun, in order.
+    """
+
+    def __init__(self, settings: MartSettings | None = None) -> None:
+        self.settings = settings = MartSettings() if settings is None else settings
+        self.quirks = settings.quirks
+        self.now_s = 0.0
+        self.chassis = Chassis(settings)
+        self.imu = Imu(settings)
+        self.front_m, self.rear_m, self.dock_m = settings.front_m, settings.rear_m, settings.dock_m
+        self.clock_offset_s = float(settings.clock_s)
+        self.hit_wall = False
+        self.received: deque[tuple[float, int, bytes]] = deque(maxlen=REMEMBERED)
+        self.executed: deque[str] = deque(maxlen=REMEMBERED)
+        self._out: list[Reply] = []
+        self._step_at_s = inf
+        self._boots_until_s = -inf
+        self.files: dict[str, FileNote] = {}
+        self._begin()
+
+    def _begin(self) -> None:
+        self.crashed = ""
+        self.motions = [Motion(kind) for kind in Kind]
+        self.alarm: Kind | None = None
+        self.starting: Kind | None = None
+        self.manual = self.recording = False
+        self.custom: dict[str, tuple[int, int]] = {}
+        self.last_reply = ""
+        self.last_files: dict[str, str] = {}
+        self.log: list[str] | None = None
+        self.log_name = ""
+        self.sampling_since_s = -1.0
+        self._busy = False
+        self._sender: Sender = None
+        self._later: _Later | None = None
+        self._waiters: list[_Waiter] = []
+        self._queue: deque[tuple[bytes, Sender]] = deque()
+        self._stop_queue: deque[bytes] = deque()
+
+    # From outside
+
+    def receive(self, datagram: bytes, port: int, sender: Sender, now: float) -> None:
+        """A datagram arrives now, in seconds since construction, not before the last."""
+        self._run(now)
+        self.received.append((now, port, datagram))
+        if self.crashed or now < self._boots_until_s:
+            return
+        if not datagram:
+            if self.quirks.empty_datagram_ends and port == COMMAND:
+                self.end("an empty datagram")
+            return
+        if port == STOP:
+            if len(self._stop_queue) < QUEUE_LENGTH:
+                self._stop_queue.append(datagram)
+            self._hear_stops()
+        elif len(self._queue) < QUEUE_LENGTH:
+            self._queue.append((datagram, sender))
+            self._next()
+
+    def advance(self, now: float) -> list[Reply]:
+        """Let time pass up to this; the replies that leave meanwhile, and have not been fetched."""
+        self._run(now)
+        out, self._out = self._out, []
+        return out
+
+    @property
+    def wake_at(self) -> float:
+        """When something happens next, if no datagram comes; infinite if nothing will."""
+        if self._out:
+            return self.now_s
+        return min(self._step_at_s, inf if self._later is None else self._later.at_s)
+
+    def copy(self) -> "MartServer":
+        """An independent one, that goes on from here; cheaper than a deep copy."""
+        new = MartServer.__new__(MartServer)
+        new.__dict__.update(self.__dict__)
+        new.chassis, new.imu = self.chassis.copy(), self.imu.copy()
+        new.motions = [motion.copy() for motion in self.motions]
+        new.received, new.executed = self.received.copy(), self.executed.copy()
+        new.files, new.last_files = {**self.files}, {**self.last_files}
+        new.custom = {**self.custom}
+        new.log = None if self.log is None else [*self.log]
+        new._out, new._waiters = [*self._out], [*self._waiters]
+        new._queue, new._stop_queue = self._queue.copy(), self._stop_queue.copy()
+        return new
+
+    def restart(self, boot_s: float = 0.0) -> None:
+        """Start the server again; the motors keep what they were told last."""
+        self._begin()
+        self.imu.restart()
+        self._boots_until_s = self.now_s + boot_s
+
+    def power_cycle(self, boot_s: float = 1.0) -> None:
+        """Of controller and motor board; the robot stays where it is."""
+        self.chassis.power_cycle()
+        self.restart(boot_s)
+
+    @property
+    def hung(self) -> bool:
+        """Whether the command port is silent for good, although the server runs."""
+        return any(
+            waiter.port == COMMAND and waiter.kind is not self.alarm for waiter in self._waiters
+        )
+
+    @property
+    def stop_port_hung(self) -> bool:
+        """The same of the stop port."""
+        return any(
+            waiter.port == STOP and waiter.kind is not self.alarm for waiter in self._waiters
+        )
+
+    @property
+    def blocked(self) -> bool:
+        """Whether the command port answers only when the IMU lives again."""
+        waits = bool(self._waiters) or self.starting is not None
+        return self._busy and waits and not self.imu.living(self.now_s)
+
+    @property
+    def busy(self) -> bool:
+        """Whether a command is being executed."""
+        return self._busy
+
+    @property
+    def moving(self) -> bool:
+        """Whether the robot truly moves, or its motors are told to."""
+        return self.chassis.moving or self.chassis.powered
+
+    @property
+    def motion(self) -> Kind | None:
+        """The motion that is in progress as the server sees it."""
+        return next((each.kind for each in self.motions if each.running), self.starting)
+
+    # For commands and motions
+
+    @property
+    def clock_s(self) -> float:
+        """Of the wall, in Unix time."""
+        return self.now_s + self.clock_offset_s
+
+    @property
+    def date(self) -> str:
+        """The same, as files begin."""
+        return time.strftime("%m/%d/%Y  %H:%M:%S", time.gmtime(self.clock_s))
+
+    @property
+    def docked(self) -> bool:
+        """Whether the robot stands at its dock."""
+        return self.chassis.x_m >= self.dock_m
+
+    @property
+    def conflict(self) -> bool:
+        """Whether something is in progress that refuses other motions."""
+        return self.manual or self.recording or any(each.running for each in self.motions)
+
+    def drive(self, right: int, left: int) -> None:
+        """Write the motors' registers."""
+        self.chassis.set(right, left)
+        self._wake()
+
+    def watch(self, kind: Kind) -> None:
+        """Begin to watch a motion; where one is being watched, the new one is not."""
+        if self.alarm is None:
+            self.alarm = kind
+        self._wake()
+
+    def later(self, seconds: float, then: Then, *args: Any) -> None:
+        """Go on with the command then."""
+        self._later = _Later(self.now_s + seconds, then, args)
+
+    def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
+        """Go on with the next notice of this kind of motion."""
+        motion = self.motions[kind]
+        if motion.posts:
+            motion.posts -= 1
+            if then is not None:
+                then(self, *args)
+        else:
+            self._waiters.append(_Waiter(port, kind, then, args))
+
+    def post(self, kind: Kind) -> None:
+        """Notify who waits for this kind of motion, or will."""
+        for waiter in self._waiters:
+            if waiter.kind is kind:
+                self._waiters.remove(waiter)
+                if waiter.then is not None:
+                    waiter.then(self, *waiter.args)
+                if waiter.port == STOP:
+                    self._hear_stops()
+                return
+        self.motions[kind].posts += 1
+
+    def answer(self, text: str) -> None:
+        """The reply to the command that is being executed."""
+        self.last_reply = text
+        self.send(wire.reply(text))
+        self.done()
+
+    def send(self, data: bytes) -> None:
+        """A datagram to the sender of the command."""
+        if self.log is not None and len(self.log) < LOG_LINES:
+            self.log.append(f"{self.date} {data[:49].decode('latin-1')}")
+        self._out.append(Reply(self.now_s, COMMAND, self._sender, data))
+
+    def done(self) -> None:
+        """The command is over."""
+        self._busy = False
+        self._next()
+
+    def abort(self, text: str) -> None:
+        """Give up the motion that is being started."""
+        kind, self.starting = self.starting, None
+        self._later = None
+        self._waiters = [waiter for waiter in self._waiters if waiter.port != COMMAND]
+        self.alarm = None
+        if kind is not None:
+            alarms.stop_motors(self, self.motions[kind])
+            self.motions[kind].running = self.motions[kind].watching = False
+        self.answer(text)
+
+    def end(self, why: str) -> None:
+        """The server is not there any more. Nothing stops the motors."""
+        self.crashed = why
+        self.alarm = self.starting = self._later = None
+        self._busy = False
+        self._waiters.clear()
+        self._queue.clear()
+        self._stop_queue.clear()
+
+    def save(self, note: FileNote) -> None:
+        """Keep a file, as the last of its kind."""
+        self.files[note.name] = note
+        self.last_files["TURN" if note.is_turn else "MOVE"] = note.name
+
+    def sonar_in(self, *, backward: bool) -> int:
+        """What a sonar tells, in inches; -1 where it sees nothing."""
+        seen_m = sight_m(self.chassis, self.front_m, self.rear_m, backward=backward)
+        inches = seen_m * INCHES_PER_M
+        return int(inches) if 1.0 <= inches < FARTHEST_IN + 1 else -1
+
+    def clearance_in(self, *, backward: bool) -> int:
+        """What the sonar that is sampled in a motion told last."""
+        since_s = self.sampling_since_s
+        if since_s < 0.0 or self.now_s - since_s < SONAR_SETTLES_S:
+            return -1
+        return self.sonar_in(backward=backward)
+
+    @property
+    def heading_integrates(self) -> bool:
+        """Whether turning changes the relative heading now."""
+        return self.alarm is Kind.REFERENCE or not self.quirks.heading_in_reference_moves_only
+
+    def begin_heading(self) -> None:
+        """The first sample of RM."""
+        if self.quirks.heading_starts_off:
+            self.imu.heading_deg += self.imu.rate_dps / 2 * self.now_s
+
+    def heading_deg(self) -> float:
+        """The relative heading, as RMRA tells it."""
+        if self._step_at_s == inf:
+            self.imu.drift(self.now_s, integrates=self.heading_integrates)
+        return self.imu.heading_deg
+
+    # Time
+
+    def _wake(self) -> None:
+        if self._step_at_s == inf:
+            self.imu.drift(self.now_s, integrates=self.heading_integrates)
+            self._step_at_s = self.now_s + STEP_S
+
+    def _run(self, now: float) -> None:
+        while True:
+            later, step_s = self._later, self._step_at_s
+            if later is not None and later.at_s < step_s:
+                if later.at_s > now:
+                    break
+                self.now_s = max(self.now_s, later.at_s)
+                self._later = None
+                later.then(self, *later.args)
+            elif step_s <= now:
+                self.now_s = step_s
+                self._step()
+            else:
+                break
+        self.now_s = max(self.now_s, now)
+
+    def _step(self) -> None:
+        chassis, now = self.chassis, self.now_s
+        rate_dps = chassis.step()
+        if self.imu.living(now):
+            self.imu.sample(rate_dps, now, integrates=self.heading_integrates)
+        else:
+            self.imu.drift(now, integrates=False)
+        if not -self.rear_m < chassis.x_m < self.front_m:
+            self.hit_wall = True
+        if self.alarm is not None:
+            alarms.sample(self, self.motions[self.alarm])
+        if self.alarm is None and chassis.rests:
+            self._step_at_s = inf
+        else:
+            self._step_at_s += STEP_S
+
+    # The two threads
+
+    def _next(self) -> None:
+        while self._queue and not self._busy and not self.crashed:
+            datagram, self._sender = self._queue.popleft()
+            text = wire.text_of(datagram)
+            self._busy = True
+            self.executed.append(text)
+            if self.log is not None and len(self.log) < LOG_LINES:
+                self.log.append(f"{self.date} {text}")
+            answer = commands.execute(self, text)
+            if answer is not None:
+                self.later(QUICK_S, MartServer.answer, answer)
+
+    def _hear_stops(self) -> None:
+        while self._stop_queue and not any(waiter.port == STOP for waiter in self._waiters):
+            stop_port.obey(self, wire.text_of(self._stop_queue.popleft()))

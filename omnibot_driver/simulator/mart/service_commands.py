@@ -1,0 +1,244 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The commands that start no motion: questions, clock, log, files, and the motors by hand.
+
+Knows what they answer and when. Must not know how they are told apart.
+"""
+
+import calendar
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from omnibot_driver.simulator.mart import moves, wire
+from omnibot_driver.simulator.mart.motion import NOT_SUPPORTED
+
+if TYPE_CHECKING:
+    from omnibot_driver.simulator.mart.server import MartServer
+
+BOARD_S, BOARD_SILENT_S = 0.005, 0.2
+SONAR_S = 0.055
+RESET_S, RESET_FAILS_S = 0.11, 0.13
+BIAS_SAMPLES = 50
+NO_READ = 255
+
+Handler = Callable[["MartServer", str], str | None]
+
+
+def missing(server: "MartServer", what: str) -> str | None:
+    """A number is missing that the server reads all the same."""
+    if not server.quirks.crashes_on_missing_numbers:
+        return "fail improper command format"
+    server.end(what)
+    return None
+
+
+def fine(server: "MartServer", text: str) -> str | None:
+    """Nothing of it is played."""
+    return "ok"
+
+
+def bare_fail(server: "MartServer", text: str) -> str | None:
+    """There are no calibration files."""
+    return "fail"
+
+
+def hello(server: "MartServer", text: str) -> str | None:
+    """Who it is."""
+    return "ok BBB"
+
+
+def volts(server: "MartServer", text: str) -> str | None:
+    """Of the battery."""
+    return f"ok {server.chassis.volts:.2f}"
+
+
+def docked(server: "MartServer", text: str) -> str | None:
+    """Whether the switch is pressed."""
+    return "ok true" if server.docked else "ok false"
+
+
+def heading(server: "MartServer", text: str) -> str | None:
+    """RMRA."""
+    return wire.degrees(server.heading_deg())
+
+
+def last_measured(server: "MartServer", text: str) -> str | None:
+    """MCD, MD."""
+    return "ok 0"
+
+
+def _ask_board(server: "MartServer", then: Callable[["MartServer"], None]) -> None:
+    server.later(BOARD_SILENT_S if server.chassis.silent else BOARD_S, then)
+
+
+def encoder(server: "MartServer", text: str) -> str | None:
+    """ENC."""
+    _ask_board(server, _tell_encoder)
+    return None
+
+
+def _tell_encoder(server: "MartServer") -> None:
+    server.answer("fail" if server.chassis.silent else f"ok {server.chassis.encoder}")
+
+
+def motor_status(server: "MartServer", text: str) -> str | None:
+    """MCSTAT."""
+    _ask_board(server, _tell_status)
+    return None
+
+
+def _tell_status(server: "MartServer") -> None:
+    chassis = server.chassis
+    server.answer(f"ok {NO_READ if chassis.silent else chassis.error_bits}")
+
+
+def sonar(*, backward: bool) -> Handler:
+    """SFC, SRC."""
+
+    def handle(server: "MartServer", text: str) -> str | None:
+        server.later(SONAR_S, _tell_rear if backward else _tell_front)
+        return None
+
+    return handle
+
+
+def _tell_front(server: "MartServer") -> None:
+    server.answer(f"ok {server.sonar_in(backward=False)}")
+
+
+def _tell_rear(server: "MartServer") -> None:
+    server.answer(f"ok {server.sonar_in(backward=True)}")
+
+
+def record_sonar(server: "MartServer", text: str) -> str | None:
+    """SFR, SRR minutes; no file is played."""
+    return "ok" if wire.fields(text) else missing(server, f"{text} without a number")
+
+
+def take_bias(server: "MartServer", text: str) -> str | None:
+    """SB; opens an IMU that was given up, if it lives."""
+    imu = server.imu
+    if imu.closed and not imu.plugged(server.now_s):
+        server.later(RESET_FAILS_S, _fail)
+        return None
+    imu.closed = False
+    server.later(BOARD_S, moves.take_bias, None, BIAS_SAMPLES, 0)
+    return None
+
+
+def _fail(server: "MartServer") -> None:
+    server.answer("fail")
+
+
+def reset(server: "MartServer", text: str) -> str | None:
+    """RST IMU, RST MC."""
+    if text == "RST IMU":
+        plugged = server.imu.plugged(server.now_s)
+        server.imu.closed = True
+        server.later(RESET_S if plugged else RESET_FAILS_S, _reset_imu)
+        return None
+    if text == "RST MC":
+        _ask_board(server, _reset_board)
+        return None
+    return server.last_reply if server.quirks.unknown_reset_repeats else NOT_SUPPORTED
+
+
+def _reset_imu(server: "MartServer") -> None:
+    server.imu.closed = not server.imu.plugged(server.now_s)
+    server.answer("fail could not init" if server.imu.closed else "ok")
+
+
+def _reset_board(server: "MartServer") -> None:
+    chassis = server.chassis
+    wrong = chassis.silent or chassis.error_bits
+    server.answer("fail error condition" if wrong else "ok")
+
+
+def set_time(server: "MartServer", text: str) -> str | None:
+    """TIME m d yyyy h mi s in UTC; the seconds are ignored."""
+    numbers = [wire.integer(word) for word in text.split(" ")[1:] if word]
+    if len(numbers) < 6:
+        return missing(server, "TIME with fewer than six numbers")
+    month, day, year, hour, minute, _ = numbers[:6]
+    before_s = server.clock_s
+    if 1 <= month <= 12 and 1 <= day <= 31 and 1970 <= year <= 9999:
+        wanted_s = calendar.timegm((year, month, day, hour, minute, 0))
+        server.clock_offset_s += wanted_s - before_s
+    if server.alarm is not None and server.quirks.clock_moves_heading:
+        jump_s = server.clock_s - before_s
+        server.imu.heading_deg += server.imu.rate_dps * jump_s
+        server.motions[server.alarm].angle_deg += server.imu.rate_dps * jump_s
+    return "ok"
+
+
+def open_log(server: "MartServer", text: str) -> str | None:
+    """LOG; what is open stays open."""
+    if server.log is None:
+        if server.quirks.log_deletes_files:
+            server.files.clear()
+        server.log_name = f"MotionController{int(server.clock_s)}.log"
+        server.log = [f"{server.date} Motion controller log file opened"]
+    return "ok"
+
+
+def last_file(which: str) -> Handler:
+    """LAST MOVE, LAST TURN."""
+
+    def handle(server: "MartServer", text: str) -> str | None:
+        name = server.last_files.get(which)
+        if name is None:
+            return "fail no file available"
+        note = server.files.get(name)
+        if note is None:
+            return "fail"
+        for block in wire.blocks(name, note.content):
+            server.send(block)
+        server.done()
+        return None
+
+    return handle
+
+
+def leave(server: "MartServer", text: str) -> str | None:
+    """EXIT."""
+    if server.log is not None:
+        content = (
+            "\n".join([*server.log, f"{server.date} UDP server shutting down"]) + "\n"
+        ).encode("latin-1")
+        server.log = None
+        for block in wire.blocks(server.log_name, content):
+            server.send(block)
+    elif not server.quirks.exit_is_silent:
+        server.send(wire.reply("ok"))
+    server.end("EXIT")
+    return None
+
+
+def start_record(server: "MartServer", text: str) -> str | None:
+    """REC START; no file is played."""
+    server.recording = True
+    return "ok"
+
+
+def stop_record(server: "MartServer", text: str) -> str | None:
+    """REC STOP."""
+    server.recording = False
+    return "ok"
+
+
+def set_motors(server: "MartServer", text: str) -> str | None:
+    """MCS right left: the registers themselves, once."""
+    numbers = wire.fields(text)
+    if len(numbers) < 2:
+        return missing(server, "MCS with one number")
+    server.manual = True
+    server.drive(wire.integer(numbers[0]), wire.integer(numbers[1]))
+    return "ok"
+
+
+def stop_motors(server: "MartServer", text: str) -> str | None:
+    """MSM: ends MCS."""
+    if server.manual:
+        server.manual = False
+        server.drive(128, 128)
+    return "ok"

@@ -1,0 +1,80 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The second port: stops that are heard while the first one is busy, and are not answered.
+
+Knows its three commands. Must not know those of the first port.
+"""
+
+from typing import TYPE_CHECKING
+
+from omnibot_driver.simulator.mart import wire
+from omnibot_driver.simulator.mart.alarms import stop_motors
+from omnibot_driver.simulator.mart.motion import Kind, Motion
+
+if TYPE_CHECKING:
+    from omnibot_driver.simulator.mart.server import MartServer
+
+STOP = 1
+DRIVES = (Kind.LINEAR, Kind.MEASURED_LINEAR, Kind.CONTROLLED_LINEAR, Kind.REFERENCE)
+SPINS = (Kind.SPIN, Kind.CONTROLLED_SPIN)
+
+
+def obey(server: "MartServer", text: str) -> None:
+    """One stop."""
+    quirks = server.quirks
+    if text == "SL":
+        _stop_first(server, DRIVES)
+    elif text == "SS":
+        drives = (Kind.LINEAR, Kind.REFERENCE) if quirks.spin_stop_ends_drives else ()
+        _stop_first(server, (*SPINS, *drives))
+    elif text.startswith("SDR"):
+        _limit(server, text)
+
+
+def end_motion(server: "MartServer", port: int, motion: Motion) -> bool:
+    """Stop an uncontrolled motion; whether a notice will tell that it stands."""
+    if motion.kind is Kind.SPIN:
+        if motion.stopping:
+            return False
+    elif motion.stopping:
+        return True
+    elif not motion.watching:
+        motion.posts = max(0, motion.posts - 1)
+        return False
+    motion.posts = max(0, motion.posts - 1)
+    stop_motors(server, motion)
+    return True
+
+
+def _stop_first(server: "MartServer", kinds: tuple[Kind, ...]) -> None:
+    quirks = server.quirks
+    if not quirks.early_stop_is_ignored and server.starting in kinds:
+        controlled = server.starting in (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR)
+        server.abort("ok 0" if controlled else "fail stopped")
+        return
+    motion = next((server.motions[kind] for kind in kinds if server.motions[kind].running), None)
+    if motion is None:
+        return
+    kind = motion.kind
+    if kind in (Kind.CONTROLLED_LINEAR, Kind.CONTROLLED_SPIN, Kind.MEASURED_LINEAR):
+        if not motion.stopping:
+            stop_motors(server, motion)
+    elif quirks.stop_port_keeps_motion or kind is Kind.SPIN:
+        if end_motion(server, STOP, motion):
+            server.wait(STOP, kind, None)
+    elif not motion.stopping and motion.watching:
+        motion.released = True
+        stop_motors(server, motion)
+
+
+def _limit(server: "MartServer", text: str) -> None:
+    """A move without an end gets one, counted from where it began to move."""
+    motion = next(
+        (each for each in server.motions if each.running and each.kind in DRIVES[1:3]), None
+    )
+    behind = wire.fields(text)
+    if motion is None or motion.limited or not behind:
+        return
+    from omnibot_driver.simulator.mart.moves import limit
+
+    limit(motion, wire.integer(behind[0]))

@@ -1,0 +1,97 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Somebody who talks to a simulated MART controller by hand-typed datagrams, in simulated time."""
+
+from math import inf
+
+from omnibot_driver.simulator.mart import (
+    COMMAND,
+    FIRMWARE,
+    STOP,
+    Kind,
+    MartServer,
+    MartSettings,
+    Quirks,
+)
+
+INCH_M = 0.0254
+
+
+class Rig:
+    """``replies``: all that came, with the time."""
+
+    def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:
+        self.server = MartServer(MartSettings(quirks=quirks, **settings))  # type: ignore[arg-type]
+        self.replies: list[tuple[float, bytes]] = []
+        self.took_s = inf
+
+    @property
+    def now(self) -> float:
+        """Simulated."""
+        return self.server.now_s
+
+    def say(self, *texts: str) -> None:
+        """To the command port, without waiting."""
+        for text in texts:
+            self.server.receive(text.encode("latin-1"), COMMAND, "us", self.now)
+
+    def stop(self, text: str) -> None:
+        """To the stop port."""
+        self.server.receive(text.encode("latin-1"), STOP, "us", self.now)
+
+    def run(self, seconds: float) -> list[str]:
+        """What came meanwhile."""
+        found = self.server.advance(self.now + seconds)
+        self.replies += [(reply.at_s, reply.data) for reply in found]
+        return [reply.data.decode("latin-1") for reply in found]
+
+    def wait(self, limit_s: float = 20.0) -> str | None:
+        """The next reply; ``took_s`` is how long it took. None: there was none."""
+        began_s, until_s = self.now, self.now + limit_s
+        while self.now < until_s:
+            found = self.run(max(0.0, min(self.server.wake_at, until_s) - self.now))
+            if found:
+                self.took_s = self.now - began_s
+                assert len(found) == 1, found
+                return found[0]
+            if self.server.wake_at == inf:
+                self.run(until_s - self.now)
+        return None
+
+    def ask(self, text: str, limit_s: float = 20.0) -> str | None:
+        """One command and its reply."""
+        self.say(text)
+        return self.wait(limit_s)
+
+    def number(self, text: str) -> float:
+        """One question and the number in its answer."""
+        answer = self.ask(text)
+        assert answer is not None
+        ok, number = answer.split()
+        assert ok == "ok"
+        return float(number)
+
+    def drive(self, text: str, seconds: float = 1.0) -> None:
+        """Start an uncontrolled motion, and let it drive."""
+        assert self.ask(text) == "ok"
+        self.run(seconds)
+
+    @property
+    def x_in(self) -> float:
+        """The true way forward in inches."""
+        return self.server.chassis.x_m / INCH_M
+
+    @property
+    def yaw_deg(self) -> float:
+        """The true heading."""
+        return self.server.chassis.yaw_rad * 57.29577951308232
+
+    @property
+    def moving(self) -> bool:
+        """Whether the robot truly moves."""
+        return self.server.chassis.moving
+
+    @property
+    def in_progress(self) -> Kind | None:
+        """As the server believes."""
+        return self.server.motion
