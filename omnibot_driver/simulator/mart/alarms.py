@@ -48,8 +48,8 @@ def sample(server: "MartServer", motion: Motion) -> None:
     if not server.imu.living(now):
         _miss(server, motion)
         return
-    if motion.sampled_s < 0.0 and kind is Kind.REFERENCE:
-        server.begin_heading()
+    if kind is Kind.REFERENCE:
+        server.sample_reference(first=motion.sampled_s < 0.0)
     motion.sampled_s = now
     if kind is Kind.LINEAR or kind is Kind.REFERENCE:
         _watch_clearance(server, motion)

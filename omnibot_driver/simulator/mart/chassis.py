@@ -8,20 +8,21 @@ commands, nor why it moves.
 
 from math import cos, exp, inf, pi, sin
 
-from omnibot_driver.simulator.mart.settings import MartSettings
+from omnibot_driver.simulator.mart.settings import MartSettings, Stuck
 
 STOP = 128
 STEP_S = 0.01
 RAMPS_PER_S = 40.0
 """The board changes what it applies each 25 ms, by its acceleration."""
-STANDS_MPS = 0.003
+STANDS_MPS = 0.008
 RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
 
 
 class Chassis:
     """``right``, ``left``: registers. Speeds in m/s; the true pose in m and rad, unwrapped.
 
-    counts: of the right wheel since the last reset. way_m: driven in all, of either sign.
+    counts: of the right wheel since the last reset. way_m: driven in all, of either sign. To change
+    volts, stuck, motor_status or silent: ``change``.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -29,12 +30,12 @@ class Chassis:
         self._alpha = 1.0 - exp(-STEP_S / settings.motor_lag_s)
         self._per_count = settings.encoder_sign / settings.metres_per_count
         self._track_m = settings.track_m
+        self._dead_units = settings.dead_zone_units
         self._noise = (settings.seed * 2_654_435_761 + 12_345) & 0x7FFFFFFF
         self.x_m = self.y_m = self.yaw_rad = self.way_m = 0.0
         self.motor_status = settings.motor_status
         self.silent = settings.motor_board_silent
-        self.stuck_left = settings.stuck in ("left", "both")
-        self.stuck_right = settings.stuck in ("right", "both")
+        self.stuck: Stuck = settings.stuck
         self.volts = settings.volts
         self.power_cycle()
 
@@ -45,15 +46,29 @@ class Chassis:
         self.right_mps = self.left_mps = 0.0
         self.counts = 0.0
         self.acceleration = 5
-        self.settle()
+        self._settle()
 
-    def settle(self) -> None:
-        """Take over volts and faults that were changed."""
+    def change(
+        self,
+        *,
+        volts: float | None = None,
+        stuck: Stuck | None = None,
+        motor_status: int | None = None,
+        silent: bool | None = None,
+    ) -> None:
+        """Something happens to it."""
+        self.volts = self.volts if volts is None else volts
+        self.stuck = self.stuck if stuck is None else stuck
+        self.motor_status = self.motor_status if motor_status is None else motor_status
+        self.silent = self.silent if silent is None else silent
+        self._settle()
+
+    def _settle(self) -> None:
         settings = self._settings
         speed = settings.speed_mps_per_unit * self.volts / settings.nominal_volts
         half = settings.motor_inequality / 2
-        stopped_right = self.stuck_right or self.motor_status & RIGHT_FAULTS
-        stopped_left = self.stuck_left or self.motor_status & LEFT_FAULTS
+        stopped_right = self.stuck in ("right", "both") or self.motor_status & RIGHT_FAULTS
+        stopped_left = self.stuck in ("left", "both") or self.motor_status & LEFT_FAULTS
         self._gain_right = 0.0 if stopped_right else speed * (1 - half)
         self._gain_left = 0.0 if stopped_left else speed * (1 + half)
 
@@ -103,29 +118,30 @@ class Chassis:
         """What the board tells of its state."""
         return self.motor_status | (64 if self.volts > 30 else 0) | (128 if self.volts < 16 else 0)
 
+    def _turn(
+        self, wanted: int, applied: float, speed_mps: float, gain: float
+    ) -> tuple[float, float]:
+        """What is applied to a motor 10 ms later, and its speed."""
+        if applied != wanted:
+            slew = self.acceleration * RAMPS_PER_S * STEP_S
+            if applied < wanted:
+                applied = min(applied + slew, wanted)
+            else:
+                applied = max(applied - slew, wanted)
+        aim_mps = 0.0 if -self._dead_units < applied < self._dead_units else applied * gain
+        speed_mps += (aim_mps - speed_mps) * self._alpha
+        if not aim_mps and -STANDS_MPS < speed_mps < STANDS_MPS:
+            speed_mps = 0.0
+        return applied, speed_mps
+
     def step(self) -> float:
         """Let 10 ms pass; the turn rate in deg/s, with the shaking of a robot that moves."""
-        slew = self.acceleration * RAMPS_PER_S * STEP_S
-        wanted = STOP - self.right
-        applied = self._applied_right
-        if applied != wanted:
-            applied = (
-                min(applied + slew, wanted) if applied < wanted else max(applied - slew, wanted)
-            )
-            self._applied_right = applied
-        right = self.right_mps + (applied * self._gain_right - self.right_mps) * self._alpha
-        if not applied and -STANDS_MPS < right < STANDS_MPS:
-            right = 0.0
-        wanted = STOP - self.left
-        applied = self._applied_left
-        if applied != wanted:
-            applied = (
-                min(applied + slew, wanted) if applied < wanted else max(applied - slew, wanted)
-            )
-            self._applied_left = applied
-        left = self.left_mps + (applied * self._gain_left - self.left_mps) * self._alpha
-        if not applied and -STANDS_MPS < left < STANDS_MPS:
-            left = 0.0
+        self._applied_right, right = self._turn(
+            STOP - self.right, self._applied_right, self.right_mps, self._gain_right
+        )
+        self._applied_left, left = self._turn(
+            STOP - self.left, self._applied_left, self.left_mps, self._gain_left
+        )
         self.right_mps, self.left_mps = right, left
         if right == 0.0 == left:
             return 0.0

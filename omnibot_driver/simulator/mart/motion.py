@@ -13,7 +13,7 @@ SLOW_STOP_SAMPLES = 188
 FAST_REGISTER = 45
 """A register below it is so fast that RM stops gently."""
 SETUP_S = 0.05
-BIAS_SAMPLE_S = 0.0105
+BIAS_SAMPLE_S = 0.0107
 LOST_AT_START_S, LOST_S = 0.5, 1.5
 REAR_CLEARANCE_IN, FRONT_CLEARANCE_IN = 15, 19
 INCHES_PER_M = 1 / 0.0254
@@ -51,10 +51,10 @@ RAMPS_S = {"NORMAL": (0.3, 0.12), "SLOW": (0.2, 0.08)}
 class Motion:
     """Of one kind; what it was like stays when it is over.
 
-    running: in progress, so that others are refused. posts: unread notices that it started or
-    stopped. error: of this motion. right, left: what the server believes of the registers.
-    encoder: as it was read last, of which the next sample knows. sampled_s: time of the last sample of the IMU, or -1. angle_deg: of spins and straight moves.
-    released: the stop port ended it.
+    running: in progress, so that others are refused. posts: notices that it started or stopped, and
+    that were not read. error: of this motion. right, left: what the server believes of the
+    registers. encoder: as it was read last, of which the next sample knows. sampled_s: time of the
+    last sample of the IMU, or -1. angle_deg: since its start. released: the stop port ended it.
     """
 
     def __init__(self, kind: Kind) -> None:
@@ -81,6 +81,13 @@ class Motion:
         self.correction = 0
         self.first_sample = True
         self.stop_samples = STOP_SAMPLES
+
+    def limit(self, inches: int) -> None:
+        """Stop after the time that it takes so far, by its calibration."""
+        up_s, down_s = RAMPS_S[self.word]
+        top_inps = TOP_SPEED_INPS[self.word]
+        self.stop_after_s = (inches - (up_s + down_s) / 2 * top_inps) / top_inps + up_s
+        self.limited = True
 
     def copy(self) -> "Motion":
         """An independent one."""

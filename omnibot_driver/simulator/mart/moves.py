@@ -9,7 +9,7 @@ Knows motions. Must not know the words of commands.
 from typing import TYPE_CHECKING
 
 from omnibot_driver.simulator.mart import motion as motions
-from omnibot_driver.simulator.mart.alarms import change_speed, stop_motors
+from omnibot_driver.simulator.mart.alarms import change_speed
 from omnibot_driver.simulator.mart.files import note_of
 from omnibot_driver.simulator.mart.motion import Kind, Motion
 from omnibot_driver.simulator.mart.stop_port import end_motion
@@ -22,7 +22,7 @@ BIAS_SAMPLES = 10
 PATIENCE_SAMPLES = 50
 PROBE_S = 0.5
 WRITES_S = 0.005
-REFERENCE_S = 0.015
+LINEAR_S = REFERENCE_S = 0.015
 """Setting up the motor board takes so long."""
 
 
@@ -58,18 +58,10 @@ def start_controlled(
     server.starting = kind
     server.sampling_since_s = server.now_s
     if inches > 0:
-        limit(motion, inches)
+        motion.limit(inches)
     else:
         motion.limited = False
     server.later(motions.SETUP_S, _set_up, kind, 5)
-
-
-def limit(motion: Motion, inches: int) -> None:
-    """The time after which a timed move stops."""
-    up_s, down_s = motions.RAMPS_S[motion.word]
-    top_inps = motions.TOP_SPEED_INPS[motion.word]
-    motion.stop_after_s = (inches - (up_s + down_s) / 2 * top_inps) / top_inps + up_s
-    motion.limited = True
 
 
 def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
@@ -101,6 +93,10 @@ def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -
         server.starting = None
         server.answer("ok")
         return
+    server.later(LINEAR_S, _go_linear, kind)
+
+
+def _go_linear(server: "MartServer", kind: Kind) -> None:
     motion = server.motions[kind]
     register = 128 + motion.speed if motion.backward else 128 - motion.speed
     _go(server, motion, register, register)
@@ -127,7 +123,7 @@ def _go_reference(server: "MartServer", speed: int) -> None:
     server.chassis.accelerate(5)
     server.chassis.reset_encoders()
     motion.begin(server.now_s)
-    server.imu.heading_deg = 0.0
+    server.zero_heading()
     server.sampling_since_s = server.now_s
     _go(server, motion, 128 - speed, 128 - speed)
     server.wait(COMMAND, Kind.REFERENCE, started, Kind.REFERENCE)
@@ -193,6 +189,8 @@ def controlled_done(server: "MartServer", kind: Kind) -> None:
     motion = server.motions[kind]
     server.starting = None
     motion.running = False
+    if not server.quirks.echoes_distance:
+        motion.reported_in = abs(server.driven_m) * motions.INCHES_PER_M
     server.save(note_of(server, motion))
     if motion.error:
         server.answer(f"fail {motion.error}")
@@ -204,11 +202,7 @@ def controlled_done(server: "MartServer", kind: Kind) -> None:
 
 def last_distance_in(server: "MartServer") -> int:
     """Of the last TF or TB."""
-    motion = server.motions[Kind.CONTROLLED_LINEAR]
-    if server.quirks.echoes_distance:
-        return round(motion.reported_in)
-    counted = abs(server.chassis.counts * server.settings.metres_per_count)
-    return round(counted * motions.INCHES_PER_M)
+    return round(server.motions[Kind.CONTROLLED_LINEAR].reported_in)
 
 
 def stop(server: "MartServer", kind: Kind) -> None:
@@ -255,18 +249,3 @@ def change_reference(server: "MartServer", right: int, left: int) -> bool:
             server.chassis.accelerate(2)
         change_speed(server, motion, right, left)
     return True
-
-
-__all__ = [
-    "change_linear",
-    "change_reference",
-    "limit",
-    "start_controlled",
-    "start_controlled_spin",
-    "start_linear",
-    "start_reference",
-    "start_spin",
-    "stop",
-    "stop_motors",
-    "take_bias",
-]

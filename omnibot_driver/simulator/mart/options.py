@@ -87,7 +87,7 @@ def _bits(text: str) -> int:
 
 _WORDS = {
     "speed_mps_per_unit": "speed_per_unit",
-    "metres_per_count": "metres_per_count",
+    "dead_zone_units": "dead_zone",
     "track_m": "track",
     "gyro_bias_dps": "gyro_bias",
     "gyro_noise_dps": "gyro_noise",
@@ -102,6 +102,7 @@ _NUMBERS: tuple[tuple[str, Callable[[str], float], str, str], ...] = (
     ("metres_per_count", _within(1e-6, 1.0), "M", "of an encoder count"),
     ("track_m", _within(0.01, 10.0), "M", "between the wheels"),
     ("volts", _within(0.0, 40.0), "V", "of the battery; the speed grows with them"),
+    ("dead_zone_units", _within(0.0, 127.0), "UNITS", "below which a motor stands"),
     ("motor_inequality", _within(-1.0, 1.0), "PART", "how much faster the left motor is"),
     ("gyro_bias_dps", _within(-50.0, 50.0), "DEG/S", "that the server finds with SB"),
     ("gyro_noise_dps", _within(0.0, 50.0), "DEG/S", "of a sample while the robot moves"),

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Any, NamedTuple
 
-from omnibot_driver.simulator.mart import alarms, commands, stop_port, wire
+from omnibot_driver.simulator.mart import alarms, commands, moves, stop_port, wire
 from omnibot_driver.simulator.mart.chassis import STEP_S, Chassis, sight_m
 from omnibot_driver.simulator.mart.files import FileNote
 from omnibot_driver.simulator.mart.imu import Imu
@@ -27,6 +27,7 @@ SONAR_SETTLES_S = 0.165
 """Three readings confirm that something is near."""
 FARTHEST_IN = 254
 QUICK_S = 0.0005
+UNCONTROLLED = (Kind.LINEAR, Kind.REFERENCE, Kind.SPIN)
 
 Sender = object
 Then = Callable[..., None]
@@ -92,6 +93,7 @@ class MartServer:
         self.log: list[str] | None = None
         self.log_name = ""
         self.sampling_since_s = -1.0
+        self._reference_clock_s: float | None = None
         self._busy = False
         self._sender: Sender = None
         self._later: _Later | None = None
@@ -174,8 +176,13 @@ class MartServer:
     @property
     def blocked(self) -> bool:
         """Whether the command port answers only when the IMU lives again."""
-        waits = bool(self._waiters) or self.starting is not None
-        return self._busy and waits and not self.imu.living(self.now_s)
+        if self.imu.living(self.now_s) or self.crashed:
+            return False
+        later = self._later
+        return (later is not None and later.then is moves.take_bias) or any(
+            waiter.port == COMMAND and waiter.kind is self.alarm and waiter.kind in UNCONTROLLED
+            for waiter in self._waiters
+        )
 
     @property
     def busy(self) -> bool:
@@ -208,6 +215,11 @@ class MartServer:
     def docked(self) -> bool:
         """Whether the robot stands at its dock."""
         return self.chassis.x_m >= self.dock_m
+
+    @property
+    def driven_m(self) -> float:
+        """By the right wheel since the encoder was reset."""
+        return self.chassis.counts * self.settings.metres_per_count
 
     @property
     def conflict(self) -> bool:
@@ -311,10 +323,17 @@ class MartServer:
         """Whether turning changes the relative heading now."""
         return self.alarm is Kind.REFERENCE or not self.quirks.heading_in_reference_moves_only
 
-    def begin_heading(self) -> None:
-        """The first sample of RM."""
-        if self.quirks.heading_starts_off:
-            self.imu.heading_deg += self.imu.rate_dps / 2 * self.now_s
+    def sample_reference(self, *, first: bool) -> None:
+        """A sample of RM; by its source, the first counts the time since the one before."""
+        clock_s, before_s = self.clock_s, self._reference_clock_s
+        self._reference_clock_s = clock_s
+        if first and before_s is not None and self.quirks.heading_starts_off:
+            self.imu.heading_deg += self.imu.rate_dps / 2 * (clock_s - before_s)
+
+    def zero_heading(self) -> None:
+        """RM begins."""
+        self.imu.drift(self.now_s, integrates=False)
+        self.imu.heading_deg = 0.0
 
     def heading_deg(self) -> float:
         """The relative heading, as RMRA tells it."""

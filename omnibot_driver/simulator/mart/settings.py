@@ -90,14 +90,14 @@ class MartSettings:
     """The controller, its robot, and where it is.
 
     speed_mps_per_unit: of a wheel at nominal_volts; the speed grows with the voltage.
-    motor_inequality: how much faster the left motor is than the right one, as a part of the speed.
-    encoder_sign: -1 where forward counts down. gyro_bias_dps: what the server does not know of.
-    gyro_noise_dps: standard deviation of a sample while a wheel turns. imu_dies_s, imu_returns_s:
-    since construction. stuck: wheels that do not turn. motor_board_silent: its serial line is cut.
-    motor_status: bits of MCSTAT, besides those of the voltage; a tripped or short motor stops.
-    front_m, rear_m: walls across the way, from where the robot begins. dock_m: the way forward to
-    the dock. reference_start_fails: a build that answers ``fail`` to RM, and moves.
-    clock_s: what its wall clock shows at first, in Unix time.
+    dead_zone_units: a motor stands below it. motor_inequality: how much faster the left motor is
+    than the right one, as a part of the speed. encoder_sign: -1 where forward counts down.
+    gyro_bias_dps: what the server does not know of. gyro_noise_dps: standard deviation of a sample
+    while a wheel turns. imu_dies_s, imu_returns_s: since construction. stuck: wheels that do not
+    turn. motor_board_silent: its serial line is cut. motor_status: bits of MCSTAT, besides those of
+    the voltage; a tripped or short motor stops. front_m, rear_m: walls across the way, from where
+    the robot begins. dock_m: the way forward to the dock. reference_start_fails: a build that
+    answers ``fail`` to RM, and moves. clock_s: what its wall clock shows at first, in Unix time.
     """
 
     quirks: Quirks = FIRMWARE
@@ -108,6 +108,7 @@ class MartSettings:
     track_m: float = 0.40
     volts: float = 24.0
     nominal_volts: float = 24.0
+    dead_zone_units: float = 0.0
     motor_inequality: float = 0.0
     motor_lag_s: float = 0.05
     gyro_bias_dps: float = 0.02

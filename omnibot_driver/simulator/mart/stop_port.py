@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 STOP = 1
 DRIVES = (Kind.LINEAR, Kind.MEASURED_LINEAR, Kind.CONTROLLED_LINEAR, Kind.REFERENCE)
 SPINS = (Kind.SPIN, Kind.CONTROLLED_SPIN)
+CONTROLLED = (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR, Kind.CONTROLLED_SPIN)
 
 
 def obey(server: "MartServer", text: str) -> None:
@@ -49,14 +50,15 @@ def end_motion(server: "MartServer", port: int, motion: Motion) -> bool:
 def _stop_first(server: "MartServer", kinds: tuple[Kind, ...]) -> None:
     quirks = server.quirks
     if not quirks.early_stop_is_ignored and server.starting in kinds:
-        controlled = server.starting in (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR)
-        server.abort("ok 0" if controlled else "fail stopped")
-        return
+        controlled = server.starting in CONTROLLED
+        if not (controlled and server.alarm is server.starting):
+            server.abort("ok 0" if controlled else "fail stopped")
+            return
     motion = next((server.motions[kind] for kind in kinds if server.motions[kind].running), None)
     if motion is None:
         return
     kind = motion.kind
-    if kind in (Kind.CONTROLLED_LINEAR, Kind.CONTROLLED_SPIN, Kind.MEASURED_LINEAR):
+    if kind in CONTROLLED:
         if not motion.stopping:
             stop_motors(server, motion)
     elif quirks.stop_port_keeps_motion or kind is Kind.SPIN:
@@ -73,8 +75,10 @@ def _limit(server: "MartServer", text: str) -> None:
         (each for each in server.motions if each.running and each.kind in DRIVES[1:3]), None
     )
     behind = wire.fields(text)
-    if motion is None or motion.limited or not behind:
+    if motion is None:
         return
-    from omnibot_driver.simulator.mart.moves import limit
-
-    limit(motion, wire.integer(behind[0]))
+    if behind:
+        if not motion.limited:
+            motion.limit(wire.integer(behind[0]))
+    elif server.quirks.crashes_on_missing_numbers:
+        server.end("SDR without a number")

@@ -1,0 +1,180 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""TF, TB, MCR and MCL of the public server."""
+
+import pytest
+from mart_rig import INCH_M, Rig
+
+
+@pytest.mark.parametrize(("text", "sign"), [("TF 12", 1), ("TB 12", -1)])
+def test_ok_echoes_the_target_12_for_15_8_inches_driven(text: str, sign: int) -> None:
+    """It is computed from time."""
+    rig = Rig()
+    assert rig.ask(text) == "ok 12"
+    assert sign * rig.x_in == pytest.approx(15.8, abs=0.2)
+    assert rig.ask("TD") == "ok 12"
+
+
+@pytest.mark.parametrize("volts", [20.0, 26.0])
+def test_it_echoes_it_at_any_voltage(volts: float) -> None:
+    """However far the robot went."""
+    rig = Rig(volts=volts)
+    assert rig.ask("TF 24") == "ok 24"
+    assert abs(rig.x_in - 30.3) > 2
+
+
+def test_tf_24_slow_runs_at_normal_speed() -> None:
+    """TF SLOW 24 does not."""
+    fast, normal, slow = Rig(), Rig(), Rig()
+    assert fast.ask("TF 24 SLOW") == normal.ask("TF NORMAL 24") == "ok 24"
+    assert slow.ask("TF SLOW 24") == "ok 24"
+    assert fast.took_s == normal.took_s < 0.7 * slow.took_s
+
+
+@pytest.mark.parametrize("text", ["TF 0", "TF x", "TF SLOW x", "TB 0", "TB NORMAL y", "TF FAST 12"])
+def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
+    """Until it is stopped."""
+    rig = Rig()
+    assert rig.ask(text, 60.0) is None
+    assert rig.moving
+    rig.stop("SL")
+    assert rig.wait() is not None
+
+
+def test_sdr_limits_an_unlimited_move_alone() -> None:
+    """Counted from its start."""
+    rig = Rig()
+    rig.say("TF 0")
+    rig.run(1.0)
+    rig.stop("SDR 24")
+    assert rig.wait() == "ok 24"
+    rig.say("TF 24")
+    rig.run(1.0)
+    rig.stop("SDR 100")
+    assert rig.wait() == "ok 24"
+
+
+def test_a_negative_distance_is_refused() -> None:
+    """With these words."""
+    assert Rig().ask("TF -5") == "fail bad distance value"
+    assert Rig().ask("TB SLOW -5") == "fail bad distance value"
+
+
+@pytest.mark.parametrize(
+    ("text", "answer"),
+    [
+        ("TF", "fail command missng parameter"),
+        ("TF SLOW", "fail command missng parameter"),
+        ("TB", "fail command missng parameter"),
+        ("MCR", "fail command missing parameter"),
+        ("MCL SLOW", "fail command missing parameter"),
+    ],
+)
+def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
+    """In two spellings."""
+    assert Rig().ask(text) == answer
+
+
+@pytest.mark.parametrize(("front_in", "driven_in"), [(15.0, 0.3), (17.0, 0.3)])
+def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
+    front_in: float, driven_in: float
+) -> None:
+    """With these words."""
+    rig = Rig(front_m=front_in * INCH_M)
+    assert rig.ask("TF 24") == "fail Insufficient front clearance."
+    assert rig.took_s == pytest.approx(0.6, abs=0.1)
+    assert rig.x_in == pytest.approx(driven_in, abs=0.15)
+
+
+def test_near_an_obstacle_tb_fails_likewise() -> None:
+    """Behind."""
+    rig = Rig(rear_m=12 * INCH_M)
+    assert rig.ask("TB 24") == "fail Insufficient rear clearance."
+
+
+@pytest.mark.parametrize("text", ["TF SLOW NCC 30", "TF DOCK 30"])
+def test_ncc_and_dock_see_no_obstacle(text: str) -> None:
+    """No clearance check."""
+    rig = Rig(front_m=20 * INCH_M)
+    assert rig.ask(text, 60.0) == "ok 30"
+    assert rig.server.hit_wall
+
+
+def test_tf_dock_stops_at_the_dock() -> None:
+    """And claims what it computed."""
+    rig = Rig(dock_m=20 * INCH_M)
+    assert rig.ask("DOCKED") == "ok false"
+    answer = rig.ask("TF DOCK 60", 60.0)
+    assert answer is not None
+    assert 8 < int(answer.split()[1]) < 20
+    assert rig.x_in == pytest.approx(20.5, abs=0.8)
+    assert rig.ask("DOCKED") == "ok true"
+
+
+def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
+    """Then it is 19 inches again."""
+    rig = Rig(front_m=60 * INCH_M)
+    assert rig.ask("TFSFC 40") == "ok"
+    assert rig.ask("TF 60") == "fail Insufficient front clearance."
+    assert rig.x_in == pytest.approx(21, abs=2)
+    assert rig.ask("TF 60") == "fail Insufficient front clearance."
+    assert rig.x_in == pytest.approx(43, abs=2)
+
+
+def test_tf_holds_its_course_with_unequal_motors() -> None:
+    """By the gyro."""
+    rig = Rig(motor_inequality=0.05)
+    assert rig.ask("TF 80", 60.0) == "ok 80"
+    assert abs(rig.yaw_deg) < 4
+    free = Rig(motor_inequality=0.05)
+    free.drive("F", rig.took_s)
+    assert abs(free.yaw_deg) > 15
+
+
+def test_a_wheel_that_stops_turns_tf_away_until_it_gives_up() -> None:
+    """With these words."""
+    rig = Rig()
+    rig.say("TF 80")
+    rig.run(1.0)
+    rig.server.chassis.change(stuck="left")
+    assert rig.wait() == "fail excessive gyro correct"
+
+
+@pytest.mark.parametrize(("text", "sign"), [("MCR 90", -1), ("MCL 90", 1), ("MCL SLOW 90", 1)])
+def test_mcr_turns_right_and_mcl_left(text: str, sign: int) -> None:
+    """Whatever the manual says of MCL."""
+    rig = Rig()
+    assert rig.ask(text) == "ok"
+    assert sign * rig.yaw_deg == pytest.approx(93, abs=5)
+
+
+def test_mcr_normal_90_parses_as_0() -> None:
+    """It does not turn."""
+    rig = Rig()
+    assert rig.ask("MCR NORMAL 90") == "ok"
+    assert rig.took_s == pytest.approx(0.5, abs=0.05)
+    assert rig.yaw_deg == 0.0
+
+
+def test_less_than_10_degrees_are_turned_slowly() -> None:
+    """Also at normal speed."""
+    rig, slow = Rig(), Rig()
+    rig.ask("MCR 9")
+    slow.ask("MCR SLOW 9")
+    assert rig.yaw_deg == slow.yaw_deg < 0
+
+
+@pytest.mark.parametrize("text", ["PTF 12 4 0.05 10", "PTF SLOW 12 4 0 10", "MCF 12", "MCB 12"])
+def test_undocumented_moves_answer_ok(text: str) -> None:
+    """Without a distance."""
+    rig = Rig()
+    assert rig.ask(text) == "ok"
+    assert abs(rig.x_in) > 8
+
+
+def test_the_port_is_silent_during_a_controlled_move() -> None:
+    """A TF of 80 inches slowly takes 20 s."""
+    rig = Rig()
+    rig.say("TF SLOW 80", "ENC", "RMRA")
+    assert rig.run(15.0) == []
+    assert len(rig.run(10.0)) == 3

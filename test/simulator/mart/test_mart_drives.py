@@ -1,0 +1,310 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""F, B, RM, R and L of the public server: speeds, signs, limits, obstacles, stuck motors."""
+
+import pytest
+from mart_rig import INCH_M, Rig
+
+from omnibot_driver.simulator.mart import FIRMWARE, Kind
+
+
+def test_rm_answers_in_71_ms() -> None:
+    """When the wheel is seen to turn."""
+    rig = Rig()
+    assert rig.ask("RM 30") == "ok"
+    assert rig.took_s == pytest.approx(0.071, abs=0.01)
+    assert rig.moving
+
+
+def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
+    """F takes the bias of the gyro before."""
+    rig = Rig()
+    assert rig.ask("F") == "ok"
+    assert rig.took_s == pytest.approx(0.22, abs=0.015)
+    rig = Rig()
+    assert rig.ask("R") == "ok"
+    assert rig.took_s == pytest.approx(0.061, abs=0.01)
+
+
+def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
+    """And does not know of it: nothing but a write to the motors ends it."""
+    rig = Rig(reference_start_fails=True)
+    assert rig.ask("RM 30") == "fail "
+    rig.run(1.0)
+    assert rig.moving
+    assert rig.in_progress is None
+    assert rig.ask("SRM") == "fail no motion in progress"
+    assert rig.ask("RMCS 0 0") == "fail no motion in progress"
+    rig.stop("SL")
+    rig.run(1.0)
+    assert rig.moving
+    assert rig.ask("MCS 128 128") == "ok"
+    rig.run(1.0)
+    assert not rig.moving
+    assert rig.ask("MSM") == "ok"
+
+
+@pytest.mark.parametrize("change", ["1 1", "-1 -1", "5 -5", "0 1", "40 40"])
+def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(change: str) -> None:
+    """RMCS 0 0 does not."""
+    rig = Rig()
+    rig.drive("RM -20")
+    assert rig.x_in < -1
+    assert rig.server.chassis.right == 148
+    rig.ask("RMCS 0 0")
+    rig.run(1.0)
+    assert rig.moving
+    rig.ask(f"RMCS {change}")
+    rig.run(2.0)
+    right, left = (int(number) for number in change.split())
+    chassis = rig.server.chassis
+    stops = right <= 20 and left <= 20
+    assert rig.moving is not stops
+    assert (chassis.right, chassis.left) == (min(148 - right, 128), min(148 - left, 128))
+
+
+def test_rm_200_drives_backward_at_56() -> None:
+    """And at full speed forward after the smallest change."""
+    rig = Rig()
+    rig.drive("RM 200")
+    assert rig.server.chassis.right == 128 + 56
+    assert rig.x_in < -1
+    rig.ask("RMCS 1 1")
+    assert (rig.server.chassis.right, rig.server.chassis.left) == (0, 0)
+
+
+@pytest.mark.parametrize("speed", [1, 30, 127])
+def test_rm_1_to_127_drives_forward(speed: int) -> None:
+    """By as many units."""
+    rig = Rig()
+    rig.drive(f"RM {speed}")
+    assert rig.server.chassis.right == 128 - speed
+    assert rig.x_in > 0
+
+
+def test_a_stuck_motor_can_hang_rm() -> None:
+    """It is not answered; the motors are told to stop after 0.6 s."""
+    rig = Rig(stuck="right")
+    rig.say("RM 30")
+    rig.run(0.5)
+    assert rig.server.chassis.powered
+    assert rig.wait() is None
+    assert rig.server.hung
+    assert not rig.server.chassis.powered
+
+
+def test_rm_0_is_a_motor_that_does_not_turn() -> None:
+    """As is a speed below which the motors stand."""
+    assert Rig().ask("RM 0") is None
+    assert Rig(dead_zone_units=4.0).ask("RM 3") is None
+    assert Rig(dead_zone_units=4.0).ask("RM 5") == "ok"
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"), [("R", 0.6), ("L", 0.6), ("MCR 20", 0.6), ("F", 0.76), ("TF 12", 0.76)]
+)
+def test_a_stuck_motor_is_told_of(text: str, seconds: float) -> None:
+    """And nothing is in progress."""
+    rig = Rig(stuck="right")
+    assert rig.ask(text) == "fail start timedout"
+    assert rig.took_s == pytest.approx(seconds, abs=0.02)
+    rig.run(1.0)
+    assert rig.in_progress is None
+    assert not rig.server.chassis.powered
+
+
+def test_a_stuck_left_motor_is_not_noticed() -> None:
+    """There is no encoder."""
+    rig = Rig(stuck="left")
+    rig.drive("F")
+    assert rig.yaw_deg > 20
+
+
+@pytest.mark.parametrize(("start", "change"), [("RM 30", "RMCS"), ("F", "CS"), ("B", "CS")])
+def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, change: str) -> None:
+    """Also in B."""
+    rig = Rig()
+    rig.drive(start)
+    before = rig.server.chassis.copy()
+    answer = rig.ask(f"{change} 5 -6")
+    assert answer is not None
+    assert answer.startswith("ok")
+    rig.run(1.0)
+    chassis = rig.server.chassis
+    unit = rig.server.settings.speed_mps_per_unit
+    assert chassis.right_mps - before.right_mps == pytest.approx(5 * unit, abs=0.001)
+    assert chassis.left_mps - before.left_mps == pytest.approx(-6 * unit, abs=0.001)
+
+
+def test_cs_5_minus_5_turns_left() -> None:
+    """By the true heading."""
+    rig = Rig()
+    rig.drive("F")
+    assert rig.ask("CS 5 -5") == "ok"
+    rig.run(1.0)
+    assert rig.yaw_deg > 5
+
+
+@pytest.mark.parametrize(
+    ("start", "change", "registers"),
+    [
+        ("F", "CS -100 -100", (128, 128)),
+        ("B", "CS 100 100", (128, 128)),
+        ("RM 30", "RMCS -100 0", (128, 98)),
+        ("RM 120", "RMCS 20 0", (0, 20)),
+        ("F FAST", "CS 100 60", (0, 40)),
+        ("B FAST", "CS -100 -60", (255, 215)),
+    ],
+)
+def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int, int]) -> None:
+    """At full speed the other motor yields instead."""
+    rig = Rig()
+    rig.drive(start, 0.5)
+    rig.ask(change)
+    assert (rig.server.chassis.right, rig.server.chassis.left) == registers
+
+
+def test_rmcs_0_0_just_reads_the_angle() -> None:
+    """As RMRA does."""
+    rig = Rig()
+    rig.drive("RM 30")
+    rig.ask("RMCS 4 -4")
+    rig.run(1.0)
+    registers = rig.server.chassis.right, rig.server.chassis.left
+    assert rig.ask("RMCS 0 0") == f"ok {rig.server.imu.heading_deg:.2f}"
+    assert (rig.server.chassis.right, rig.server.chassis.left) == registers
+
+
+@pytest.mark.parametrize("turn", ["RMCS 4 -4", "RMCS -4 4"])
+def test_rmra_is_the_angle_since_rm_and_positive_is_left(turn: str) -> None:
+    """Within the gyro's noise."""
+    rig = Rig(gyro_bias_dps=0.0)
+    rig.drive("L")
+    rig.ask("SM")
+    before = rig.yaw_deg
+    rig.drive("RM 30")
+    rig.ask(turn)
+    rig.run(3.0)
+    assert abs(rig.yaw_deg - before) > 20
+    assert rig.number("RMRA") == pytest.approx(rig.yaw_deg - before, abs=1.5)
+    assert (rig.number("RMRA") > 0) is (turn == "RMCS 4 -4")
+
+
+@pytest.mark.parametrize("start", ["F", "B", "RM 30", "R"])
+def test_rmra_works_at_any_time(start: str) -> None:
+    """Also before, and in other motions than RM."""
+    rig = Rig()
+    assert rig.number("RMRA") == 0.0
+    rig.drive(start)
+    if start in ("F", "B"):
+        rig.ask("CS 6 -6")
+    elif start == "RM 30":
+        rig.ask("RMCS 6 -6")
+    rig.run(1.0)
+    assert rig.number("RMRA") == pytest.approx(rig.yaw_deg, abs=1.5)
+    assert abs(rig.yaw_deg) > 5
+
+
+def test_enc_counts_the_right_wheel_alone_and_has_a_sign() -> None:
+    """In 5 ms."""
+    rig = Rig(metres_per_count=0.001)
+    rig.drive("R")
+    spun = rig.number("ENC")
+    assert rig.took_s == pytest.approx(0.005)
+    assert spun < -50
+    assert spun * 0.001 == pytest.approx(rig.server.chassis.yaw_rad * 0.4 / 2, abs=0.003)
+    inverted = Rig(encoder_sign=-1)
+    inverted.drive("F")
+    assert inverted.number("ENC") < -100
+
+
+@pytest.mark.parametrize("start", ["F", "B", "RM 30", "R", "L", "TF 2", "TB 2", "MCR 5", "MCL 5"])
+def test_enc_is_zeroed_at_each_motion_start(start: str) -> None:
+    """And keeps its value afterwards."""
+    rig = Rig()
+    rig.drive("F")
+    rig.ask("SM")
+    long = rig.number("ENC")
+    assert long > 400
+    assert rig.number("ENC") == long
+    rig.ask(start)
+    assert abs(rig.number("ENC")) < 350
+
+
+@pytest.mark.parametrize(("start", "side"), [("F", "front_m"), ("B", "rear_m")])
+def test_in_f_and_b_an_obstacle_stops_it_without_a_message(start: str, side: str) -> None:
+    """The next SM tells."""
+    rig = Rig(**{side: 45 * INCH_M})
+    rig.drive(start, 10.0)
+    assert not rig.moving
+    assert not rig.server.hit_wall
+    assert rig.replies[1:] == []
+    assert rig.in_progress is Kind.LINEAR
+    assert rig.ask("SM") == "fail insufficent clearence"
+    assert rig.in_progress is None
+
+
+def test_an_obstacle_ends_rm_and_srm_tells() -> None:
+    """With other words; RMCS fails by them too."""
+    rig = Rig(front_m=45 * INCH_M)
+    rig.drive("RM 30", 10.0)
+    assert not rig.moving
+    assert rig.ask("RMCS 0 0") == "fail insufficient clearance"
+    assert rig.ask("SRM") == "fail insufficient clearance"
+    assert not rig.server.hit_wall
+
+
+def test_backward_rm_and_spins_see_no_obstacle() -> None:
+    """The rear sonar is not asked."""
+    rig = Rig(rear_m=20 * INCH_M)
+    rig.drive("RM -20", 6.0)
+    assert rig.server.hit_wall
+
+
+@pytest.mark.parametrize(("front_in", "stops"), [(19.5, False), (18.5, True)])
+def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
+    """Measured to the whole inch."""
+    rig = Rig(front_m=front_in * INCH_M, dead_zone_units=0.0)
+    rig.drive("RM 1", 0.3)
+    assert rig.server.chassis.powered is not stops
+
+
+@pytest.mark.parametrize(("rear_in", "stops"), [(18.0, False), (15.1, True)])
+def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
+    """The robot moves 0.6 inches until it looks."""
+    rig = Rig(rear_m=rear_in * INCH_M)
+    rig.drive("B SLOW", 0.1)
+    assert rig.server.chassis.powered is not stops
+
+
+@pytest.mark.parametrize("volts", [20.0, 24.0, 26.0])
+@pytest.mark.parametrize("inequality", [-0.05, 0.0, 0.05])
+def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
+    volts: float, inequality: float
+) -> None:
+    """The regulator is off."""
+    rig = Rig(volts=volts, motor_inequality=inequality)
+    rig.drive("RM 40")
+    chassis = rig.server.chassis
+    speed = 40 * rig.server.settings.speed_mps_per_unit * volts / 24.0
+    assert (chassis.right_mps + chassis.left_mps) / 2 == pytest.approx(speed, rel=0.01)
+    assert chassis.left_mps / chassis.right_mps == pytest.approx(1 + inequality, rel=0.003)
+    assert rig.number("VOLTS") == volts
+
+
+def test_mcs_sets_registers_once_and_everything_is_refused_until_msm() -> None:
+    """Absolute, right first."""
+    rig = Rig()
+    assert rig.ask("MCS 100 120") == "ok"
+    assert (rig.server.chassis.right, rig.server.chassis.left) == (100, 120)
+    assert rig.ask("MCS 128 128") == "fail conflicting action in progress"
+    assert rig.ask("F") == "fail conflicting action in progress"
+    assert rig.ask("MSM") == "ok"
+    rig.run(1.0)
+    assert not rig.moving
+    assert rig.ask("F") == "ok"
+
+
+def test_the_firmware_is_what_is_played_by_default() -> None:
+    """Not the manual."""
+    assert Rig().server.quirks == FIRMWARE

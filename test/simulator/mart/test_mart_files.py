@@ -1,0 +1,103 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Downloads and the end of the public server."""
+
+import pytest
+from mart_rig import Rig
+
+
+def download(rig: Rig, text: str) -> tuple[str, int, list[bytes]]:
+    """Name, size and blocks of a file."""
+    before = len(rig.replies)
+    rig.say(text)
+    rig.run(0.1)
+    head, *blocks = [data for _, data in rig.replies[before:]]
+    ok, name, size = head.decode("ascii").split()
+    assert ok == "ok"
+    return name, int(size), blocks
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "text", "name"),
+    [
+        ("F", "SM", "LAST MOVE", "LinearMotionSensorData"),
+        ("B", "SM", "LAST MOVE", "LinearMotionSensorData"),
+        ("RM 30", "SRM", "LAST MOVE", "RefMotionData"),
+        ("TF 12", None, "LAST MOVE", "TLinearMotionSensorData"),
+        ("R", "SM", "LAST TURN", "SpinSensorData"),
+        ("MCL 30", None, "LAST TURN", "MCSpinSensorData"),
+    ],
+)
+def test_a_file_comes_in_datagrams_of_512_bytes(
+    start: str, end: str | None, text: str, name: str
+) -> None:
+    """Behind its name and size; SRM fills LAST MOVE too."""
+    rig = Rig()
+    answer = rig.ask(start)
+    assert answer is not None
+    assert answer.startswith("ok")
+    rig.run(1.0)
+    if end:
+        rig.ask(end)
+    found, size, blocks = download(rig, text)
+    assert found.startswith(name)
+    assert found.endswith(".csv")
+    assert sum(map(len, blocks)) == size > 512
+    assert all(len(block) == 512 for block in blocks[:-1])
+    assert 0 < len(blocks[-1]) <= 512
+    assert rig.ask("HELLO") == "ok BBB"
+
+
+def test_files_are_latin_1_and_0xb0_is_the_sign_of_a_degree() -> None:
+    """Not UTF-8."""
+    rig = Rig()
+    rig.ask("TF 12")
+    content = b"".join(download(rig, "LAST MOVE")[2])
+    assert b"\xb0/sec" in content
+    assert "Motion error: " in content.decode("latin-1")
+    with pytest.raises(UnicodeDecodeError):
+        content.decode("utf-8")
+
+
+def test_log_deletes_earlier_files_then_last_move_answers_a_bare_fail() -> None:
+    """Until the next motion; LOG again deletes nothing."""
+    rig = Rig()
+    rig.ask("TF 5")
+    assert rig.ask("LOG") == "ok"
+    rig.say("LAST MOVE")
+    assert rig.run(0.1) == ["fail"]
+    rig.ask("TF 5")
+    assert rig.ask("LOG") == "ok"
+    assert download(rig, "LAST MOVE")[1] > 0
+
+
+def test_exit_downloads_the_log_if_log_was_given() -> None:
+    """And ends the server."""
+    rig = Rig()
+    rig.ask("LOG")
+    rig.ask("HELLO")
+    name, size, blocks = download(rig, "EXIT")
+    content = b"".join(blocks)
+    assert name.startswith("MotionController")
+    assert name.endswith(".log")
+    assert len(content) == size
+    assert b"HELLO" in content
+    assert b"ok BBB" in content
+    assert rig.server.crashed == "EXIT"
+    assert rig.ask("HELLO") is None
+
+
+def test_exit_without_log_answers_nothing_and_ends_the_server() -> None:
+    """The same afterwards."""
+    rig = Rig()
+    assert rig.ask("EXIT") is None
+    assert rig.server.crashed == "EXIT"
+
+
+def test_exit_stops_no_motor() -> None:
+    """Of a motion in progress."""
+    rig = Rig()
+    rig.drive("RM 30")
+    rig.say("EXIT")
+    rig.run(30.0)
+    assert rig.moving

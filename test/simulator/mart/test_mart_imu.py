@@ -1,0 +1,180 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the public server does without a living IMU."""
+
+import pytest
+from mart_rig import INCH_M, Rig
+
+LOST = "fail MPU6050 connection lost"
+
+
+@pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24", "SB"])
+def test_with_a_dead_imu_it_never_answers_and_does_not_move(text: str) -> None:
+    """Nor anything that is said afterwards."""
+    rig = Rig(imu_dies_s=0.0)
+    rig.say(text, "HELLO", "SM")
+    rig.stop("SL")
+    assert rig.run(120.0) == []
+    assert rig.server.blocked
+    assert not rig.server.hung
+    assert rig.server.chassis.way_m == 0.0
+
+
+@pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24"])
+def test_a_move_that_the_host_has_given_up_starts_when_the_imu_comes_back(text: str) -> None:
+    """Minutes later."""
+    rig = Rig(imu_dies_s=0.0, imu_returns_s=300.0)
+    rig.say(text)
+    rig.run(299.0)
+    assert rig.server.chassis.way_m == 0.0
+    assert rig.run(20.0)
+    assert rig.server.chassis.way_m > 0.3
+
+
+@pytest.mark.parametrize("text", ["RM 30", "R", "L"])
+@pytest.mark.parametrize("stops", [("SL", "SRM", "SS"), ("SM",), ("SS", "SM"), ("SL", "SL", "SRM")])
+def test_without_an_imu_rm_r_and_l_start_the_motors_and_nothing_stops_them(
+    text: str, stops: tuple[str, ...]
+) -> None:
+    """They never answer."""
+    rig = Rig(imu_dies_s=0.0)
+    rig.say(text)
+    rig.run(0.5)
+    for stop in stops:
+        if stop in ("SL", "SS"):
+            rig.stop(stop)
+        else:
+            rig.say(stop)
+    assert rig.run(60.0) == []
+    assert rig.moving
+    assert rig.server.blocked
+
+
+@pytest.mark.parametrize("text", ["RM 30", "R"])
+def test_the_start_timeout_is_dead_without_an_imu(text: str) -> None:
+    """A motor that is stuck is not noticed either."""
+    rig = Rig(imu_dies_s=0.0, stuck="both")
+    assert rig.ask(text) is None
+    assert rig.server.chassis.powered
+
+
+def test_the_obstacle_check_is_dead_without_an_imu() -> None:
+    """It drives into the wall."""
+    rig = Rig(imu_dies_s=0.0, front_m=50 * INCH_M)
+    rig.ask("RM 30")
+    assert rig.server.hit_wall
+
+
+def test_rm_that_was_started_without_an_imu_is_answered_when_it_comes_back() -> None:
+    """And what was said after it is done then."""
+    rig = Rig(imu_dies_s=0.0, imu_returns_s=30.0)
+    rig.say("RM 30", "SRM")
+    assert rig.run(29.0) == []
+    assert rig.run(5.0) == ["ok", "ok"]
+    assert not rig.moving
+
+
+def test_an_imu_lost_during_rm_freezes_rmra_and_it_drives_through_obstacles() -> None:
+    """SRM stops the motors, but is not answered."""
+    rig = Rig(imu_dies_s=1.0, front_m=60 * INCH_M)
+    rig.drive("RM 30")
+    rig.ask("RMCS 4 -4")
+    frozen = rig.number("RMRA")
+    rig.run(1.0)
+    assert rig.number("RMRA") == frozen
+    rig.run(10.0)
+    assert rig.number("RMRA") == frozen
+    assert rig.server.hit_wall
+    assert rig.moving
+    assert rig.ask("SRM") is None
+    assert not rig.moving
+    assert rig.server.blocked
+    assert rig.ask("HELLO") is None
+
+
+def test_while_it_lives_rmra_changes_all_the_time_of_a_drive() -> None:
+    """So that one that does not change tells of a dead IMU."""
+    for seed in range(8):
+        rig = Rig(seed=seed)
+        rig.drive("RM 30", 0.0)
+        seen = [rig.number("RMRA") for _ in range(100) if rig.run(0.095) == []]
+        assert all(len(set(seen[at : at + 5])) > 1 for at in range(95))
+
+
+@pytest.mark.parametrize(("imu_dies_s", "answer"), [(float("inf"), "ok"), (0.0, LOST)])
+def test_mcr_slow_0_proves_in_half_a_second_whether_it_lives(
+    imu_dies_s: float, answer: str
+) -> None:
+    """Without moving."""
+    rig = Rig(imu_dies_s=imu_dies_s)
+    assert rig.ask("MCR SLOW 0") == answer
+    assert rig.took_s == pytest.approx(0.5, abs=0.05)
+    assert rig.server.chassis.way_m == rig.yaw_deg == 0.0
+
+
+def test_rst_imu_proves_it_in_0_13_s() -> None:
+    """It is refused while the robot moves."""
+    rig = Rig()
+    assert rig.ask("RST IMU") == "ok"
+    rig.server.imu.alive = False
+    assert rig.ask("RST IMU") == "fail could not init"
+    assert rig.took_s == pytest.approx(0.13, abs=0.01)
+    rig.server.imu.alive = True
+    assert rig.ask("RST IMU") == "ok"
+    rig.drive("R")
+    assert rig.ask("RST IMU") == "fail conflicting action in progress"
+
+
+def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -> None:
+    """Even if it would answer."""
+    for cure in ("RST IMU", "SB"):
+        rig = Rig()
+        rig.server.imu.alive = False
+        assert rig.ask("RST IMU") == "fail could not init"
+        assert rig.ask("SB") == "fail"
+        rig.server.imu.alive = True
+        assert rig.ask("MCR SLOW 0") == LOST
+        assert rig.ask(cure) == "ok"
+        assert rig.ask("MCR SLOW 0") == "ok"
+
+
+def test_mcr_fails_in_half_a_second_if_it_is_dead() -> None:
+    """And the motors stop."""
+    rig = Rig(imu_dies_s=0.0)
+    assert rig.ask("MCR 90") == LOST
+    assert rig.took_s == pytest.approx(0.5, abs=0.05)
+    rig.run(1.0)
+    assert not rig.moving
+
+
+@pytest.mark.parametrize("text", ["TF 200", "TB 200", "MCR 1000", "MCL 1000"])
+def test_a_loss_within_a_controlled_move_fails_after_1_5_s(text: str) -> None:
+    """Until then it goes on."""
+    rig = Rig(imu_dies_s=2.0)
+    assert rig.ask(text) == LOST
+    assert rig.took_s == pytest.approx(3.5, abs=0.05)
+    rig.run(1.0)
+    assert not rig.moving
+
+
+@pytest.mark.parametrize("start", ["F", "R"])
+def test_an_imu_lost_in_f_or_r_stops_by_sm_but_without_an_answer(start: str) -> None:
+    """Which comes when the IMU does."""
+    rig = Rig(imu_dies_s=1.0, imu_returns_s=40.0)
+    rig.drive(start, 2.0)
+    assert rig.ask("SM") is None
+    assert not rig.moving
+    rig.run(30.0)
+    assert [data.split()[0] for _, data in rig.replies[-1:]] == [b"ok"]
+
+
+def test_the_bias_drifts_until_sb_finds_it() -> None:
+    """In 0.53 s."""
+    rig = Rig(gyro_bias_dps=0.5)
+    rig.run(100.0)
+    assert rig.number("RMRA") == pytest.approx(50.0, abs=1.0)
+    assert rig.ask("SB") == "ok"
+    assert rig.took_s == pytest.approx(0.53, abs=0.01)
+    before = rig.number("RMRA")
+    rig.run(100.0)
+    assert rig.number("RMRA") == before

@@ -1,0 +1,263 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Each way in which the public server departs from its manual: seen with it, unseen without."""
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+
+import pytest
+from mart_rig import INCH_M, Rig
+
+from omnibot_driver.simulator.mart import COMMAND, DOCUMENTED, FIRMWARE, SOURCE, Kind, Quirks
+
+CONFLICT = "fail conflicting action in progress"
+IN_SOURCE_ALONE = ("heading_in_reference_moves_only", "probe_turns", "heading_starts_off")
+
+
+def stop_port_keeps_motion(quirks: Quirks) -> bool:
+    """SL alone: a conflict with everything; then SM: silence for good."""
+    rig = Rig(quirks)
+    rig.drive("F")
+    rig.stop("SL")
+    rig.run(2.0)
+    assert not rig.moving
+    conflict = rig.ask("R SLOW") == CONFLICT
+    if not conflict:
+        return False
+    rig.say("SM")
+    return rig.wait() is None and rig.server.hung
+
+
+def spin_stop_ends_drives(quirks: Quirks) -> bool:
+    """SS stops F."""
+    rig = Rig(quirks)
+    rig.drive("F")
+    rig.stop("SS")
+    rig.run(1.0)
+    return not rig.moving
+
+
+def early_stop_is_ignored(quirks: Quirks) -> bool:
+    """SL 0.1 s after F, before its ok."""
+    rig = Rig(quirks)
+    rig.say("F")
+    rig.run(0.1)
+    rig.stop("SL")
+    return rig.wait() == "ok" and rig.run(3.0) == [] and rig.moving
+
+
+def left_spin_in_reference_move(quirks: Quirks) -> bool:
+    """It spins, and is silent."""
+    rig = Rig(quirks)
+    rig.drive("RM 30")
+    if rig.ask("L") == CONFLICT:
+        return False
+    chassis = rig.server.chassis
+    return rig.server.hung and chassis.right_mps > 0 > chassis.left_mps
+
+
+def moves_wait_for_imu(quirks: Quirks) -> bool:
+    """F is never answered, and starts when the IMU is back."""
+    rig = Rig(quirks, imu_dies_s=0.0, imu_returns_s=60.0)
+    rig.say("F")
+    answer = rig.wait(59.0)
+    assert rig.server.chassis.way_m == 0.0
+    return answer is None and rig.wait(5.0) == "ok" and rig.moving
+
+
+def drives_trust_imu(quirks: Quirks) -> bool:
+    """RM moves without one, and is not answered."""
+    rig = Rig(quirks, imu_dies_s=0.0)
+    silent = rig.ask("RM 30") is None
+    return silent and rig.moving
+
+
+def reference_speed_wraps(quirks: Quirks) -> bool:
+    """RM -20 is obeyed, backward."""
+    rig = Rig(quirks)
+    return rig.ask("RM -20") == "ok" and rig.server.chassis.right_mps < 0
+
+
+def stuck_motor_hangs_reference_move(quirks: Quirks) -> bool:
+    """The wheel does not turn."""
+    rig = Rig(quirks, stuck="both")
+    return rig.ask("RM 30") is None and rig.server.hung
+
+
+def speed_word_first(quirks: Quirks) -> bool:
+    """TF 24 SLOW is as fast as TF 24."""
+    rig, normal = Rig(quirks), Rig(quirks)
+    rig.ask("TF 24 SLOW")
+    normal.ask("TF 24")
+    return rig.took_s == normal.took_s
+
+
+def zero_distance_is_unlimited(quirks: Quirks) -> bool:
+    """TF 0 drives on."""
+    rig = Rig(quirks)
+    return rig.ask("TF 0", 60.0) is None and rig.moving
+
+
+def echoes_distance(quirks: Quirks) -> bool:
+    """12 inches are told, 16 were driven."""
+    rig = Rig(quirks)
+    answer = rig.ask("TF 12")
+    assert round(rig.x_in) == 16
+    return answer == "ok 12"
+
+
+def crashes_on_missing_numbers(quirks: Quirks) -> bool:
+    """TIME with five of them."""
+    rig = Rig(quirks)
+    return rig.ask("TIME 7 4 2024 12 30") is None and bool(rig.server.crashed)
+
+
+def empty_datagram_ends(quirks: Quirks) -> bool:
+    """Nothing is answered afterwards."""
+    rig = Rig(quirks)
+    rig.say("")
+    return rig.ask("HELLO") is None
+
+
+def exit_is_silent(quirks: Quirks) -> bool:
+    """Without LOG before."""
+    return Rig(quirks).ask("EXIT") is None
+
+
+def log_deletes_files(quirks: Quirks) -> bool:
+    """The name is known, the file is away."""
+    rig = Rig(quirks)
+    rig.ask("MCR SLOW 20")
+    rig.ask("LOG")
+    rig.say("LAST TURN")
+    return rig.run(0.1) == ["fail"]
+
+
+def unknown_reset_repeats(quirks: Quirks) -> bool:
+    """It answers with the voltage."""
+    rig = Rig(quirks)
+    rig.ask("VOLTS")
+    return rig.ask("RST x") == "ok 24.00"
+
+
+def clock_moves_heading(quirks: Quirks) -> bool:
+    """An hour that passes at once while the robot turns."""
+    rig = Rig(quirks)
+    rig.ask("TIME 1 1 2024 0 0 0")
+    rig.drive("RM 30")
+    rig.ask("RMCS 5 -5")
+    rig.run(1.0)
+    rig.ask("TIME 1 1 2024 1 0 0")
+    return abs(rig.number("RMRA")) > 1000.0
+
+
+def undocumented_commands(quirks: Quirks) -> bool:
+    """TFSFC, for one."""
+    return Rig(quirks).ask("TFSFC 30") == "ok"
+
+
+def heading_in_reference_moves_only(quirks: Quirks) -> bool:
+    """A spin does not move it."""
+    rig = Rig(quirks)
+    rig.drive("R")
+    return rig.number("RMRA") == 0.0
+
+
+def probe_turns(quirks: Quirks) -> bool:
+    """MCR SLOW 0 with a dead IMU."""
+    rig = Rig(quirks, imu_dies_s=0.0)
+    assert rig.ask("MCR SLOW 0") == "fail MPU6050 connection lost"
+    assert rig.took_s == pytest.approx(0.5, abs=0.05)
+    return abs(rig.yaw_deg) > 5.0
+
+
+def heading_starts_off(quirks: Quirks) -> bool:
+    """The second RM, after a long time."""
+    rig = Rig(quirks)
+    for _ in range(2):
+        rig.drive("RM 30", 0.0)
+        first = rig.number("RMRA")
+        rig.ask("SRM")
+        rig.run(1000.0)
+    return abs(first) > 5.0
+
+
+SEEN: dict[str, Callable[[Quirks], bool]] = {
+    name: found
+    for name, found in globals().items()
+    if name in {field.name for field in fields(Quirks)}
+}
+
+
+def test_every_quirk_has_its_sight() -> None:
+    """None is forgotten here."""
+    assert set(SEEN) == {field.name for field in fields(Quirks)}
+
+
+@pytest.mark.parametrize("name", SEEN)
+def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
+    """All the others being there."""
+    assert SEEN[name](replace(FIRMWARE, **{name: True}))
+    assert not SEEN[name](replace(FIRMWARE, **{name: False}))
+
+
+@pytest.mark.parametrize("name", SEEN)
+def test_a_quirk_is_unseen_on_a_server_as_documented(name: str) -> None:
+    """All the others being away as well."""
+    assert not SEEN[name](DOCUMENTED)
+
+
+@pytest.mark.parametrize("name", IN_SOURCE_ALONE)
+def test_what_only_the_source_says_is_played_only_if_it_is_asked_for(name: str) -> None:
+    """Both readings of the server can be chosen."""
+    assert SEEN[name](SOURCE)
+    assert not SEEN[name](FIRMWARE)
+
+
+def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
+    """SS does nothing to F, and SM ends it as if nothing had been said."""
+    rig = Rig(SOURCE)
+    rig.drive("F")
+    rig.stop("SS")
+    rig.run(1.0)
+    assert rig.moving
+    assert rig.ask("SM") == "ok"
+
+
+@pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
+def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
+    """And goes on."""
+    rig = Rig(replace(FIRMWARE, crashes_on_missing_numbers=False))
+    if text == "CS 5":
+        rig.drive("F")
+    assert rig.ask(text) == "fail improper command format"
+    assert rig.ask("HELLO") == "ok BBB"
+
+
+def test_a_documented_server_stops_at_a_wall_and_when_its_imu_dies() -> None:
+    """None of its motions is blind."""
+    for start in ("F", "RM 30", "R"):
+        rig = Rig(DOCUMENTED, imu_dies_s=1.0, front_m=200 * INCH_M)
+        rig.drive(start, 5.0)
+        assert not rig.moving
+        assert rig.ask("SRM" if start == "RM 30" else "SM") == "fail MPU6050 connection lost"
+
+
+def test_a_documented_move_is_cancelled_at_any_time() -> None:
+    """And is answered then."""
+    for start, stop in (("TF 100", "SL"), ("TB 100", "SL"), ("MCR 170", "SS"), ("MCL 170", "SS")):
+        for after_s in (0.02, 0.12, 1.0):
+            rig = Rig(DOCUMENTED)
+            rig.say(start)
+            rig.run(after_s)
+            rig.stop(stop)
+            assert rig.wait(1.0) is not None
+            rig.run(1.0)
+            assert not rig.moving
+            assert rig.in_progress is None
+            assert rig.server.motions[Kind.CONTROLLED_LINEAR].posts == 0
+
+
+def test_the_ports_are_numbered_as_they_stand() -> None:
+    """The command port is the first."""
+    assert COMMAND == 0

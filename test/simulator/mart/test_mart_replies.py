@@ -1,0 +1,291 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the public server understands, and what it answers when nothing moves."""
+
+import pytest
+from mart_rig import INCH_M, Rig
+
+from omnibot_driver.simulator.mart import COMMAND
+
+NOT_SUPPORTED = "fail command not supported"
+
+
+@pytest.mark.parametrize(
+    ("text", "answer", "seconds"),
+    [
+        ("HELLO", "ok BBB", 0.001),
+        ("VOLTS", "ok 24.00", 0.001),
+        ("MCSTAT", "ok 0", 0.005),
+        ("ENC", "ok 0", 0.005),
+        ("SFC", "ok -1", 0.055),
+        ("SRC", "ok -1", 0.055),
+        ("DOCKED", "ok false", 0.001),
+        ("RMRA", "ok 0.00", 0.001),
+        ("TD", "ok 0", 0.001),
+        ("SB", "ok", 0.53),
+        ("LOG", "ok", 0.001),
+        ("LAST MOVE", "fail no file available", 0.001),
+        ("LAST TURN", "fail no file available", 0.001),
+        ("SM", "fail no motion", 0.001),
+        ("SRM", "fail no motion in progress", 0.001),
+        ("RMCS 1 1", "fail no motion in progress", 0.001),
+        ("CS 1 1", "fail", 0.001),
+        ("TIME 7 4 2024 12 30 15", "ok", 0.001),
+    ],
+)
+def test_a_question_is_answered_in_its_time(text: str, answer: str, seconds: float) -> None:
+    """Of a robot that stands."""
+    rig = Rig(gyro_bias_dps=0.0)
+    assert rig.ask(text) == answer
+    assert rig.took_s == pytest.approx(seconds, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *(
+            "HELLO\n",
+            "hello",
+            "HELLO ",
+            "sm",
+            "volts",
+            "F FASTER",
+            "B 3",
+            "R FAST",
+            "L FAST",
+            "FOO",
+        ),
+        *(
+            "X",
+            "RM",
+            "RMCS",
+            "CS",
+            "TIME",
+            "LOGS",
+            "RST",
+            "EXI",
+            "SMX",
+            "LAST",
+            " HELLO",
+            "SL",
+            "SS",
+        ),
+    ],
+)
+def test_what_is_not_a_command_is_refused(text: str) -> None:
+    """Capital letters, no line feed."""
+    rig = Rig()
+    assert rig.ask(text) == NOT_SUPPORTED
+    assert not rig.moving
+
+
+@pytest.mark.parametrize("text", ["RMCS 5", "RMCS x"])
+def test_rmcs_with_one_number_is_refused(text: str) -> None:
+    """It is the one that looks."""
+    rig = Rig()
+    rig.drive("RM 30")
+    assert rig.ask(text) == "fail improper command format"
+
+
+def test_only_49_bytes_are_taken_of_a_request() -> None:
+    """The rest is not read."""
+    rig = Rig()
+    assert rig.ask("TIME 7 4 2024 12 30 0" + " " * 40 + "7") == "ok"
+    assert rig.ask("HELLO" + "\0" * 60) == "ok BBB"
+    assert rig.ask("HELLO" + "x" * 60) == NOT_SUPPORTED
+
+
+@pytest.mark.parametrize(
+    ("text", "start"),
+    [
+        ("TIME 7 4 2024 12 30", None),
+        ("TIME 7", None),
+        ("CS 5", "F"),
+        ("CS x", "F"),
+        ("SFR", None),
+        ("SRR", None),
+        ("MCS 100", None),
+    ],
+)
+def test_a_command_with_fewer_numbers_crashes_the_server(text: str, start: str | None) -> None:
+    """Nothing answers afterwards, and nothing stops the motors."""
+    rig = Rig()
+    if start:
+        rig.drive(start)
+    assert rig.ask(text) is None
+    assert rig.server.crashed
+    assert rig.ask("HELLO") is None
+    rig.stop("SL")
+    rig.run(5.0)
+    assert rig.moving is bool(start)
+
+
+def test_cs_with_one_number_does_no_harm_while_still() -> None:
+    """It is refused before it is read."""
+    assert Rig().ask("CS 5") == "fail"
+
+
+def test_an_empty_datagram_ends_the_server() -> None:
+    """On the command port."""
+    rig = Rig()
+    rig.stop("")
+    assert rig.ask("HELLO") == "ok BBB"
+    rig.drive("RM 30")
+    rig.say("")
+    assert rig.server.crashed
+    assert rig.ask("HELLO") is None
+    assert rig.moving
+
+
+def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
+    """It knows of no motion; a power cycle stops it."""
+    rig = Rig()
+    rig.drive("RM 30")
+    rig.say("")
+    rig.server.restart()
+    assert rig.ask("HELLO") == "ok BBB"
+    assert rig.ask("SRM") == "fail no motion in progress"
+    assert rig.moving
+    rig.server.power_cycle(boot_s=2.0)
+    assert not rig.moving
+    rig.run(1.0)
+    assert rig.ask("HELLO", 5.0) is None
+    assert rig.ask("HELLO") == "ok BBB"
+
+
+@pytest.mark.parametrize(
+    ("inches", "seen"), [(100.7, 100), (254.5, 254), (255.5, -1), (300, -1), (0.5, -1)]
+)
+def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen: int) -> None:
+    """Both of them."""
+    rig = Rig(front_m=inches * INCH_M, rear_m=inches * INCH_M)
+    assert rig.number("SFC") == seen
+    assert rig.number("SRC") == seen
+
+
+def test_sonars_turn_with_the_robot() -> None:
+    """After half a turn each sees what the other did."""
+    rig = Rig(front_m=100 * INCH_M, rear_m=40 * INCH_M)
+    rig.ask("MCL 174")
+    assert rig.yaw_deg == pytest.approx(178, abs=5)
+    assert rig.number("SFC") == pytest.approx(40, abs=2)
+    assert rig.number("SRC") == pytest.approx(100, abs=2)
+
+
+@pytest.mark.parametrize(
+    ("changes", "bits"),
+    [
+        ({"volts": 31.0}, 64),
+        ({"volts": 15.0}, 128),
+        ({"motor_status": 4}, 4),
+        ({"motor_status": 8 | 32, "volts": 15.0}, 168),
+    ],
+)
+def test_mcstat_tells_by_bits_what_is_wrong_with_the_motor_board(
+    changes: dict[str, float], bits: int
+) -> None:
+    """4, 8: tripped; 16, 32: short; 64: above 30 V; 128: below 16 V."""
+    rig = Rig()
+    rig.server.chassis.change(**changes)  # type: ignore[arg-type]
+    assert rig.number("MCSTAT") == bits
+
+
+def test_a_motor_that_tripped_does_not_turn() -> None:
+    """The other one does."""
+    rig = Rig(motor_status=8)
+    rig.drive("RM 30")
+    assert rig.server.chassis.left_mps == 0.0 < rig.server.chassis.right_mps
+
+
+def test_a_silent_motor_board_fails_enc_after_0_2_s_and_mcstat_tells_255() -> None:
+    """It obeys nothing either."""
+    rig = Rig(motor_board_silent=True)
+    assert rig.ask("ENC") == "fail"
+    assert rig.took_s == pytest.approx(0.2)
+    assert rig.ask("MCSTAT") == "ok 255"
+    assert rig.took_s == pytest.approx(0.2)
+    assert rig.ask("F") == "fail start timedout"
+    assert rig.server.chassis.way_m == 0.0
+
+
+def test_an_unknown_reset_repeats_the_previous_reply() -> None:
+    """RST MC is known."""
+    rig = Rig()
+    assert rig.ask("RST MC") == "ok"
+    assert rig.ask("HELLO") == rig.ask("RST x") == rig.ask("RST imu") == "ok BBB"
+
+
+@pytest.mark.parametrize(
+    ("text", "answer"),
+    [
+        ("TFSFC 30", "ok"),
+        ("MNLV", "fail"),
+        ("MD", "ok 0"),
+        ("MCD", "ok 0"),
+        ("MSM", "ok"),
+        ("MFC 30", "ok"),
+        ("SLMP 5 40", "ok"),
+        ("SLMP 5", "fail command missng parameter"),
+        ("SLPP 1 2 3", "ok"),
+        ("SSP 5 40", "ok"),
+        ("SSP 5", "fail command missing parameter"),
+        ("SFR 1", "ok"),
+        ("SRR 1", "ok"),
+        ("SSR", "ok"),
+        ("SMCST", "ok"),
+        ("STPMCST", "ok"),
+        ("LAST IMU RCD", "fail no file available"),
+    ],
+)
+def test_undocumented_commands_are_known(text: str, answer: str) -> None:
+    """And do no harm."""
+    rig = Rig()
+    assert rig.ask(text) == answer
+    assert not rig.server.chassis.powered
+
+
+def test_a_record_refuses_motions_until_it_is_stopped() -> None:
+    """REC START, REC STOP."""
+    rig = Rig()
+    assert rig.ask("REC START") == "ok"
+    assert rig.ask("F") == "fail conflicting action in progress"
+    assert rig.ask("REC STOP") == "ok"
+    assert rig.ask("F") == "ok"
+
+
+def test_parameters_that_are_set_change_the_next_f_and_r_custom() -> None:
+    """SLMP holds until SM."""
+    rig = Rig()
+    rig.ask("SLMP 5 50")
+    rig.drive("F")
+    assert rig.server.chassis.right == 78
+    rig.ask("SM")
+    rig.drive("F")
+    assert rig.server.chassis.right == 98
+    rig.ask("SM")
+    rig.ask("SSP 5 40")
+    rig.drive("R CUSTOM")
+    assert rig.server.chassis.right == 168
+
+
+def test_a_reply_goes_to_the_sender_of_its_request() -> None:
+    """Also when another one has asked meanwhile."""
+    rig = Rig()
+    rig.server.receive(b"SFC", COMMAND, "one", 0.0)
+    rig.server.receive(b"VOLTS", COMMAND, "other", 0.01)
+    replies = rig.server.advance(1.0)
+    assert [(reply.sender, reply.data) for reply in replies] == [
+        ("one", b"ok -1"),
+        ("other", b"ok 24.00"),
+    ]
+
+
+def test_time_sets_the_clock_in_utc_and_ignores_seconds() -> None:
+    """Files are named and dated by it."""
+    rig = Rig()
+    rig.ask("TIME 7 4 2024 12 30 59")
+    assert rig.server.clock_s == pytest.approx(1_720_096_200, abs=0.01)
+    rig.ask("MCR SLOW 0")
+    rig.say("LAST TURN")
+    assert rig.run(0.1)[0].startswith("ok MCSpinSensorData1720096200.csv ")
+    assert rig.server.date.startswith("07/04/2024  12:30:0")
