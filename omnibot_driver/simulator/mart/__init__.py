@@ -10,7 +10,7 @@ same for ports, ``sim://`` and bad networks.
 from omnibot_driver.simulator.mart.board import CHANNELS, SimulatedMart
 from omnibot_driver.simulator.mart.motion import Kind
 from omnibot_driver.simulator.mart.options import add_options, from_arguments
-from omnibot_driver.simulator.mart.server import COMMAND, STOP, MartServer, Reply
+from omnibot_driver.simulator.mart.server import MartServer, Reply
 from omnibot_driver.simulator.mart.settings import (
     DOCUMENTED,
     FIRMWARE,
@@ -20,6 +20,7 @@ from omnibot_driver.simulator.mart.settings import (
     MartSettings,
     Quirks,
 )
+from omnibot_driver.simulator.mart.state import COMMAND, STOP
 
 TITLE = "MART motion controller"
 

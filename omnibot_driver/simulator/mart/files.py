@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from omnibot_driver.simulator.mart.motion import Kind, Motion
 
 if TYPE_CHECKING:
-    from omnibot_driver.simulator.mart.server import MartServer
+    from omnibot_driver.simulator.mart.state import ServerState
 
 ROWS = 2000
 SPINS = (Kind.SPIN, Kind.CONTROLLED_SPIN)
@@ -47,7 +47,7 @@ class FileNote:
         return ("\r\n".join(lines) + "\r\n").encode("latin-1")
 
 
-def note_of(server: "MartServer", motion: Motion) -> FileNote:
+def note_of(server: "ServerState", motion: Motion) -> FileNote:
     """The file of a motion that is over."""
     head = (
         server.date,

@@ -12,12 +12,12 @@ from omnibot_driver.simulator.mart import motion as motions
 from omnibot_driver.simulator.mart.alarms import change_speed
 from omnibot_driver.simulator.mart.files import note_of
 from omnibot_driver.simulator.mart.motion import Kind, Motion
+from omnibot_driver.simulator.mart.state import COMMAND
 from omnibot_driver.simulator.mart.stop_port import end_motion
 
 if TYPE_CHECKING:
     from omnibot_driver.simulator.mart.server import MartServer
 
-COMMAND = 0
 BIAS_SAMPLES = 10
 PATIENCE_SAMPLES = 50
 PROBE_S = 0.5
@@ -144,6 +144,7 @@ def start_controlled_spin(server: "MartServer", angle_deg: int, word: str, *, le
     motion.running = True
     server.starting = Kind.CONTROLLED_SPIN
     if angle_deg <= 0 and not server.quirks.probe_turns:
+        server.chassis.reset_encoders()
         server.later(PROBE_S, _probed)
     else:
         server.later(WRITES_S, _go_spin, Kind.CONTROLLED_SPIN, left)

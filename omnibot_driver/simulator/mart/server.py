@@ -7,30 +7,21 @@ goes from event to event, so a robot that stands costs nothing. Must not know so
 nor which commands there are.
 """
 
-import time
 from collections import deque
-from collections.abc import Callable
 from math import inf
 from typing import Any, NamedTuple
 
 from omnibot_driver.simulator.mart import alarms, commands, moves, stop_port, wire
-from omnibot_driver.simulator.mart.chassis import STEP_S, Chassis, sight_m
-from omnibot_driver.simulator.mart.files import FileNote
-from omnibot_driver.simulator.mart.imu import Imu
-from omnibot_driver.simulator.mart.motion import INCHES_PER_M, Kind, Motion
+from omnibot_driver.simulator.mart.chassis import STEP_S
+from omnibot_driver.simulator.mart.motion import Kind
 from omnibot_driver.simulator.mart.settings import MartSettings
+from omnibot_driver.simulator.mart.state import COMMAND, STOP, ServerState, Then, Waiter
 
-COMMAND, STOP = 0, 1
-"""The ports, by their place."""
 QUEUE_LENGTH, REMEMBERED, LOG_LINES = 256, 10_000, 10_000
-SONAR_SETTLES_S = 0.165
-"""Three readings confirm that something is near."""
-FARTHEST_IN = 254
 QUICK_S = 0.0005
 UNCONTROLLED = (Kind.LINEAR, Kind.REFERENCE, Kind.SPIN)
 
 Sender = object
-Then = Callable[..., None]
 
 
 class Reply(NamedTuple):
@@ -48,56 +39,27 @@ class _Later(NamedTuple):
     args: tuple[Any, ...]
 
 
-class _Waiter(NamedTuple):
-    port: int
-    kind: Kind
-    then: Then | None
-    args: tuple[Any, ...]
+class MartServer(ServerState):
+    """The controller with its robot: ``receive`` and ``advance``; what is known of it: ServerState.
 
-
-class MartServer:
-    """The controller with its robot. ``now_s``: simulated time, since construction.
-
-    crashed: why the server is not there any more; empty while it runs. hung: the command port will
-    not answer again, whatever happens. stop_port_hung: the stop port hears nothing any more.
     blocked: the command port waits for samples of the IMU. received: all that came to either port,
-    with its time. motions: what the server knows of each kind. executed: commands begun, in order.
+    with its time. executed: commands begun, in order.
     """
 
     def __init__(self, settings: MartSettings | None = None) -> None:
-        self.settings = settings = MartSettings() if settings is None else settings
-        self.quirks = settings.quirks
-        self.now_s = 0.0
-        self.chassis = Chassis(settings)
-        self.imu = Imu(settings)
-        self.front_m, self.rear_m, self.dock_m = settings.front_m, settings.rear_m, settings.dock_m
-        self.clock_offset_s = float(settings.clock_s)
-        self.hit_wall = False
+        super().__init__(MartSettings() if settings is None else settings)
         self.received: deque[tuple[float, int, bytes]] = deque(maxlen=REMEMBERED)
         self.executed: deque[str] = deque(maxlen=REMEMBERED)
         self._out: list[Reply] = []
         self._step_at_s = inf
         self._boots_until_s = -inf
-        self.files: dict[str, FileNote] = {}
-        self._begin()
+        self.begin()
 
-    def _begin(self) -> None:
-        self.crashed = ""
-        self.motions = [Motion(kind) for kind in Kind]
-        self.alarm: Kind | None = None
-        self.starting: Kind | None = None
-        self.manual = self.recording = False
-        self.custom: dict[str, tuple[int, int]] = {}
-        self.last_reply = ""
-        self.last_files: dict[str, str] = {}
-        self.log: list[str] | None = None
-        self.log_name = ""
-        self.sampling_since_s = -1.0
-        self._reference_clock_s: float | None = None
-        self._busy = False
+    def begin(self) -> None:
+        """The program starts: it knows nothing."""
+        super().begin()
         self._sender: Sender = None
         self._later: _Later | None = None
-        self._waiters: list[_Waiter] = []
         self._queue: deque[tuple[bytes, Sender]] = deque()
         self._stop_queue: deque[bytes] = deque()
 
@@ -144,13 +106,13 @@ class MartServer:
         new.files, new.last_files = {**self.files}, {**self.last_files}
         new.custom = {**self.custom}
         new.log = None if self.log is None else [*self.log]
-        new._out, new._waiters = [*self._out], [*self._waiters]
+        new._out, new.waiters = [*self._out], [*self.waiters]
         new._queue, new._stop_queue = self._queue.copy(), self._stop_queue.copy()
         return new
 
     def restart(self, boot_s: float = 0.0) -> None:
         """Start the server again; the motors keep what they were told last."""
-        self._begin()
+        self.begin()
         self.imu.restart()
         self._boots_until_s = self.now_s + boot_s
 
@@ -160,20 +122,6 @@ class MartServer:
         self.restart(boot_s)
 
     @property
-    def hung(self) -> bool:
-        """Whether the command port is silent for good, although the server runs."""
-        return any(
-            waiter.port == COMMAND and waiter.kind is not self.alarm for waiter in self._waiters
-        )
-
-    @property
-    def stop_port_hung(self) -> bool:
-        """The same of the stop port."""
-        return any(
-            waiter.port == STOP and waiter.kind is not self.alarm for waiter in self._waiters
-        )
-
-    @property
     def blocked(self) -> bool:
         """Whether the command port answers only when the IMU lives again."""
         if self.imu.living(self.now_s) or self.crashed:
@@ -181,50 +129,10 @@ class MartServer:
         later = self._later
         return (later is not None and later.then is moves.take_bias) or any(
             waiter.port == COMMAND and waiter.kind is self.alarm and waiter.kind in UNCONTROLLED
-            for waiter in self._waiters
+            for waiter in self.waiters
         )
 
-    @property
-    def busy(self) -> bool:
-        """Whether a command is being executed."""
-        return self._busy
-
-    @property
-    def moving(self) -> bool:
-        """Whether the robot truly moves, or its motors are told to."""
-        return self.chassis.moving or self.chassis.powered
-
-    @property
-    def motion(self) -> Kind | None:
-        """The motion that is in progress as the server sees it."""
-        return next((each.kind for each in self.motions if each.running), self.starting)
-
     # For commands and motions
-
-    @property
-    def clock_s(self) -> float:
-        """Of the wall, in Unix time."""
-        return self.now_s + self.clock_offset_s
-
-    @property
-    def date(self) -> str:
-        """The same, as files begin."""
-        return time.strftime("%m/%d/%Y  %H:%M:%S", time.gmtime(self.clock_s))
-
-    @property
-    def docked(self) -> bool:
-        """Whether the robot stands at its dock."""
-        return self.chassis.x_m >= self.dock_m
-
-    @property
-    def driven_m(self) -> float:
-        """By the right wheel since the encoder was reset."""
-        return self.chassis.counts * self.settings.metres_per_count
-
-    @property
-    def conflict(self) -> bool:
-        """Whether something is in progress that refuses other motions."""
-        return self.manual or self.recording or any(each.running for each in self.motions)
 
     def drive(self, right: int, left: int) -> None:
         """Write the motors' registers."""
@@ -249,13 +157,13 @@ class MartServer:
             if then is not None:
                 then(self, *args)
         else:
-            self._waiters.append(_Waiter(port, kind, then, args))
+            self.waiters.append(Waiter(port, kind, then, args))
 
     def post(self, kind: Kind) -> None:
         """Notify who waits for this kind of motion, or will."""
-        for waiter in self._waiters:
+        for waiter in self.waiters:
             if waiter.kind is kind:
-                self._waiters.remove(waiter)
+                self.waiters.remove(waiter)
                 if waiter.then is not None:
                     waiter.then(self, *waiter.args)
                 if waiter.port == STOP:
@@ -277,14 +185,14 @@ class MartServer:
 
     def done(self) -> None:
         """The command is over."""
-        self._busy = False
+        self.busy = False
         self._next()
 
     def abort(self, text: str) -> None:
         """Give up the motion that is being started."""
         kind, self.starting = self.starting, None
         self._later = None
-        self._waiters = [waiter for waiter in self._waiters if waiter.port != COMMAND]
+        self.waiters = [waiter for waiter in self.waiters if waiter.port != COMMAND]
         self.alarm = None
         if kind is not None:
             alarms.stop_motors(self, self.motions[kind])
@@ -295,40 +203,10 @@ class MartServer:
         """The server is not there any more. Nothing stops the motors."""
         self.crashed = why
         self.alarm = self.starting = self._later = None
-        self._busy = False
-        self._waiters.clear()
+        self.busy = False
+        self.waiters.clear()
         self._queue.clear()
         self._stop_queue.clear()
-
-    def save(self, note: FileNote) -> None:
-        """Keep a file, as the last of its kind."""
-        self.files[note.name] = note
-        self.last_files["TURN" if note.is_turn else "MOVE"] = note.name
-
-    def sonar_in(self, *, backward: bool) -> int:
-        """What a sonar tells, in inches; -1 where it sees nothing."""
-        seen_m = sight_m(self.chassis, self.front_m, self.rear_m, backward=backward)
-        inches = seen_m * INCHES_PER_M
-        return int(inches) if 1.0 <= inches < FARTHEST_IN + 1 else -1
-
-    def clearance_in(self, *, backward: bool) -> int:
-        """What the sonar that is sampled in a motion told last."""
-        since_s = self.sampling_since_s
-        if since_s < 0.0 or self.now_s - since_s < SONAR_SETTLES_S:
-            return -1
-        return self.sonar_in(backward=backward)
-
-    @property
-    def heading_integrates(self) -> bool:
-        """Whether turning changes the relative heading now."""
-        return self.alarm is Kind.REFERENCE or not self.quirks.heading_in_reference_moves_only
-
-    def sample_reference(self, *, first: bool) -> None:
-        """A sample of RM; by its source, the first counts the time since the one before."""
-        clock_s, before_s = self.clock_s, self._reference_clock_s
-        self._reference_clock_s = clock_s
-        if first and before_s is not None and self.quirks.heading_starts_off:
-            self.imu.heading_deg += self.imu.rate_dps / 2 * (clock_s - before_s)
 
     def zero_heading(self) -> None:
         """RM begins."""
@@ -383,10 +261,10 @@ class MartServer:
     # The two threads
 
     def _next(self) -> None:
-        while self._queue and not self._busy and not self.crashed:
+        while self._queue and not self.busy and not self.crashed:
             datagram, self._sender = self._queue.popleft()
             text = wire.text_of(datagram)
-            self._busy = True
+            self.busy = True
             self.executed.append(text)
             if self.log is not None and len(self.log) < LOG_LINES:
                 self.log.append(f"{self.date} {text}")
@@ -395,5 +273,5 @@ class MartServer:
                 self.later(QUICK_S, MartServer.answer, answer)
 
     def _hear_stops(self) -> None:
-        while self._stop_queue and not any(waiter.port == STOP for waiter in self._waiters):
+        while self._stop_queue and not any(waiter.port == STOP for waiter in self.waiters):
             stop_port.obey(self, wire.text_of(self._stop_queue.popleft()))

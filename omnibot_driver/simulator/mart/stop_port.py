@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from omnibot_driver.simulator.mart import wire
 from omnibot_driver.simulator.mart.alarms import stop_motors
 from omnibot_driver.simulator.mart.motion import Kind, Motion
+from omnibot_driver.simulator.mart.state import STOP
 
 if TYPE_CHECKING:
     from omnibot_driver.simulator.mart.server import MartServer
 
-STOP = 1
 DRIVES = (Kind.LINEAR, Kind.MEASURED_LINEAR, Kind.CONTROLLED_LINEAR, Kind.REFERENCE)
 SPINS = (Kind.SPIN, Kind.CONTROLLED_SPIN)
 CONTROLLED = (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR, Kind.CONTROLLED_SPIN)

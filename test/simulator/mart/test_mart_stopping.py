@@ -242,3 +242,31 @@ def test_the_stop_port_is_never_answered() -> None:
         rig.stop(text)
     assert rig.run(5.0) == []
     assert rig.ask("HELLO") == "ok BBB"
+
+
+@pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 120", "SRM")])
+def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> None:
+    """A motor board that obeys slowly; RM gives itself 1.88 s if it was fast."""
+    rig = Rig()
+    rig.ask("SLMP 1 60")
+    rig.drive(start)
+    if start == "F":
+        assert rig.ask(end) == "fail stop time out"
+        assert rig.took_s == pytest.approx(0.75, abs=0.02)
+    else:
+        assert rig.ask(end) == "ok"
+        assert 1.5 < rig.took_s < 1.88
+
+
+@pytest.mark.parametrize("start", ["TF 0", "TF 24"])
+def test_sdr_without_a_number_crashes_the_server(start: str) -> None:
+    """In a controlled move; nothing stops the motors."""
+    rig = Rig()
+    rig.stop("SDR")
+    assert not rig.server.crashed
+    rig.say(start)
+    rig.run(1.0)
+    rig.stop("SDR")
+    assert rig.server.crashed
+    rig.run(60.0)
+    assert rig.moving

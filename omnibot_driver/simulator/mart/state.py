@@ -1,0 +1,152 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is true of a simulated server and its robot, and what the server believes.
+
+Values and what follows from them. Must not know how time passes, nor commands.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from omnibot_driver.simulator.mart.chassis import Chassis, sight_m
+from omnibot_driver.simulator.mart.files import FileNote
+from omnibot_driver.simulator.mart.imu import Imu
+from omnibot_driver.simulator.mart.motion import INCHES_PER_M, Kind, Motion
+from omnibot_driver.simulator.mart.settings import MartSettings
+
+COMMAND, STOP = 0, 1
+"""The ports, by their place."""
+SONAR_SETTLES_S = 0.165
+"""Three readings confirm that something is near."""
+FARTHEST_IN = 254
+FILES = 100
+
+Then = Callable[..., None]
+
+
+class Waiter(NamedTuple):
+    """The thread of a port waits until a motion has started or stopped."""
+
+    port: int
+    kind: Kind
+    then: Then | None
+    args: tuple[Any, ...]
+
+
+class ServerState:
+    """``now_s``: simulated time, since construction.
+
+    crashed: why the server is not there any more; empty while it runs. busy: a command is being
+    executed. motions: what the server knows of each kind; alarm: the one that it watches; starting:
+    the one whose command is not answered yet. custom: parameters that were set. sampling_since_s:
+    since when a motion uses a sonar, or -1. front_m, rear_m, dock_m, and what the chassis and the
+    IMU have, can be changed.
+    """
+
+    def __init__(self, settings: MartSettings) -> None:
+        self.settings = settings
+        self.quirks = settings.quirks
+        self.now_s = 0.0
+        self.chassis = Chassis(settings)
+        self.imu = Imu(settings)
+        self.front_m, self.rear_m, self.dock_m = settings.front_m, settings.rear_m, settings.dock_m
+        self.clock_offset_s = float(settings.clock_s)
+        self.hit_wall = False
+        self.files: dict[str, FileNote] = {}
+
+    def begin(self) -> None:
+        """The program starts: it knows nothing."""
+        self.crashed = ""
+        self.motions = [Motion(kind) for kind in Kind]
+        self.alarm: Kind | None = None
+        self.starting: Kind | None = None
+        self.manual = self.recording = False
+        self.custom: dict[str, tuple[int, int]] = {}
+        self.last_reply = ""
+        self.last_files: dict[str, str] = {}
+        self.log: list[str] | None = None
+        self.log_name = ""
+        self.sampling_since_s = -1.0
+        self._reference_clock_s: float | None = None
+        self.busy = False
+        self.waiters: list[Waiter] = []
+
+    @property
+    def hung(self) -> bool:
+        """Whether the command port is silent for good, although the server runs."""
+        return any(
+            waiter.port == COMMAND and waiter.kind is not self.alarm for waiter in self.waiters
+        )
+
+    @property
+    def stop_port_hung(self) -> bool:
+        """The same of the stop port."""
+        return any(waiter.port == STOP and waiter.kind is not self.alarm for waiter in self.waiters)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the robot truly moves, or its motors are told to."""
+        return self.chassis.moving or self.chassis.powered
+
+    @property
+    def motion(self) -> Kind | None:
+        """The motion that is in progress as the server sees it."""
+        return next((each.kind for each in self.motions if each.running), self.starting)
+
+    @property
+    def clock_s(self) -> float:
+        """Of the wall, in Unix time."""
+        return self.now_s + self.clock_offset_s
+
+    @property
+    def date(self) -> str:
+        """The same, as files begin."""
+        return time.strftime("%m/%d/%Y  %H:%M:%S", time.gmtime(self.clock_s))
+
+    @property
+    def docked(self) -> bool:
+        """Whether the robot stands at its dock."""
+        return self.chassis.x_m >= self.dock_m
+
+    @property
+    def driven_m(self) -> float:
+        """By the right wheel since the encoder was reset."""
+        return self.chassis.counts * self.settings.metres_per_count
+
+    @property
+    def conflict(self) -> bool:
+        """Whether something is in progress that refuses other motions."""
+        return self.manual or self.recording or any(each.running for each in self.motions)
+
+    def save(self, note: FileNote) -> None:
+        """Keep a file, as the last of its kind."""
+        self.files[note.name] = note
+        if len(self.files) > FILES:
+            del self.files[next(iter(self.files))]
+        self.last_files["TURN" if note.is_turn else "MOVE"] = note.name
+
+    def sonar_in(self, *, backward: bool) -> int:
+        """What a sonar tells, in inches; -1 where it sees nothing."""
+        seen_m = sight_m(self.chassis, self.front_m, self.rear_m, backward=backward)
+        inches = seen_m * INCHES_PER_M
+        return int(inches) if 1.0 <= inches < FARTHEST_IN + 1 else -1
+
+    def clearance_in(self, *, backward: bool) -> int:
+        """What the sonar that is sampled in a motion told last."""
+        since_s = self.sampling_since_s
+        if since_s < 0.0 or self.now_s - since_s < SONAR_SETTLES_S:
+            return -1
+        return self.sonar_in(backward=backward)
+
+    @property
+    def heading_integrates(self) -> bool:
+        """Whether turning changes the relative heading now."""
+        return self.alarm is Kind.REFERENCE or not self.quirks.heading_in_reference_moves_only
+
+    def sample_reference(self, *, first: bool) -> None:
+        """A sample of RM; by its source, the first counts the time since the one before."""
+        clock_s, before_s = self.clock_s, self._reference_clock_s
+        self._reference_clock_s = clock_s
+        if first and before_s is not None and self.quirks.heading_starts_off:
+            self.imu.heading_deg += self.imu.rate_dps / 2 * (clock_s - before_s)
