@@ -106,8 +106,7 @@ def _start(server: "MartServer", motion: Motion, encoder: int) -> None:
     if motion.samples == motions.START_SAMPLES:
         stop_motors(server, motion)
         motion.error = "start timedout"
-        hangs = server.quirks.stuck_motor_hangs_reference_move
-        _end(server, motion, post=not (hangs and motion.kind is Kind.REFERENCE))
+        _end(server, motion)
     elif encoder:
         motion.starting = False
         motion.samples = 0
@@ -130,26 +129,26 @@ def _stop(server: "MartServer", motion: Motion, encoder: int) -> None:
             _end(server, motion)
     else:
         motion.same = 0
+        motion.turned_s = server.now_s
 
 
-def _end(server: "MartServer", motion: Motion, *, post: bool = True) -> None:
+def _end(server: "MartServer", motion: Motion) -> None:
     server.alarm = None
     motion.watching = False
     if motion.released:
         motion.running = motion.released = False
     if motion.kind is Kind.REFERENCE:
         server.save(note_of(server, motion))
-    if post:
-        server.post(motion.kind)
+    server.post(motion.kind)
 
 
 def _timed_distance_in(motion: Motion) -> float:
-    """What it must have driven, by its calibration alone."""
+    """What it must have driven, by its calibration alone; the ramps are taken in feet."""
     if motion.kind not in _TIMED:
         return 0.0
-    up_s, down_s = motions.RAMPS_S[motion.word]
-    at_top_s = max(0.0, motion.stopped_s - motion.moved_s - up_s)
-    return motions.TOP_SPEED_INPS[motion.word] * ((up_s + down_s) / 2 + at_top_s)
+    ramps_s, top_inps = sum(motions.RAMPS_S[motion.word]), motions.TOP_SPEED_INPS[motion.word]
+    ran_s = motion.turned_s - motion.moved_s
+    return max(0.0, ramps_s * top_inps / 24 + (ran_s - ramps_s) * top_inps)
 
 
 def _hold_course(server: "MartServer", motion: Motion) -> None:

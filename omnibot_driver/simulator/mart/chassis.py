@@ -14,7 +14,7 @@ STOP = 128
 STEP_S = 0.01
 RAMPS_PER_S = 40.0
 """The board changes what it applies each 25 ms, by its acceleration."""
-STANDS_MPS = 0.008
+STANDS_MPS = 0.006
 RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
 
 
@@ -97,6 +97,11 @@ class Chassis:
     def encoder(self) -> int:
         """What the board tells; 0 where its line is cut."""
         return 0 if self.silent else int(self.counts)
+
+    @property
+    def speed_mps(self) -> float:
+        """Forward."""
+        return (self.right_mps + self.left_mps) / 2
 
     @property
     def powered(self) -> bool:

@@ -54,7 +54,8 @@ class Motion:
     running: in progress, so that others are refused. posts: notices that it started or stopped, and
     that were not read. error: of this motion. right, left: what the server believes of the
     registers. encoder: as it was read last, of which the next sample knows. sampled_s: time of the
-    last sample of the IMU, or -1. angle_deg: since its start. released: the stop port ended it.
+    last sample of the IMU, or -1. moved_s, stopped_s, turned_s: when the wheel began to turn, was
+    told to stop, and turned last. angle_deg: since its start. released: the stop port ended it.
     """
 
     def __init__(self, kind: Kind) -> None:
@@ -76,7 +77,7 @@ class Motion:
         self.right = self.left = 128
         self.samples = self.same = self.encoder = self.last_encoder = self.sample_count = 0
         self.sampled_s = -1.0
-        self.started_s = self.moved_s = self.stopped_s = now
+        self.started_s = self.moved_s = self.stopped_s = self.turned_s = now
         self.angle_deg = self.last_rate = self.angle_sum = self.last_angle = 0.0
         self.correction = 0
         self.first_sample = True

@@ -122,7 +122,10 @@ def _go_reference(server: "MartServer", speed: int) -> None:
     motion = server.motions[Kind.REFERENCE]
     server.chassis.accelerate(5)
     server.chassis.reset_encoders()
+    samples = motion.samples
     motion.begin(server.now_s)
+    if server.quirks.reference_start_counts_on:
+        motion.samples = samples
     server.zero_heading()
     server.sampling_since_s = server.now_s
     _go(server, motion, 128 - speed, 128 - speed)
@@ -176,8 +179,9 @@ def started(server: "MartServer", kind: Kind) -> None:
     """An uncontrolled motion was seen to begin, or was not."""
     motion = server.motions[kind]
     server.starting = None
-    if kind is Kind.REFERENCE and server.settings.reference_start_fails:
-        server.answer("fail ")
+    if kind is Kind.REFERENCE and (server.settings.reference_start_fails or motion.error):
+        told = Kind.LINEAR if server.quirks.reference_start_counts_on else kind
+        server.answer(f"fail {server.motions[told].error}")
     elif motion.error:
         server.answer(f"fail {motion.error}")
     else:

@@ -10,7 +10,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from omnibot_driver.simulator.mart import moves, wire
-from omnibot_driver.simulator.mart.motion import NOT_SUPPORTED
+from omnibot_driver.simulator.mart.motion import (
+    FRONT_CLEARANCE_IN,
+    NOT_SUPPORTED,
+    REAR_CLEARANCE_IN,
+)
 
 if TYPE_CHECKING:
     from omnibot_driver.simulator.mart.server import MartServer
@@ -93,10 +97,13 @@ def _tell_status(server: "MartServer") -> None:
 
 
 def sonar(*, backward: bool) -> Handler:
-    """SFC, SRC."""
+    """SFC, SRC; what is near is measured three times."""
 
     def handle(server: "MartServer", text: str) -> str | None:
-        server.later(SONAR_S, _tell_rear if backward else _tell_front)
+        least = REAR_CLEARANCE_IN if backward else FRONT_CLEARANCE_IN
+        near = 0 < server.sonar_in(backward=backward) <= least
+        readings = 3 if near else 1
+        server.later(readings * SONAR_S, _tell_rear if backward else _tell_front)
         return None
 
     return handle
@@ -140,7 +147,12 @@ def reset(server: "MartServer", text: str) -> str | None:
     if text == "RST MC":
         _ask_board(server, _reset_board)
         return None
-    return server.last_reply if server.quirks.unknown_reset_repeats else NOT_SUPPORTED
+    if not server.quirks.unknown_reset_repeats:
+        return NOT_SUPPORTED
+    if server.last_reply:
+        return server.last_reply
+    server.done()
+    return None
 
 
 def _reset_imu(server: "MartServer") -> None:
@@ -193,6 +205,7 @@ def last_file(which: str) -> Handler:
             return "fail"
         for block in wire.blocks(name, note.content):
             server.send(block)
+        server.last_reply = ""
         server.done()
         return None
 

@@ -24,7 +24,9 @@ class Quirks:
     drives_trust_imu: RM, R and L start without a living IMU, and every uncontrolled motion goes on
         without one, blind to obstacles. Only samples of the IMU see that it started or stopped.
     reference_speed_wraps: RM below 1 or above 127 is a register that wraps, and RMCS clamps it.
-    stuck_motor_hangs_reference_move: RM never answers if the wheel does not turn.
+    reference_start_counts_on: RM counts the samples until the wheel turns from where its last stop
+        left off. After a stop of 0.56 to 0.6 s it fails at once; after a longer one it waits for a
+        stuck motor for good. The reason that it gives is that of the last F or B.
     speed_word_first: a speed word counts in front of the number only. Behind it, it is ignored.
     zero_distance_is_unlimited: TF, TB, MCF and MCB by 0 inches, or by a word, drive until stopped.
     echoes_distance: TF and TB answer what they should have driven.
@@ -50,7 +52,7 @@ class Quirks:
     moves_wait_for_imu: bool = False
     drives_trust_imu: bool = False
     reference_speed_wraps: bool = False
-    stuck_motor_hangs_reference_move: bool = False
+    reference_start_counts_on: bool = False
     speed_word_first: bool = False
     zero_distance_is_unlimited: bool = False
     echoes_distance: bool = False

@@ -17,7 +17,7 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 
 COMMAND, STOP = 0, 1
 """The ports, by their place."""
-SONAR_SETTLES_S = 0.165
+NEAR_READINGS_S = 0.15
 """Three readings confirm that something is near."""
 FARTHEST_IN = 254
 FILES = 100
@@ -126,18 +126,19 @@ class ServerState:
             del self.files[next(iter(self.files))]
         self.last_files["TURN" if note.is_turn else "MOVE"] = note.name
 
-    def sonar_in(self, *, backward: bool) -> int:
-        """What a sonar tells, in inches; -1 where it sees nothing."""
+    def sonar_in(self, *, backward: bool, ago_s: float = 0.0) -> int:
+        """What a sonar tells, or told, in inches; -1 where it sees nothing."""
         seen_m = sight_m(self.chassis, self.front_m, self.rear_m, backward=backward)
-        inches = seen_m * INCHES_PER_M
+        way_m = self.chassis.speed_mps * ago_s
+        inches = (seen_m - way_m if backward else seen_m + way_m) * INCHES_PER_M
         return int(inches) if 1.0 <= inches < FARTHEST_IN + 1 else -1
 
     def clearance_in(self, *, backward: bool) -> int:
         """What the sonar that is sampled in a motion told last."""
         since_s = self.sampling_since_s
-        if since_s < 0.0 or self.now_s - since_s < SONAR_SETTLES_S:
+        if since_s < 0.0 or self.now_s - since_s < NEAR_READINGS_S:
             return -1
-        return self.sonar_in(backward=backward)
+        return self.sonar_in(backward=backward, ago_s=NEAR_READINGS_S)
 
     @property
     def heading_integrates(self) -> bool:

@@ -82,7 +82,7 @@ def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
     """With these words."""
     rig = Rig(front_m=front_in * INCH_M)
     assert rig.ask("TF 24") == "fail Insufficient front clearance."
-    assert rig.took_s == pytest.approx(0.6, abs=0.1)
+    assert rig.took_s == pytest.approx(0.55, abs=0.06)
     assert rig.x_in == pytest.approx(driven_in, abs=0.15)
 
 

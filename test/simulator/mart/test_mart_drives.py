@@ -83,20 +83,35 @@ def test_rm_1_to_127_drives_forward(speed: int) -> None:
 
 
 def test_a_stuck_motor_can_hang_rm() -> None:
-    """It is not answered; the motors are told to stop after 0.6 s."""
-    rig = Rig(stuck="right")
-    rig.say("RM 30")
-    rig.run(0.5)
+    """After a fast drive; the motors stay on, and only a stuck one does not turn."""
+    rig = Rig()
+    rig.drive("RM 110")
+    assert rig.ask("SRM") == "ok"
+    rig.server.chassis.change(stuck="right")
+    assert rig.ask("RM 30") is None
+    assert rig.moving
     assert rig.server.chassis.powered
-    assert rig.wait() is None
-    assert rig.server.hung
+    rig.say("SRM")
+    rig.stop("SL")
+    assert rig.run(60.0) == []
+    assert rig.moving
+
+
+def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
+    """Or with that of the last F."""
+    rig = Rig(stuck="right")
+    assert rig.ask("RM 30") == "fail "
+    assert rig.took_s == pytest.approx(0.6, abs=0.03)
+    assert rig.ask("F") == "fail start timedout"
+    assert rig.ask("RM 30") == "fail start timedout"
     assert not rig.server.chassis.powered
+    assert rig.in_progress is None
 
 
 def test_rm_0_is_a_motor_that_does_not_turn() -> None:
     """As is a speed below which the motors stand."""
-    assert Rig().ask("RM 0") is None
-    assert Rig(dead_zone_units=4.0).ask("RM 3") is None
+    assert Rig().ask("RM 0") == "fail "
+    assert Rig(dead_zone_units=4.0).ask("RM 3") == "fail "
     assert Rig(dead_zone_units=4.0).ask("RM 5") == "ok"
 
 
@@ -264,16 +279,16 @@ def test_backward_rm_and_spins_see_no_obstacle() -> None:
 @pytest.mark.parametrize(("front_in", "stops"), [(19.5, False), (18.5, True)])
 def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
     """Measured to the whole inch."""
-    rig = Rig(front_m=front_in * INCH_M, dead_zone_units=0.0)
+    rig = Rig(front_m=front_in * INCH_M)
     rig.drive("RM 1", 0.3)
     assert rig.server.chassis.powered is not stops
 
 
-@pytest.mark.parametrize(("rear_in", "stops"), [(18.0, False), (15.1, True)])
+@pytest.mark.parametrize(("rear_in", "stops"), [(18.0, False), (15.5, True)])
 def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
-    """The robot moves 0.6 inches until it looks."""
+    """The robot moves 2 inches until it looks."""
     rig = Rig(rear_m=rear_in * INCH_M)
-    rig.drive("B SLOW", 0.1)
+    rig.drive("B SLOW", 0.3)
     assert rig.server.chassis.powered is not stops
 
 

@@ -78,10 +78,18 @@ def reference_speed_wraps(quirks: Quirks) -> bool:
     return rig.ask("RM -20") == "ok" and rig.server.chassis.right_mps < 0
 
 
-def stuck_motor_hangs_reference_move(quirks: Quirks) -> bool:
-    """The wheel does not turn."""
-    rig = Rig(quirks, stuck="both")
-    return rig.ask("RM 30") is None and rig.server.hung
+def reference_start_counts_on(quirks: Quirks) -> bool:
+    """After a stop of 0.57 s RM fails at once; the next one does not."""
+    rig = Rig(quirks)
+    rig.drive("RM 66")
+    assert rig.ask("SRM") == "ok"
+    failed = rig.ask("RM 30") == "fail "
+    assert rig.run(1.0) == []
+    assert rig.moving is not failed
+    if failed:
+        assert rig.ask("SRM") == "fail no motion in progress"
+        assert rig.ask("RM 30") == "ok"
+    return failed
 
 
 def speed_word_first(quirks: Quirks) -> bool:

@@ -163,6 +163,15 @@ def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen
     assert rig.number("SRC") == seen
 
 
+def test_a_sonar_measures_three_times_what_is_near() -> None:
+    """Before it tells."""
+    rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
+    assert rig.ask("SFC") == "ok 19"
+    assert rig.took_s == pytest.approx(0.165)
+    assert rig.ask("SRC") == "ok 16"
+    assert rig.took_s == pytest.approx(0.055)
+
+
 def test_sonars_turn_with_the_robot() -> None:
     """After half a turn each sees what the other did."""
     rig = Rig(front_m=100 * INCH_M, rear_m=40 * INCH_M)
@@ -211,6 +220,7 @@ def test_a_silent_motor_board_fails_enc_after_0_2_s_and_mcstat_tells_255() -> No
 def test_an_unknown_reset_repeats_the_previous_reply() -> None:
     """RST MC is known."""
     rig = Rig()
+    assert rig.ask("RST x") is None
     assert rig.ask("RST MC") == "ok"
     assert rig.ask("HELLO") == rig.ask("RST x") == rig.ask("RST imu") == "ok BBB"
 

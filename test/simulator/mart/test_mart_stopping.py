@@ -17,7 +17,7 @@ def test_sm_ends_f_and_b_on_the_command_port_in_0_4_s(start: str) -> None:
     rig.drive(start)
     assert rig.moving
     assert rig.ask("SM") == "ok"
-    usual_s = 0.54 if "FAST" in start else 0.34 if "SLOW" in start else 0.4
+    usual_s = 0.56 if "FAST" in start else 0.34 if "SLOW" in start else 0.4
     assert rig.took_s == pytest.approx(usual_s, abs=0.03)
     assert not rig.moving
     assert rig.ask("SM") == "fail no motion"
