@@ -269,3 +269,11 @@ def test_a_documented_move_is_cancelled_at_any_time() -> None:
 def test_the_ports_are_numbered_as_they_stand() -> None:
     """The command port is the first."""
     assert COMMAND == 0
+
+
+def test_by_the_source_a_probe_of_a_living_imu_turns_the_robot_a_little() -> None:
+    """By one to two degrees to the right, each time."""
+    rig = Rig(SOURCE)
+    for probes in (1, 2, 3):
+        assert rig.ask("MCR SLOW 0") == "ok"
+        assert -2.5 < rig.yaw_deg / probes < -1.0
