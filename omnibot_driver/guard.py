@@ -23,7 +23,8 @@ BEAT = b"."
 LATCHED_BEAT = b"e"
 """The driver is alive and its e-stop is latched."""
 WORDS = b"="
-"""Other words from now on."""
+END = b"\n"
+"""Other words from now on stand between them."""
 BYE = b"!"
 """The driver has stopped the robot itself; the guard may leave."""
 LIMIT_S = 0.5
@@ -44,7 +45,7 @@ Words = list[tuple[int, bytes]]
 def watch(stop: Words, emergency_stop: Words) -> None:
     """Until the driver is gone, and then a second longer unless it said that it goes."""
     patience_s: float | None = LIMIT_S
-    latched, unfinished = False, b""
+    latched, rest = False, b""
     while True:
         for line, _ in stop + emergency_stop:
             os.set_blocking(line, False)
@@ -55,16 +56,28 @@ def watch(stop: Words, emergency_stop: Words) -> None:
         elif not (heard := os.read(DRIVER, 4096)):
             speak(last_words, until=[])
             return
-        elif BYE in heard:
-            return
         else:
             patience_s = LIMIT_S
-            *others, rest = (unfinished + heard).split(b"\n")
-            for other in others:
-                stop, emergency_stop = map(words, other.partition(WORDS)[2].decode().split(" "))
-            beats, begun, other = rest.partition(WORDS)
-            unfinished = begun + other
-            latched = beats.endswith(LATCHED_BEAT) if beats else latched
+            beats, given, rest = parted(rest + heard)
+            if BYE in beats:
+                return
+            if given:
+                stop, emergency_stop = map(words, given.decode().split(" "))
+            if beats:
+                latched = beats.endswith(LATCHED_BEAT)
+
+
+def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
+    """Beats, the newest words that are whole, and the beginning of others."""
+    beats = given = b""
+    while WORDS in heard:
+        before, _, after = heard.partition(WORDS)
+        beats += before
+        whole, end, heard = after.partition(END)
+        if not end:
+            return beats, given, WORDS + after
+        given = whole
+    return beats + heard, given, b""
 
 
 def speak(last_words: Words, until: list[int]) -> None:

@@ -78,7 +78,7 @@ class Keeper:
         if (process := self._process) is None:
             return
         assert process.stdin is not None
-        message = guard.WORDS + " ".join(map(self._addressed, self.last_words)).encode() + b"\n"
+        message = guard.WORDS + " ".join(map(self._addressed, self.last_words)).encode() + guard.END
         try:
             os.write(process.stdin.fileno(), message)
             self._ahead += len(message)

@@ -220,7 +220,7 @@ class Link:
         self._session.leave(now := time.monotonic())
         self._settle()
         alone = self._port is not None and self._keeper is None and not self._port.ends_with_us
-        proof_s = self._session.proof_takes_s
+        proof_s = self._session.proof_takes_s + self._session.board.traits.stops_within_s
         self._await_standstill(now + max(UNGUARDED_S if alone else STANDS_WITHIN_S, proof_s))
         if self._session.stands and self._session.fall_silent(now := time.monotonic()):
             self._await_standstill(now + max(SILENCE_S, proof_s))

@@ -46,10 +46,12 @@ class BoardFigures:
     ``rates_hz``: how often each kind of reading should come that the board sends; ``faults``: how
     often the framing was lost, with ``discarded_bytes``; ``saturated``: commands that did not fit;
     ``odom_hz``: how often ``odom`` goes out, where that is not with each odometry reading;
-    ``own``: what only this board has to show (its version, voltage, progress), by names for people.
+    ``own``: what only this board has to show (its version, voltage, progress), by names for people;
+    ``trouble``: why the robot cannot be driven, in a sentence; empty if it can.
     """
 
     rates_hz: Mapping[RateName, float] = field(default_factory=dict)
+    trouble: str = ""
     faults: int = 0
     discarded_bytes: int = 0
     saturated: int = 0
@@ -87,6 +89,13 @@ class Board(Protocol):
     def advice(self) -> str | None:
         """What a user should set otherwise, by what the board sends; None while all is well."""
         return None
+
+    @property
+    def refusal(self) -> str:
+        """Why the robot is not to be driven, by what the board shows, and what to do; empty if it
+        may be.
+        """
+        return ""
 
     def gravity_advice(self, gravity_mps2: float) -> str:
         """What such a specific force at rest says of the settings; empty where it is gravity."""
@@ -152,7 +161,7 @@ class Board(Protocol):
         return NO_PACKETS
 
     def stop(self) -> Packets:
-        """Stand still."""
+        """Stand still. Where it depends on what the robot does: as it is now."""
 
     def emergency_stop(self) -> Packets:
         """The board's own emergency stop, and nothing else."""

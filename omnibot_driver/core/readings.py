@@ -106,6 +106,14 @@ class ResetReading:
 
 
 @dataclass(frozen=True, slots=True)
+class NoticeReading:
+    """Something that a user should be told; ``halt``: the robot is to be driven no further."""
+
+    text: str
+    halt: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ExtraReading:
     """Anything else that a board tells: a value of a kind of its own, passed on as it is."""
 
@@ -120,6 +128,7 @@ Reading = (
     | PausedReading
     | EStopButtonReading
     | ResetReading
+    | NoticeReading
     | ExtraReading
 )
 

@@ -20,6 +20,7 @@ from omnibot_driver.core.mode_manager import CLOSED, ModeManager
 from omnibot_driver.core.readings import (
     DisplacementReading,
     EStopButtonReading,
+    NoticeReading,
     PausedReading,
     PoseReading,
     ResetReading,
@@ -76,6 +77,10 @@ class SafetyStops:
                 self._button_held = reading.pressed
                 if reading.pressed:
                     self.estop(True, now, by="the button on the robot")
+            elif isinstance(reading, NoticeReading):
+                notify([reading.text])
+                if reading.halt:
+                    self._policy.halt(now)
             elif isinstance(reading, ResetReading):
                 self._mode_manager.heard_reset(now, reading.remark)
         if self._policy.current is not None:

@@ -29,7 +29,13 @@ from omnibot_driver.core.measurement.outlier_filter import Refused
 from omnibot_driver.core.measurement.pipeline import MeasurementPipeline
 from omnibot_driver.core.mode_manager import CLOSED, ModeManager
 from omnibot_driver.core.packets import NO_PACKETS, Packets
-from omnibot_driver.core.readings import OdometryReading, PausedReading, Reading, Vector3
+from omnibot_driver.core.readings import (
+    NoticeReading,
+    OdometryReading,
+    PausedReading,
+    Reading,
+    Vector3,
+)
 from omnibot_driver.core.reporter import Reporter
 from omnibot_driver.core.reporting.figures import SessionFigures
 from omnibot_driver.core.requests import OnExit, Request
@@ -371,7 +377,7 @@ class Session:
         before = self._board.mode
         readings = self._board.elapse(now)
         self._reporter.events += self._measurement.hear(readings, now)
-        if all(isinstance(reading, OdometryReading) for reading in readings):
+        if all(isinstance(reading, OdometryReading | NoticeReading) for reading in readings):
             self._safety.react(self._measurement.flush(), now)
         else:
             self._liveness.heard_at, self._last = now, readings[-1]

@@ -99,10 +99,43 @@ def lois_ecu(firmware: str) -> tuple[Board, Any]:
     return LoisEcuBoard(LoisEcuSettings()), LoisRobot(firmware)
 
 
+class MartRobot:
+    """The simulated MART controller; five of its ticks in one of ours."""
+
+    def __init__(self, firmware: Any) -> None:
+        from omnibot_driver.simulator.mart import QUIRKS, MartSettings, SimulatedMart
+
+        self.board = SimulatedMart(MartSettings(quirks=QUIRKS[firmware]))
+
+    @property
+    def stands(self) -> bool:
+        return not self.board.server.moving
+
+    @property
+    def way_m(self) -> float:
+        return self.board.server.chassis.x_m
+
+    def receive(self, data: bytes, now: float, channel: int) -> None:
+        self.board.receive(data, now, channel)
+
+    def advance(self) -> list[Packet]:
+        return [packet for _ in range(5) for packet in self.board.advance()]
+
+
+def mart(firmware: str) -> tuple[Board, Any]:
+    from omnibot_driver.core.mart import MartSettings
+    from omnibot_driver.core.mart.board import MartBoard
+
+    return MartBoard(MartSettings()), MartRobot(firmware)
+
+
 MAKERS: dict[str, Callable[[], tuple[Board, Any]]] = {
     "omnibot": omnibot,
     "lois_ecu": lambda: lois_ecu("firmware"),
     "lois_ecu as documented": lambda: lois_ecu("documented"),
+    "mart": lambda: mart("firmware"),
+    "mart as documented": lambda: mart("documented"),
+    "mart as its source": lambda: mart("source"),
     "two lines": lambda: (line_board.make({}), LineRobot()),
     "requests": lambda: (request_board.make({}), RequestRobot()),
 }

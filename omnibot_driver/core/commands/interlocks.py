@@ -55,6 +55,8 @@ class Interlocks:
         unheard_s = self._liveness.unheard_s
         if not stands and now - self._liveness.heard_at >= unheard_s:
             return f"nothing was heard from the board for {unheard_s:g} s"
+        if not stands and (refusal := self._board.refusal):
+            return refusal
         return tripped
 
     def why_not_task(self) -> str:

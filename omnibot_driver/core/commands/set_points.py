@@ -127,7 +127,8 @@ class SteadySetpoint:
 class GoalSetpoint:
     """A pose to drive to: ``goal`` in the odometry frame, as that lay at this ``alignment``.
 
-    ``place`` is the same in the board's frame. Raises CommandRefused.
+    ``place`` is the same in the board's frame; ``direct``: the board drives straight at it, and
+    nowhere else first. Raises CommandRefused.
     """
 
     authority: Final = Authority.POSE
@@ -135,9 +136,16 @@ class GoalSetpoint:
     settled: Final = True
 
     def __init__(
-        self, goal: Pose, place: Pose, alignment: int, check: Callable[[Order], object]
+        self,
+        goal: Pose,
+        place: Pose,
+        alignment: int,
+        check: Callable[[Order], object],
+        *,
+        direct: bool = True,
     ) -> None:
         self.alignment = alignment
+        self._direct = direct
         self._goal, self._order, self._check = goal, GoTo(place), check
         self._nearest_m = self._nearest_rad = math.inf
         self.check_anew()
@@ -152,6 +160,8 @@ class GoalSetpoint:
 
     def is_left_by(self, pose: Pose) -> bool:
         """Whether a robot that is here now has been plainly nearer before."""
+        if not self._direct:
+            return False
         way = pose.way_to(self._goal)
         self._nearest_m = min(self._nearest_m, way.way_m)
         self._nearest_rad = min(self._nearest_rad, abs(way.yaw_rad))

@@ -84,13 +84,20 @@ class CommandShaper:
         if self._control == "velocity":
             raise self._at_odds(Authority.POSE)
         require_finite("cmd_pose", (goal.x_m, goal.y_m, goal.yaw_rad))
-        place = self._odometry.in_board_frame(goal)
+        own = self._board.traits.own_odometry
+        place = goal if own else self._odometry.in_board_frame(goal)
         if place is None or self._board.mode is Mode.IMU_ONLY:
             raise CommandRefused(
                 "cmd_pose refused: where the board believes to be is not known; this needs its"
                 " poses (nominal mode) and `use_board_pose`. After a restart, wait a second"
             )
-        return GoalSetpoint(goal, place, self._odometry.alignments, self._actuator.is_zero)
+        return GoalSetpoint(
+            goal,
+            place,
+            self._odometry.alignments,
+            self._actuator.is_zero,
+            direct=self._control is not None,
+        )
 
     def _at_odds(self, authority: Authority) -> CommandRefused:
         return CommandRefused(

@@ -21,6 +21,7 @@ from omnibot_driver.core.readings import (
     EStopButtonReading,
     ExtraReading,
     ImuReading,
+    NoticeReading,
     OdometryReading,
     PoseReading,
     Reading,
@@ -143,7 +144,7 @@ class MeasurementPipeline:
             return [Extra(reading, stamp_s)]
         if isinstance(reading, ExtraReading):
             return [Extra(reading.content, stamp_s)]
-        if isinstance(reading, ResetReading):
+        if isinstance(reading, ResetReading | NoticeReading):
             return []
         self._clock.restart()
         return []

@@ -154,6 +154,8 @@ class Diagnosis:
         if self._grew("restarts", restarts, now) and level is Level.OK:
             level = Level.WARN
             message = "the board has restarted: unless you reset it, check its power supply"
+        if session.board.trouble and session.state in RUNNING:
+            level, message = Level.ERROR, session.board.trouble
         values = {"Mode": session.state, "Restarts": str(restarts), **session.board.own}
         if session.task:
             values["Under way"] = session.task

@@ -1,0 +1,24 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The MART motion controller: datagrams, one request at a time. Bytes and times, nothing else."""
+
+from omnibot_driver.core.mart.replies import Fail, MartDecoder, Ok, Other, parse
+from omnibot_driver.core.mart.settings import MartSettings
+from omnibot_driver.core.mart.states import Motion, State
+from omnibot_driver.core.mart.words import WORDS, Form, Kind, Request, Word
+
+__all__ = [
+    "WORDS",
+    "Fail",
+    "Form",
+    "Kind",
+    "MartDecoder",
+    "MartSettings",
+    "Motion",
+    "Ok",
+    "Other",
+    "Request",
+    "State",
+    "Word",
+    "parse",
+]

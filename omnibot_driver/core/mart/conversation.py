@@ -1,0 +1,140 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""One request at a time, and which reply belongs to it.
+
+Replies carry no number, and datagrams are lost, doubled and late. So a reply is matched by its
+form, its reason and the least time its command takes; what matches nothing is late, and discarded.
+After a query that was not answered, none with the same form of reply is asked until its reply can
+no longer come. Those that the robot is driven by cannot wait: their answers are marked as doubtful,
+and whoever reads them compares them with what is expected. Time is an argument.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.mart.replies import Fail, Ok, Other, Reply
+from omnibot_driver.core.mart.words import (
+    ENC,
+    KNOWN_FAILS,
+    MCSTAT,
+    RMRA,
+    Form,
+    Kind,
+    Request,
+    Word,
+)
+from omnibot_driver.core.packets import Packets
+
+QUICKEST_S: Final = 0.1
+"""Less patience than this a query never needs."""
+SMOOTHING: Final = 0.2
+PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
+"""Asked at once, whatever reply may still come."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pending:
+    """What was asked and not answered yet; given up at ``until_s``."""
+
+    request: Request
+    sent_s: float
+    until_s: float
+
+    @property
+    def word(self) -> Word:
+        """Its command."""
+        return self.request.word
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A reply with what it answers. ``took_s``: from the sending to the arrival; ``doubtful``: it
+    may be the late reply to something else.
+    """
+
+    request: Request
+    reply: Ok | Fail
+    took_s: float
+    doubtful: bool = False
+
+    @property
+    def word(self) -> Word:
+        """The command that is answered."""
+        return self.request.word
+
+
+class Conversation:
+    """``delay_s``: how long a datagram may be on its way. ``discarded``: late replies so far."""
+
+    def __init__(self, delay_s: float) -> None:
+        self.delay_s = delay_s
+        self.discarded = 0
+        self.connect()
+
+    def connect(self) -> None:
+        """Nothing was asked."""
+        self.pending: Pending | None = None
+        self._owed_until_s: dict[Form, float] = {}
+        self._trip_s = 0.0
+
+    def may_ask(self, word: Word, now: float) -> bool:
+        """Whether nothing is asked, and no late reply can be taken for its own."""
+        if self.pending is not None:
+            return False
+        return word.kind is not Kind.QUERY or word in PRESSING or not self._owed(word, now)
+
+    def _owed(self, word: Word, now: float) -> bool:
+        return any(self._owed_until_s.get(form, -math.inf) > now for form in word.forms)
+
+    def ask(self, request: Request, now: float) -> Packets:
+        """Send a request that is to be answered."""
+        self.pending = Pending(request, now, now + self._patience_s(request.word))
+        return ((request.word.channel, request.data),)
+
+    def give_up(self, now: float) -> Word | None:
+        """The pending request is not waited for any more: what it was."""
+        if self.pending is None:
+            return None
+        word = self.pending.word
+        until_s = self.pending.sent_s + word.takes_s + 2 * self.delay_s
+        for form in word.forms:
+            self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
+        self.pending = None
+        return word
+
+    def overdue(self, now: float) -> Word | None:
+        """The pending request, where its time is over; it is given up."""
+        if self.pending is None or now < self.pending.until_s:
+            return None
+        return self.give_up(now)
+
+    def hear(self, reply: Reply, now: float) -> Answer | None:
+        """What this answers; None for what is late, or doubled."""
+        pending = self.pending
+        if pending is None or isinstance(reply, Other) or not _matches(reply, pending, now):
+            self.discarded += 1
+            if isinstance(reply, Ok):
+                self._owed_until_s.pop(reply.form, None)
+            return None
+        self.pending = None
+        took_s = now - pending.sent_s
+        if pending.word.kind is Kind.QUERY:
+            self._trip_s += SMOOTHING * (took_s - self._trip_s)
+        return Answer(pending.request, reply, took_s, self._owed(pending.word, now))
+
+    def _patience_s(self, word: Word) -> float:
+        """Queries are short of patience: what drives is not to be blind for long."""
+        longest_s = 2 * self.delay_s
+        if word.kind in (Kind.QUERY, Kind.CHANGE):
+            longest_s = min(longest_s, max(QUICKEST_S, 4 * self._trip_s))
+        return word.takes_s + longest_s
+
+
+def _matches(reply: Ok | Fail, pending: Pending, now: float) -> bool:
+    word = pending.word
+    if now < pending.sent_s + word.least_s:
+        return False
+    if isinstance(reply, Ok):
+        return reply.form in word.forms
+    return reply.reason in word.fails or (bool(reply.reason) and reply.reason not in KNOWN_FAILS)

@@ -1,0 +1,132 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What speaks against driving: the motor board's state, the IMU, obstacles, a wrong server.
+
+Knows the slower measurements and their limits; not what is done about them. Time is an argument.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.mart.goal import INCH_M
+from omnibot_driver.core.mart.readings import (
+    BatteryReading,
+    DockedReading,
+    Side,
+    SonarReading,
+)
+from omnibot_driver.core.mart.replies import Ok
+from omnibot_driver.core.mart.states import Motion
+from omnibot_driver.core.mart.words import DOCKED, MCSTAT, SFC, SRC, VOLTS, Word
+from omnibot_driver.core.readings import ExtraReading, Reading
+
+BITS: Final = {
+    4: "motor 1 trip",
+    8: "motor 2 trip",
+    16: "motor 1 short",
+    32: "motor 2 short",
+    64: "supply above 30 V",
+    128: "supply below 16 V",
+}
+NO_READ: Final = 255
+HALTING: Final = 4 | 8 | 16 | 32
+FRONT_IN, REAR_IN = 19, 15
+"""An obstacle nearer than this stops the controller."""
+SEEN_FOR_S: Final = 2.0
+LOWEST_V, HIGHEST_V = 5.0, 40.0
+ENCODER_FAILS: Final = 3
+
+
+class Health:
+    """``imu_dead``: the last check found no IMU; ``stranger``: what another server answers;
+    ``heading_in_reverse``: RMRA was seen to change while B drives; ``reference_fails``: how often
+    RM was answered by a bare ``fail``.
+    """
+
+    def __init__(self) -> None:
+        self.heading_in_reverse = False
+        self.reference_fails = 0
+        self.connect()
+
+    def connect(self) -> None:
+        """Nothing was measured."""
+        self.imu_dead = False
+        self.stranger = ""
+        self.status: int | None = None
+        self.volts: float | None = None
+        self._status_before: int | None = None
+        self._encoder_fails = 0
+        self._sonars_in: dict[Side, tuple[int, float]] = {}
+
+    def measured(self, word: Word, reply: Ok, now: float) -> list[Reading]:
+        """A reply to one of the slower queries."""
+        if word is MCSTAT:
+            self._status(int(reply.number))
+        elif word is VOLTS and LOWEST_V <= reply.number <= HIGHEST_V:
+            self.volts = reply.number
+            return [ExtraReading(BatteryReading(reply.number))]
+        elif word is DOCKED:
+            return [ExtraReading(DockedReading(reply.text == "true"))]
+        elif word in (SFC, SRC):
+            side: Side = "front" if word is SFC else "rear"
+            inches = int(reply.number)
+            self._sonars_in[side] = inches, now
+            distance_m = inches * INCH_M if inches >= 0 else math.inf
+            return [ExtraReading(SonarReading(side, distance_m))]
+        return []
+
+    def _status(self, bits: int) -> None:
+        """It counts when it is told twice: a late reply to ENC looks the same."""
+        if not 0 <= bits <= NO_READ:
+            return
+        before, self._status_before = self._status_before, bits
+        if bits == before or bits == 0:
+            self.status = bits
+
+    def encoder_failed(self) -> None:
+        """ENC was answered by ``fail``."""
+        self._encoder_fails += 1
+
+    def encoder_answers(self) -> None:
+        """ENC was answered."""
+        self._encoder_fails = 0
+
+    def volts_or(self, nominal: float) -> float:
+        """The battery's."""
+        return nominal if self.volts is None else self.volts
+
+    @property
+    def bits(self) -> str:
+        """What MCSTAT tells, by name."""
+        if self.status is None:
+            return "unknown"
+        if self.status == NO_READ:
+            return "motor board does not answer"
+        return ", ".join(name for bit, name in BITS.items() if self.status & bit) or "none"
+
+    @property
+    def tripped(self) -> str:
+        """Why the motors must not be driven, by the motor board; empty if they may."""
+        if self._encoder_fails >= ENCODER_FAILS or self.status == NO_READ:
+            return "nothing (ENC or MCSTAT is not answered by it)"
+        return self.bits if (self.status or 0) & HALTING else ""
+
+    @property
+    def refusal(self) -> str:
+        """Why the robot is not to be driven, and what to do; empty if it may be."""
+        if self.stranger:
+            return f"the server is no motion controller: it calls itself '{self.stranger}'"
+        if self.tripped:
+            return f"the motor board reports {self.tripped}: check motors, wiring and power"
+        if self.imu_dead:
+            return "the IMU does not answer (MPU6050 connection lost): check its wiring and restart"
+        if self.reference_fails >= 2:
+            return "this server answers 'fail' to RM although the robot moves: update the server"
+        return ""
+
+    def obstacle(self, motion: Motion, now: float) -> bool:
+        """Whether a sonar has just seen something too near, that way."""
+        side: Side = "rear" if motion is Motion.REVERSE else "front"
+        least = REAR_IN if motion is Motion.REVERSE else FRONT_IN
+        inches, at_s = self._sonars_in.get(side, (-1, -math.inf))
+        return 0 <= inches < least and now - at_s < SEEN_FOR_S

@@ -1,0 +1,180 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is asked of the controller besides motion, one job at a time: gyro bias, dock, log, files.
+
+A file comes as a name with a size, then as pieces of 512 bytes without numbers: lost and doubled
+ones show in the size, or as two that are alike. Knows words and replies; not when the command port
+is free. Time is an argument.
+"""
+
+import math
+from enum import Enum
+from typing import Final
+
+from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.conversation import Answer
+from omnibot_driver.core.mart.readings import JobDone
+from omnibot_driver.core.mart.replies import Fail, Ok
+from omnibot_driver.core.mart.words import Form, Request, Word
+
+PIECE: Final = 512
+QUIET_S: Final = 1.0
+"""A file is over when nothing came for so long."""
+TIMES: Final = 3
+"""A job that may be repeated is asked so often."""
+
+
+class Job(Enum):
+    """What can be asked; the value reads well in a sentence."""
+
+    BIAS = "gyro calibration"
+    DOCK = "docking"
+    LOG = "start of the log"
+    LAST_MOVE = "download of the last move"
+    LAST_TURN = "download of the last turn"
+    LOG_FILE = "download of the log"
+    TIME = "setting of the clock"
+
+
+WORD_OF: Final[dict[Job, Word]] = {
+    Job.BIAS: words.SB,
+    Job.DOCK: words.TF,
+    Job.LOG: words.LOG,
+    Job.LAST_MOVE: words.LAST_MOVE,
+    Job.LAST_TURN: words.LAST_TURN,
+    Job.LOG_FILE: words.EXIT,
+    Job.TIME: words.TIME,
+}
+WITHIN_S: Final[dict[Job, float]] = {Job.DOCK: 90.0}
+USUAL_S: Final = 20.0
+REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
+"""Harmless to ask again where no reply came."""
+
+
+class Jobs:
+    """``done``: what came of jobs, to be taken. ``logging``: LOG was answered since the connection.
+
+    ``ended``: EXIT was sent, so the server is not there any more.
+    """
+
+    def __init__(self) -> None:
+        self.done: list[JobDone] = []
+        self.logging = self.ended = False
+        self.moving = False
+        self._clear()
+
+    def _clear(self) -> None:
+        self.job: Job | None = None
+        self._token: object = None
+        self._request: Request | None = None
+        self._waiting = False
+        self._tries = 0
+        self._until_s = math.inf
+        self._name, self._size = "", -1
+        self._pieces: list[bytes] = []
+        self._piece_s = math.inf
+        self.moving = False
+
+    @property
+    def collecting(self) -> bool:
+        """Whether pieces of a file are awaited."""
+        return self._size >= 0
+
+    @property
+    def wake_at(self) -> float:
+        """When ``tick`` has something to do."""
+        return min(self._until_s, self._piece_s)
+
+    def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
+        """Begin. Raises RequestRefused."""
+        if self.job is not None:
+            raise RequestRefused(f"a {self.job.value} is under way; wait for its answer")
+        if job is Job.LOG_FILE and not self.logging:
+            raise RequestRefused(
+                "no log was started: call ~/start_log first; without one the server would end and"
+                " answer nothing"
+            )
+        self.job, self._token = job, token
+        self._request = WORD_OF[job].request(*arguments)
+        self._until_s = now + WITHIN_S.get(job, USUAL_S)
+
+    def next(self, now: float, *, stands: bool) -> Request | None:
+        """What to send, as soon as the robot is proved to stand."""
+        return self._request if stands and not self._waiting else None
+
+    def sent(self, request: Request, now: float) -> None:
+        """It was."""
+        self._waiting = True
+        self._tries += 1
+        self.moving = request.word in (words.TF, words.TB)
+        self.ended |= request.word is words.EXIT
+
+    def answered(self, answer: Answer, now: float) -> None:
+        """The reply to it."""
+        job, reply = self.job, answer.reply
+        if job is None or self._request is None or answer.word is not self._request.word:
+            return
+        if isinstance(reply, Fail):
+            self._finish(False, f"the controller answers: {reply.reason or 'fail'}")
+        elif reply.form is Form.FILE:
+            self._name, self._size = reply.file
+            self._piece_s = now + QUIET_S
+        else:
+            self.logging |= job is Job.LOG
+            self._finish(True, f"{job.value} done")
+
+    def missed(self, word: Word, now: float) -> None:
+        """No reply came in time."""
+        if self.job is None:
+            return
+        if self.job in REPEATED and self._tries < TIMES:
+            self._waiting = False
+        else:
+            self._finish(False, f"{word.text} was not answered")
+
+    def moved(self, reply: Ok | Fail, now: float) -> None:
+        """The reply to a controlled move, which may be ours."""
+        if self.job is not Job.DOCK or not self.moving:
+            return
+        if isinstance(reply, Fail):
+            self._finish(False, f"the controller answers: {reply.reason or 'fail'}")
+        else:
+            self._finish(True, "the move to the dock is over; `docked` tells whether it is reached")
+
+    def piece(self, data: bytes, now: float) -> None:
+        """A datagram, while pieces are awaited."""
+        if len(data) in (PIECE, self._size % PIECE):
+            self._pieces.append(data)
+            self._piece_s = now + QUIET_S
+            if len(self._pieces) * PIECE >= self._size:
+                self._piece_s = now + QUIET_S / 3
+
+    def tick(self, now: float) -> None:
+        """Time passed."""
+        if self.collecting and now >= self._piece_s:
+            self._close_file()
+        elif self.job is not None and now >= self._until_s:
+            self._finish(False, f"the {self.job.value} took too long")
+
+    def cancel(self, why: str) -> None:
+        """Something else has ended it."""
+        if self.job is not None:
+            self._finish(False, why)
+
+    def _close_file(self) -> None:
+        came = sum(map(len, self._pieces))
+        whole = [piece for piece in self._pieces if len(piece) == PIECE]
+        if came < self._size:
+            lost = math.ceil((self._size - came) / PIECE)
+            self._finish(False, f"{lost} pieces of {self._name} were lost; call again")
+        elif came > self._size or len(set(whole)) < len(whole):
+            self._finish(False, f"pieces of {self._name} came twice; call again")
+        else:
+            content = b"".join(self._pieces)
+            ended = "; the controller has ended and must be started again" if self.ended else ""
+            self._finish(True, f"{self._name}, {came} bytes{ended}", content=content)
+
+    def _finish(self, success: bool, message: str, content: bytes = b"") -> None:
+        self.done.append(JobDone(self._token, success, message, self._name, content))
+        self._clear()

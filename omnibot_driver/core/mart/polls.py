@@ -1,0 +1,64 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is asked when, while nothing else is: each query at its own pace, by the state of motion.
+
+Encoder and heading come first and one after the other; a sonar takes 55 ms, so it is asked only
+while the robot stands. Knows queries and states; time is an argument.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from omnibot_driver.core.mart.states import State
+from omnibot_driver.core.mart.words import DOCKED, ENC, MCSTAT, RMRA, SFC, SRC, VOLTS, Word
+
+MOTION_S: Final = 0.06
+STILL: Final[Mapping[Word, float]] = {
+    RMRA: 0.1,
+    ENC: 0.1,
+    MCSTAT: 0.5,
+    VOLTS: 1.0,
+    DOCKED: 1.0,
+    SFC: 0.5,
+    SRC: 0.5,
+}
+DRIVING: Final[Mapping[Word, float]] = {RMRA: MOTION_S, ENC: MOTION_S, MCSTAT: 0.5, VOLTS: 2.0}
+TURNING: Final[Mapping[Word, float]] = {ENC: MOTION_S, MCSTAT: 0.5, VOLTS: 2.0}
+PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
+    State.STILL: STILL,
+    State.DRIVING: DRIVING,
+    State.REVERSING: DRIVING,
+    State.TURNING: TURNING,
+}
+"""By state, the most pressing first. In all others the command port is busy."""
+
+
+class Polls:
+    """When each query was asked last."""
+
+    def __init__(self) -> None:
+        self._asked_s: dict[Word, float] = {}
+
+    def connect(self) -> None:
+        """Everything is due."""
+        self._asked_s.clear()
+
+    def due(self, state: State, now: float) -> list[Word]:
+        """The queries whose time has come, the most pressing first."""
+        return [word for word in PERIODS.get(state, {}) if now >= self._at(word, state)]
+
+    def asked(self, word: Word, now: float) -> None:
+        """It was sent."""
+        self._asked_s[word] = now
+
+    def press(self, word: Word) -> None:
+        """It is due at once."""
+        self._asked_s.pop(word, None)
+
+    def wake_at(self, state: State) -> float:
+        """When the next one is due."""
+        return min((self._at(word, state) for word in PERIODS.get(state, {})), default=math.inf)
+
+    def _at(self, word: Word, state: State) -> float:
+        return self._asked_s.get(word, -math.inf) + PERIODS[state][word]

@@ -1,0 +1,164 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From speed and turn rate to the units of two motors, closed by what is measured.
+
+The controller takes changes of its units, and applies them without a regulator: what comes of a
+unit depends on voltage, motor and floor. So each side has a gain that is learned from windows of
+steady driving; the heading is held by its integral. Knows units, m/s and rad; no words. Time is an
+argument.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.mart.settings import MartSettings
+
+MOST_UNITS: Final = 127
+MOST_CHANGE: Final = 15
+"""Units in one exchange: all that a command which arrives twice can do too much."""
+SETTLE_S, LEARN_S = 0.45, 0.35
+"""After a larger change nothing is learned for so long; then each so long."""
+LARGE_UNITS: Final = 3
+LEARNED: Final = 0.7
+"""Part of what a window shows that is taken over at once."""
+LOWEST_GAIN, HIGHEST_GAIN = 0.4, 2.5
+SLOWEST_MPS: Final = 0.03
+"""Of a wheel whose gain can be learned."""
+HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
+HOLD_AFTER_S: Final = 1.0
+"""A change of the turn rate takes so long; its lag is no error to be made good."""
+NEW_RADPS: Final = 0.03
+LONGEST_STEP_S: Final = 0.2
+
+
+@dataclass(slots=True)
+class _Side:
+    """One motor. ``units``: as commanded; ``gain``: measured speed over the nominal one."""
+
+    units: int = 0
+    gain: float = 1.0
+    window_units_s: float = 0.0
+    window_m: float = 0.0
+
+    def learn(self, per_unit_mps: float) -> None:
+        """From the window that is over."""
+        nominal_m = self.window_units_s * per_unit_mps
+        if nominal_m > 0.0 and self.window_m > 0.0:
+            seen = min(HIGHEST_GAIN, max(LOWEST_GAIN, self.window_m / nominal_m))
+            self.gain += LEARNED * (seen - self.gain)
+
+    def wanted_units(self, speed_mps: float, per_unit_mps: float) -> int:
+        """For this speed, by the gain."""
+        return round(min(MOST_UNITS, max(0.0, speed_mps / (per_unit_mps * self.gain))))
+
+
+class SpeedLoop:
+    """``settings`` may be replaced; ``volts`` is the battery's, as last told."""
+
+    def __init__(self, settings: MartSettings) -> None:
+        self.settings = settings
+        self.volts = settings.nominal_volts
+        self._right, self._left = _Side(), _Side()
+        self.begin(0, False, 0.0)
+
+    def begin(self, units: int, reverse: bool, now: float) -> None:
+        """A motion has begun with these units on both sides."""
+        self._right.units = self._left.units = units
+        self._direction = -1.0 if reverse else 1.0
+        self._rate_radps = self._error_rad = 0.0
+        self._rate_changed_s = now
+        self._measured_s = now
+        self._clear(now + SETTLE_S)
+
+    def first_units(self, speed_mps: float, rate_radps: float) -> int:
+        """To begin with on both sides, for a speed along the motion: that of the slower side."""
+        right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
+        slower = min(right_mps, left_mps, key=abs)
+        return max(4, min(60, self._right.wanted_units(max(slower, 0.0), self._per_unit_mps)))
+
+    def spin_units(self, rate_radps: float) -> int:
+        """For a turn on the spot."""
+        rim_mps = abs(rate_radps) * self.settings.track_m / 2
+        return max(2, self._right.wanted_units(rim_mps, self._per_unit_mps))
+
+    def spun(self, units: int, rate_radps: float) -> None:
+        """A turn with these units had this mean rate: both sides together."""
+        nominal_radps = 2 * units * self._per_unit_mps / self.settings.track_m
+        if nominal_radps > 0.0 and abs(rate_radps) > 0.05:
+            seen = min(HIGHEST_GAIN, max(LOWEST_GAIN, abs(rate_radps) / nominal_radps))
+            ratio = seen / ((self._right.gain + self._left.gain) / 2)
+            for side in (self._right, self._left):
+                side.gain *= 1.0 + LEARNED * (ratio - 1.0)
+
+    @property
+    def units(self) -> tuple[int, int]:
+        """Right and left, along the motion."""
+        return self._right.units, self._left.units
+
+    def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
+        """Speeds of right and left in m/s. None goes back: the inner one stands at most."""
+        half = rate_radps * self.settings.track_m / 2
+        return max(0.0, speed_mps + half), max(0.0, speed_mps - half)
+
+    def measured(self, speed_mps: float, rate_radps: float, turned_rad: float, now: float) -> None:
+        """What the robot does, and how far it has turned since the last call."""
+        seconds = min(max(0.0, now - self._measured_s), LONGEST_STEP_S)
+        self._measured_s = now
+        if now - self._rate_changed_s > HOLD_AFTER_S:
+            error_rad = self._error_rad + self._rate_radps * seconds - turned_rad
+            self._error_rad = max(-HOLD_MOST_RAD, min(HOLD_MOST_RAD, error_rad))
+        if now < self._window_from_s:
+            return
+        half = self._direction * rate_radps * self.settings.track_m / 2
+        along_mps = self._direction * speed_mps
+        for side, rim_mps in ((self._right, along_mps + half), (self._left, along_mps - half)):
+            if rim_mps > SLOWEST_MPS:
+                side.window_units_s += side.units * seconds
+                side.window_m += rim_mps * seconds
+        if now - self._window_from_s >= LEARN_S:
+            for side in (self._right, self._left):
+                side.learn(self._per_unit_mps)
+            self._clear(now)
+
+    def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:
+        """What to add to right and left, positive along the motion; None for nothing.
+
+        ``speed_mps`` is along the motion and not negative; ``rate_radps`` to the left.
+        """
+        if abs(rate_radps - self._rate_radps) > NEW_RADPS:
+            self._rate_changed_s, self._error_rad = now, 0.0
+        self._rate_radps = rate_radps
+        held_radps = rate_radps + HOLD_PER_S * self._error_rad
+        right_mps, left_mps = self.sides(speed_mps, self._direction * held_radps)
+        steps = []
+        for side, rim_mps in ((self._right, right_mps), (self._left, left_mps)):
+            wanted = side.wanted_units(rim_mps, self._per_unit_mps)
+            steps.append(max(-MOST_CHANGE, min(MOST_CHANGE, wanted - side.units)))
+        right, left = steps
+        if self._right.units + right <= 0 and self._left.units + left <= 0:
+            return None
+        return (right, left) if right or left else None
+
+    def changed(self, right: int, left: int, now: float) -> None:
+        """That was sent; it is taken for obeyed, and the measurement tells if it was not."""
+        self._right.units = min(MOST_UNITS, max(0, self._right.units + right))
+        self._left.units = min(MOST_UNITS, max(0, self._left.units + left))
+        if max(abs(right), abs(left)) >= LARGE_UNITS:
+            self._clear(now + SETTLE_S)
+
+    @property
+    def _per_unit_mps(self) -> float:
+        settings = self.settings
+        return settings.speed_per_unit * self.volts / settings.nominal_volts
+
+    def _clear(self, from_s: float) -> None:
+        """A new window begins."""
+        self._window_from_s = from_s
+        for side in (self._right, self._left):
+            side.window_units_s = side.window_m = 0.0
+
+
+def turn_is_on_the_spot(speed_mps: float, rate_radps: float, track_m: float) -> bool:
+    """Whether it is nearer to a turn on the spot than to one about a standing wheel."""
+    return abs(speed_mps) < 0.5 * abs(rate_radps) * track_m / 2 or math.isclose(speed_mps, 0.0)

@@ -1,0 +1,106 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Stopping one motion: what is said until the server has answered it. The stop never waits.
+
+The right word goes out at once, over whatever else was asked, and again until it is answered. A
+start may still be on its way, and be overtaken. So a reply counts only where one of those that came
+must answer a stop that was sent when no copy of the start could come any more. The stop port comes
+last. Knows words, replies and times; not why it is stopped.
+"""
+
+from typing import Final
+
+from omnibot_driver.core.mart.replies import Fail, Ok, Reply
+from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion
+from omnibot_driver.core.mart.words import NO_MOTION, NOT_IN_MOTION, Form, Word
+
+REPEAT_S: Final = 0.3
+LEAST_S: Final = 0.12
+"""No motion is stopped sooner: an earlier reply is another's."""
+ROUNDS: Final = 3
+"""So often it is said before the stop port is."""
+STOP_PORT_TIMES: Final = 3
+
+
+class Stopping:
+    """``started_s``: when the start was sent; ``owed``: replies to other requests that look alike;
+    ``move``: the controlled move whose own reply ends it.
+    """
+
+    def __init__(
+        self,
+        motion: Motion,
+        now: float,
+        *,
+        delay_s: float,
+        started_s: float,
+        owed: int = 0,
+        move: Word | None = None,
+    ) -> None:
+        self.motion, self.move = motion, move
+        self.began_s = now
+        self.result: Ok | Fail | None = None
+        """The reply of the motion itself, where there was one."""
+        self.wake_at = now
+        self.last_port = 0
+        """How often the stop port was used as the last resort."""
+        self._sure_from_s = started_s + delay_s
+        self._needed = 1 + owed
+        self._heard = 0
+        self._rounds = 0
+        self._negative: set[str] = set()
+        longest_s = max((word.takes_s for word in HALTS[motion]), default=0.0)
+        self._silent_from_s = now + longest_s + 2 * delay_s
+        if move is not None:
+            self._silent_from_s = now + 3.0 + 2 * delay_s
+
+    def due(self, now: float) -> tuple[Word, ...]:
+        """What to say now."""
+        if now < self.wake_at:
+            return ()
+        self.wake_at = now + REPEAT_S
+        self._rounds += 1
+        if now < self._sure_from_s:
+            self._needed += 1
+        words = HALTS[self.motion]
+        silent = self._rounds > ROUNDS and now >= self._silent_from_s and not self._heard
+        if silent and self.last_port < STOP_PORT_TIMES:
+            self.last_port += 1
+            return (*words, *LAST_HALTS[self.motion])
+        return words
+
+    @property
+    def failed(self) -> bool:
+        """Neither port has brought an answer."""
+        return self.last_port >= STOP_PORT_TIMES
+
+    def hear(self, reply: Reply, now: float) -> bool:
+        """Whether it is over by this reply."""
+        if self.move is not None:
+            return self._hear_move(reply, self.move, now)
+        if now < self.began_s + LEAST_S and isinstance(reply, Ok) and reply.form is Form.INTEGER:
+            return False
+        if not self._is_answer(reply):
+            return False
+        if isinstance(reply, Fail) and reply.reason in (NO_MOTION, NOT_IN_MOTION):
+            self._negative.add(reply.reason)
+        elif isinstance(reply, Ok | Fail):
+            self.result = reply
+        self._heard += 1
+        if self.motion is Motion.UNKNOWN:
+            return len(self._negative) == len(HALTS[Motion.UNKNOWN])
+        return self._heard >= self._needed
+
+    def _is_answer(self, reply: Reply) -> bool:
+        words = HALTS[self.motion]
+        if isinstance(reply, Ok):
+            return any(reply.form in word.forms for word in words)
+        return isinstance(reply, Fail) and any(reply.reason in word.fails for word in words)
+
+    def _hear_move(self, reply: Reply, move: Word, now: float) -> bool:
+        if isinstance(reply, Ok) and reply.form not in move.forms:
+            return False
+        if not isinstance(reply, Ok | Fail):
+            return False
+        self.result = reply
+        return True

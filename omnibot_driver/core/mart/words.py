@@ -1,0 +1,181 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Every command of the MART controller, as a table: its port, its replies, its times.
+
+One command is one datagram of ASCII, without an end, and case matters. Knows words and times; not
+in which state a command may be said (``states``), nor when one is sent (``conversation``).
+"""
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Final
+
+COMMAND, STOP = 0, 1
+"""The channels: port P, and the stop port P+1, which never answers."""
+LONGEST_REQUEST: Final = 49
+"""Bytes. A datagram without any shuts the server down."""
+
+
+class Form(Enum):
+    """What follows ``ok`` in a reply."""
+
+    NOTHING = "ok"
+    NAME = "ok BBB"
+    INTEGER = "ok 12"
+    DECIMAL = "ok 1.23"
+    TRUTH = "ok true"
+    FILE = "ok name 1234"
+
+
+class Kind(Enum):
+    """What a command does."""
+
+    QUERY = "asks"
+    CHECK = "proves that the IMU is alive"
+    START = "starts a motion, and answers when it has begun"
+    CHANGE = "changes a motion"
+    MOVE = "starts a controlled move, and answers when it is over"
+    HALT = "stops a motion"
+    SERVICE = "takes its time while the robot stands"
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """One command.
+
+    ``takes_s``: how long the server takes at the most; ``least_s``: at least, so that an earlier
+    reply belongs to another command; ``fails``: texts after ``fail`` that it has; a text that is in
+    no row may come with any.
+    """
+
+    text: str
+    kind: Kind
+    forms: frozenset[Form]
+    takes_s: float
+    least_s: float = 0.0
+    channel: int = COMMAND
+    fails: frozenset[str] = field(default_factory=frozenset)
+
+    def request(self, *arguments: object) -> "Request":
+        """What to send. Raises ValueError where the server could not take it."""
+        data = " ".join([self.text, *map(str, arguments)]).encode("ascii")
+        if not 0 < len(data) <= LONGEST_REQUEST:
+            raise ValueError(f"a request has 1 to {LONGEST_REQUEST} bytes, not {len(data)}")
+        return Request(self, data)
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One datagram to be sent."""
+
+    word: Word
+    data: bytes
+
+
+CONFLICT: Final = "conflicting action in progress"
+NO_MOTION: Final = "no motion"
+NOT_IN_MOTION: Final = "no motion in progress"
+UNSUPPORTED: Final = "command not supported"
+IMU_LOST: Final = "MPU6050 connection lost"
+OBSTACLES: Final = frozenset(
+    {
+        "Insufficient front clearance.",
+        "Insufficient rear clearance.",
+        "insufficent clearence",
+        "insufficient clearance",
+    }
+)
+"""In all the server's spellings."""
+STARTING: Final = frozenset({CONFLICT, UNSUPPORTED, "", "start timedout"})
+STOPPING: Final = frozenset({"stop timedout", "stop time out", "start timedout"})
+GYRO: Final = "excessive gyro correct"
+MOVING: Final = STARTING | STOPPING | OBSTACLES | {IMU_LOST, GYRO}
+
+_OK, _INTEGER, _DECIMAL = ({form} for form in (Form.NOTHING, Form.INTEGER, Form.DECIMAL))
+
+
+def _word(
+    text: str,
+    kind: Kind,
+    forms: set[Form],
+    takes_s: float,
+    fails: frozenset[str] | set[str] = frozenset(),
+    *,
+    least_s: float = 0.0,
+    channel: int = COMMAND,
+) -> Word:
+    return Word(text, kind, frozenset(forms), takes_s, least_s, channel, frozenset(fails))
+
+
+HELLO = _word("HELLO", Kind.QUERY, {Form.NAME}, 0.05)
+ENC = _word("ENC", Kind.QUERY, _INTEGER, 0.25, {""})
+RMRA = _word("RMRA", Kind.QUERY, _DECIMAL, 0.05)
+VOLTS = _word("VOLTS", Kind.QUERY, _DECIMAL, 0.05, {""})
+MCSTAT = _word("MCSTAT", Kind.QUERY, _INTEGER, 0.25)
+DOCKED = _word("DOCKED", Kind.QUERY, {Form.TRUTH}, 0.05)
+SFC = _word("SFC", Kind.QUERY, _INTEGER, 0.15)
+SRC = _word("SRC", Kind.QUERY, _INTEGER, 0.15)
+TD = _word("TD", Kind.QUERY, _INTEGER, 0.05, {"in progress"})
+
+CHECK = _word("MCR SLOW", Kind.CHECK, _OK, 0.8, MOVING, least_s=0.32)
+"""With 0 degrees. A reply to anything before it has come by ``least_s``."""
+SSP = _word("SSP", Kind.SERVICE, _OK, 0.05, {"command missing parameter", UNSUPPORTED})
+
+RM = _word("RM", Kind.START, _OK, 1.2, STARTING | OBSTACLES | {"improper command format"})
+B = _word("B", Kind.START, _OK, 1.5, STARTING | OBSTACLES)
+R = _word("R", Kind.START, _OK, 1.2, STARTING)
+L = _word("L", Kind.START, _OK, 1.2, STARTING)
+
+RMCS = _word("RMCS", Kind.CHANGE, _DECIMAL, 0.05, {NOT_IN_MOTION, ""} | OBSTACLES)
+CS = _word("CS", Kind.CHANGE, _OK, 0.05, {"", NOT_IN_MOTION})
+
+SRM = _word("SRM", Kind.HALT, _OK, 2.2, STOPPING | OBSTACLES | {NOT_IN_MOTION})
+SM = _word("SM", Kind.HALT, _OK | _INTEGER, 2.2, STOPPING | OBSTACLES | {NO_MOTION, GYRO})
+SL = _word("SL", Kind.HALT, set(), 0.0, channel=STOP)
+SS = _word("SS", Kind.HALT, set(), 0.0, channel=STOP)
+
+TF = _word("TF", Kind.MOVE, _INTEGER, 80.0, MOVING | {"bad distance value"}, least_s=0.32)
+TB = _word("TB", Kind.MOVE, _INTEGER, 80.0, MOVING | {"bad distance value"}, least_s=0.32)
+MCR = _word("MCR", Kind.MOVE, _OK, 30.0, MOVING, least_s=0.32)
+MCL = _word("MCL", Kind.MOVE, _OK, 30.0, MOVING, least_s=0.32)
+
+SB = _word("SB", Kind.SERVICE, _OK, 5.0, {CONFLICT, ""}, least_s=0.32)
+TIME = _word("TIME", Kind.SERVICE, _OK, 2.0)
+LOG = _word("LOG", Kind.SERVICE, _OK, 2.0, {""})
+NO_FILE: Final = "no file available"
+LAST_MOVE = _word("LAST MOVE", Kind.SERVICE, {Form.FILE}, 2.0, {NO_FILE, ""})
+LAST_TURN = _word("LAST TURN", Kind.SERVICE, {Form.FILE}, 2.0, {NO_FILE, ""})
+EXIT = _word("EXIT", Kind.SERVICE, {Form.FILE, Form.NOTHING}, 2.0)
+
+WORDS: Final = (
+    *(HELLO, ENC, RMRA, VOLTS, MCSTAT, DOCKED, SFC, SRC, TD, CHECK, SSP, RM, B, R, L, RMCS, CS),
+    *(SRM, SM, SL, SS, TF, TB, MCR, MCL, SB, TIME, LOG, LAST_MOVE, LAST_TURN, EXIT),
+)
+"""All that this driver ever says."""
+KNOWN_FAILS: Final = frozenset(text for word in WORDS for text in word.fails if text)
+
+NEVER_SAID: Final = {
+    "F": "RM drives forward as well, and can turn",
+    "SDR": "no move without a distance is ever started",
+    "TFSFC": "undocumented; changes the clearance that stops the robot",
+    "MCS": "undocumented; no check for obstacles, and no heading",
+    "MSM": "undocumented; stops MCS",
+    "MNLV": "undocumented; a calibrated speed that the encoder tells better",
+    "MD": "undocumented; a distance computed from time",
+    "MCF": "undocumented; like TF, without the check of the clearance",
+    "MCB": "undocumented; like TB",
+    "MCD": "undocumented; like TD",
+    "PTF": "undocumented; TF with other gains",
+    "SLMP": "undocumented; changes F and B",
+    "SLPP": "undocumented; changes F and B",
+    "REC START": "undocumented; records the IMU into a file",
+    "REC STOP": "undocumented",
+    "RST IMU": "undocumented; MCR SLOW 0 proves the IMU as well",
+    "RST MC": "undocumented",
+    "SFR": "undocumented; ends the server where its number is missing",
+    "SRR": "undocumented; the same",
+    "SSR": "undocumented; stops SFR and SRR",
+    "SMCST": "undocumented; a test that moves the motors",
+    "STPMCST": "undocumented",
+}
+"""Commands of the server that the driver does not use, and why."""
