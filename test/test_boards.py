@@ -108,11 +108,11 @@ FEW = replace(
     authorities=frozenset({Authority.POSE}),
     requests=frozenset({Request.RESET}),
 )
-OWN = Parameter("dock_distance", 1.0, "m", "How far.", low=0.0, high=5.0)
+OWN = Parameter("tow_distance", 1.0, "m", "How far.", low=0.0, high=5.0)
 
 
 def refuse_far_docks(values: Mapping[str, Any]) -> None:
-    if values["dock_distance"] > 2.0:
+    if values["tow_distance"] > 2.0:
         raise ParameterError("too far")
 
 
@@ -137,10 +137,10 @@ def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
     }  # fmt: skip
     assert not absent & set(own.by_name)
     assert {"cmd_vel_timeout", "odom_frame", "fastest_linear_speed"} <= set(own.by_name)
-    values = own.check_all({"dock_distance": 2})
-    assert values["dock_distance"] == 2.0
+    values = own.check_all({"tow_distance": 2})
+    assert values["tow_distance"] == 2.0
     with pytest.raises(ParameterError, match="too far"):
-        own.check_all({"dock_distance": 3.0})
+        own.check_all({"tow_distance": 3.0})
 
 
 @pytest.mark.parametrize("name", ["guard", "port", "on_exit", "auto_gyro_bias", "max_linear_speed"])
@@ -181,14 +181,14 @@ def test_a_parameter_of_another_board_is_refused_by_that_boards_name(
     other = SimpleNamespace(PARAMETERS=table("few", FEW, own={"Docking": (OWN,)}))
     monkeypatch.setitem(boards.PROFILES, "few", "few_profile")
     monkeypatch.setitem(sys.modules, "few_profile", other)
-    assert boards.check_all({"board": "few", "dock_distance": 1})["board"] == "few"
+    assert boards.check_all({"board": "few", "tow_distance": 1})["board"] == "few"
     with pytest.raises(ParameterError) as refused:
         boards.check_all({"board": "few", "delta_frame": "earth"})
     assert (
         str(refused.value)
         == "parameter 'delta_frame' belongs to board omnibot, not to few; remove it"
     )
-    with pytest.raises(ParameterError, match="'dock_distance' belongs to board few, not to omnib"):
-        boards.check_all({"dock_distance": 1.0})
-    with pytest.raises(ParameterError, match=r"'dock_distanc'.*'dock_distance'.*config/few\.yaml"):
-        boards.check_all({"board": "few", "dock_distanc": 1.0})
+    with pytest.raises(ParameterError, match="'tow_distance' belongs to board few, not to omnib"):
+        boards.check_all({"tow_distance": 1.0})
+    with pytest.raises(ParameterError, match=r"'tow_distanc'.*'tow_distance'.*config/few\.yaml"):
+        boards.check_all({"board": "few", "tow_distanc": 1.0})

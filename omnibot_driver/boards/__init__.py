@@ -20,10 +20,11 @@ from omnibot_driver.transports import Transport
 PROFILES: Final = {
     "omnibot": "omnibot_driver.boards.omnibot",
     "lois_ecu": "omnibot_driver.boards.lois_ecu",
+    "mart": "omnibot_driver.boards.mart",
 }
 """By the value of the parameter ``board``: the module that is its profile."""
 DEFAULT: Final = "omnibot"
-NOT_BUILT: Final = ("mart", "fejemis")
+NOT_BUILT: Final = ("fejemis",)
 """Names that are kept for boards to come."""
 
 Publish = Callable[[Any, int], None]

@@ -104,25 +104,26 @@ class MartBoard(Board):
         """What a datagram tells."""
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
-        return self._take()
+        if self._pilot.ready:
+            self._mode = Mode.NOMINAL
+        return self._pilot.take()
 
     def silence(self) -> None:
         """The server has not answered for long: it may have been started again."""
         self._mode = Mode.UNKNOWN
-        if self._pilot.state is not State.LOST:
-            self._pilot.connect()
+        self._pilot.fell_silent()
 
     def elapse(self, now: float) -> list[Reading]:
         """Odometry, and that a silence is expected."""
-        readings = self._take()
+        readings = self._pilot.take()
         pilot = self._pilot
         if self._mode is not Mode.NOMINAL:
             return readings
         if now >= self._told_s + 1.0 / self.settings.odom_rate_hz:
             period_s = 1.0 / self.settings.odom_rate_hz
             self._told_s = max(self._told_s + period_s, now - period_s / 2)
-            readings.append(pilot.odometry.told(now, pilot.blind_since_s))
-        if pilot.busy and now >= self._expected_s + EXPECTED_EVERY_S:
+            readings.append(pilot.told(now))
+        if pilot.busy(now) and now >= self._expected_s + EXPECTED_EVERY_S:
             self._expected_s = now
             readings.append(EXPECTED)
         return readings
@@ -130,14 +131,6 @@ class MartBoard(Board):
     def reset_odometry(self) -> None:
         """The frame begins where the robot stands."""
         self._pilot.odometry.reset()
-
-    def _take(self) -> list[Reading]:
-        pilot = self._pilot
-        if pilot.greeted and not pilot.health.stranger and pilot.state is not State.LOST:
-            self._mode = Mode.NOMINAL
-        elif pilot.state is State.LOST:
-            self._mode = Mode.NOMINAL if self._mode is Mode.NOMINAL else Mode.UNKNOWN
-        return pilot.take()
 
     # Outbound
 
@@ -149,7 +142,7 @@ class MartBoard(Board):
         times = [self._pilot.wake_at]
         if self._mode is Mode.NOMINAL:
             times.append(self._told_s + 1.0 / self.settings.odom_rate_hz)
-            if self._pilot.busy:
+            if self._pilot.busy(self._expected_s + EXPECTED_EVERY_S):
                 times.append(self._expected_s + EXPECTED_EVERY_S)
         return min(times)
 

@@ -23,6 +23,8 @@ from omnibot_driver.core.readings import DisplacementReading, OdometryReading
 WINDOW_S: Final = 0.35
 """Speeds are those of this time."""
 LONGEST_PREDICTION_S: Final = 0.5
+SLOWING_S: Final = 0.12
+"""Time constant of a robot that is being stopped."""
 ACCELERATION_MPS2, ACCELERATION_RADPS2 = 1.0, 3.0
 """Of a robot that is not heard."""
 DOUBT_M, DOUBT_RAD = 0.03, 0.1
@@ -33,6 +35,8 @@ WHEEL_HEADING: Final = 0.06
 TOLD_RAD, TOLD_PART = 0.05, 0.3
 """A relative heading that is so near to what the wheel tells is that of this turn."""
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
+UNEQUAL: Final = 0.04
+"""Of two motors, where nothing but what is commanded tells of a turn."""
 BLIND_MPS: Final = 0.3
 """A robot in a controlled move of which nothing is heard is anywhere within this speed."""
 SPEED_VARIANCES: Final = (0.02**2, 0.03**2)
@@ -51,7 +55,7 @@ class MartOdometry:
         """The frame begins here."""
         self.pose = Pose()
         self._walk = Covariance()
-        self._levers = [(0.0, 0.0, 0.0)] * 2
+        self._levers = [(0.0, 0.0, 0.0)] * 3
 
     def connect(self) -> None:
         """Nothing was counted."""
@@ -67,8 +71,8 @@ class MartOdometry:
         """Of the wheels' speeds, where no heading is told and the commanded ones have to do."""
         self._track: deque[tuple[float, float, float]] = deque(maxlen=40)
         self._way_m = self._yaw_rad = 0.0
-        self.spun_rad = self._spun_in_all_rad = 0.0
-        self.moved_m = 0.0
+        self.spun_rad = self.moved_m = 0.0
+        self._spin_is_told = False
 
     @property
     def count(self) -> int | None:
@@ -86,7 +90,9 @@ class MartOdometry:
 
     def rest(self) -> None:
         """The motion is over."""
-        self.motion = Motion.NONE
+        if self.motion is not Motion.NONE:
+            self.motion = Motion.NONE
+            self.forget_speeds()
 
     def begin(self, motion: Motion, now: float) -> None:
         """A motion has begun, and the count with it."""
@@ -97,6 +103,7 @@ class MartOdometry:
         self._turned_rad = self._turned_by_now_rad = 0.0
         self.heading_changed_s = now
         self.spun_rad = self.moved_m = 0.0
+        self._spin_is_told = False
 
     def turned(self, degrees: float, at_s: float, *, doubtful: bool) -> None:
         """The relative angle."""
@@ -148,7 +155,11 @@ class MartOdometry:
         turned_rad = self._turned_rad + self._rate_radps * ahead_s
         before_rad, self._turned_by_now_rad = self._turned_by_now_rad, turned_rad
         told_rad = turned_rad - before_rad
+        if self.motion is Motion.NONE and not wheel_m:
+            return 0.0  # some servers let the heading drift while the robot stands
         if self._on_the_spot:
+            if self._spin_is_told:
+                return 0.0  # how it rolled out is in what was told
             turn_rad = 2 * wheel_m / self.settings.track_m
             told = abs(told_rad - turn_rad) < TOLD_RAD + TOLD_PART * abs(turn_rad)
             if self.motion is Motion.TURN and told:
@@ -170,6 +181,7 @@ class MartOdometry:
         yaw_yaw = max(1e-6, self._walk.yaw_yaw - max(0.0, surplus))
         self._walk = replace(self._walk, yaw_yaw=yaw_yaw)
         self.spun_rad = told_rad
+        self._spin_is_told = True
 
     def finish_straight(self) -> None:
         """A straight controlled move is over: its heading was held, as far as the server can."""
@@ -198,7 +210,9 @@ class MartOdometry:
             drift_rad = seconds
         errors = [(WAY_STDDEV**2 * abs(way_m), cos, sin, 0.0), (yaw_variance, 0.0, 0.0, 1.0)]
         self._walk = self._walk.carried(dx_m, dy_m).with_errors(errors)
-        own = ((dx_m, dy_m, 0.0), (0.0, 0.0, drift_rad))
+        guessed = self.motion is Motion.REVERSE and self.left_over_right is not None
+        bend_rad = way_m / self.settings.track_m if guessed else 0.0
+        own = ((dx_m, dy_m, 0.0), (0.0, 0.0, drift_rad), (0.0, 0.0, bend_rad))
         self._levers = [
             (x - dy_m * yaw + own_x, y + dx_m * yaw + own_y, yaw + own_yaw)
             for (x, y, yaw), (own_x, own_y, own_yaw) in zip(self._levers, own, strict=True)
@@ -223,22 +237,32 @@ class MartOdometry:
         """What is counted next is another motion."""
         self._track.clear()
 
-    def told(self, now: float, blind_since_s: float | None) -> OdometryReading:
-        """Predicted to ``now``. ``blind_since_s``: since when a controlled move is under way."""
+    def told(
+        self, now: float, *, blind_since_s: float | None, slowing_since_s: float | None
+    ) -> OdometryReading:
+        """Predicted to ``now``. ``blind_since_s``: since when a controlled move is under way;
+        ``slowing_since_s``: since when the robot is being stopped.
+        """
         speed_mps, rate_radps = self.speeds
         ahead_s = max(0.0, now - self.counted_s) if self.counted_s > -math.inf else 0.0
-        predicted_s = min(ahead_s, LONGEST_PREDICTION_S)
+        predicted_s, left = min(ahead_s, LONGEST_PREDICTION_S), 1.0
         if blind_since_s is not None:
             speed_mps = rate_radps = 0.0
+        elif slowing_since_s is not None:
+            before_s = max(0.0, min(predicted_s, slowing_since_s - self.counted_s))
+            slowing_s = max(0.0, now - max(slowing_since_s, self.counted_s))
+            left = math.exp(-slowing_s / SLOWING_S)
+            predicted_s = before_s + SLOWING_S * (1.0 - left)
         tangent = Pose(speed_mps * predicted_s, 0.0, rate_radps * predicted_s)
+        twist = BodyTwist(left * speed_mps, 0.0, left * rate_radps)
         return OdometryReading(
             now,
             self.pose.moved(roll(tangent)),
-            BodyTwist(speed_mps, 0.0, rate_radps),
+            twist,
             self._total(self._unheard(ahead_s, now, blind_since_s)),
             SPEED_VARIANCES if blind_since_s is None else (BLIND_MPS**2, 1.0),
             self.rolled + tangent,
-            BodyTwist(speed_mps, 0.0, rate_radps) if blind_since_s is None else None,
+            twist if blind_since_s is None else None,
         )
 
     def _unheard(
@@ -262,5 +286,6 @@ class MartOdometry:
 
     def _total(self, more: Iterable[tuple[float, float, float, float]]) -> Covariance:
         scale, drift = self.settings.wheel_scale**2, self.settings.gyro_drift_radps**2
-        size, bias = self._levers
-        return self._walk.with_errors([(scale, *size), (drift, *bias), *more])
+        size, bias, bend = self._levers
+        errors = [(scale, *size), (drift, *bias), (UNEQUAL**2, *bend)]
+        return self._walk.with_errors([*errors, *more])

@@ -37,7 +37,7 @@ from omnibot_driver.core.mart.states import (
 from omnibot_driver.core.mart.stopping import Stopping
 from omnibot_driver.core.mart.words import Form, Kind, Request, Word
 from omnibot_driver.core.packets import NO_PACKETS, Packets
-from omnibot_driver.core.readings import ExtraReading, NoticeReading, Reading
+from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 PROVED_S: Final = 0.2
 """So old a proof of the IMU may be when a motion starts."""
@@ -55,6 +55,8 @@ SPIN_RATIO: Final = 0.35
 """A turn on the spot keeps its speed; one that is commanded so much otherwise starts anew."""
 AGAIN_S: Final = 1.0
 """After a start that failed."""
+STOPS_S: Final = 1.0
+"""The answer to a stop takes no longer, as a rule."""
 LOST_REPEAT_S: Final = 1.0
 ESTOP_REPEAT_S: Final = 0.5
 STRAY_COUNTS: Final = 3
@@ -164,12 +166,21 @@ class Pilot:
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
         return self._started_s if moves and self.state is not State.LOST else None
 
-    @property
-    def busy(self) -> bool:
+    def busy(self, now: float) -> bool:
         """The server cannot answer now, and that is as it should be."""
-        return self.state in (State.MOVING, State.SERVING, State.CHECKING, State.STARTING) or (
-            self.state is State.STOPPING and self.greeted
-        )
+        if self._stopping is not None:
+            return self.greeted and now < self._stopping.began_s + STOPS_S
+        return self.state in (State.MOVING, State.SERVING, State.CHECKING, State.STARTING)
+
+    @property
+    def ready(self) -> bool:
+        """The server has told its name, and answered the first stop."""
+        return self.greeted and not self.health.stranger and self.state is not State.LOST
+
+    def fell_silent(self) -> None:
+        """Nothing came for long, and nothing was awaited: the server may have been restarted."""
+        if self.state in (State.STILL, State.UNKNOWN):
+            self.connect()
 
     # Time
 
@@ -482,14 +493,15 @@ class Pilot:
             return
         self.health.encoder_answers()
         self.readings.append(reading)
-        if self.state is State.STILL:
-            self._watch_stray(before, count, now)
-            return
         speed, rate = self.odometry.speeds
-        self.loop.measured(speed, rate, reading.dyaw_rad, now)
-        self._fresh = True
-        if self.state is State.TURNING:
+        if self.state is State.STILL:
+            self.odometry.rest()
+            self._watch_stray(before, count, now)
+        elif self.state is State.TURNING:
             self._spin_seen_radps = rate
+        else:
+            self._fresh = True
+            self.loop.measured(speed, rate, reading.dyaw_rad, now)
         if self.state is State.REVERSING and not self.health.heading_in_reverse:
             right, left = self.loop.units
             if now - self._begun_s > FROZEN_S and right:
@@ -569,6 +581,8 @@ class Pilot:
             # A late copy of a controlled move would keep the port silent.
             self._unanswered = 0
             return self._send((words.SL, words.SS), now)
+        if self.odometry.counted_s < self._rested_s:
+            return NO_PACKETS  # how it rolled out is counted before the count begins anew
         start = self._next_start(now)
         if start is None:
             return self._job(now)
@@ -736,8 +750,6 @@ class Pilot:
     # Goals
 
     def _next_goal_move(self, order: GoTo, now: float) -> Request | None:
-        if self.odometry.counted_s < self._rested_s + 0.05:
-            return None
         if self._move is None:
             self._move = Move(order.place)
         request = next_move(self._move, self.odometry.pose, self._settings)
@@ -793,6 +805,11 @@ class Pilot:
         return self.conversation.ask(request, now)
 
     # Telling
+
+    def told(self, now: float) -> OdometryReading:
+        """The odometry, predicted to this time."""
+        slowing_s = self._stopping.began_s if self._stopping is not None else None
+        return self.odometry.told(now, blind_since_s=self.blind_since_s, slowing_since_s=slowing_s)
 
     def take(self) -> list[Reading]:
         """What came of the replies since the last call."""

@@ -15,7 +15,7 @@ class MartSettings:
     """
 
     wheel_radius_m: float = 0.0625
-    track_m: float = 0.30
+    track_m: float = 0.40
     metres_per_count: float = 0.0004
     speed_per_unit: float = 0.0085
     nominal_volts: float = 24.0

@@ -80,7 +80,8 @@ class SpeedLoop:
     def spin_units(self, rate_radps: float) -> int:
         """For a turn on the spot."""
         rim_mps = abs(rate_radps) * self.settings.track_m / 2
-        return max(2, self._right.wanted_units(rim_mps, self._per_unit_mps))
+        gain = (self._right.gain + self._left.gain) / 2
+        return max(2, min(MOST_UNITS, round(rim_mps / (self._per_unit_mps * gain))))
 
     def spun(self, units: int, rate_radps: float) -> None:
         """A turn with these units had this mean rate: both sides together."""

@@ -72,6 +72,7 @@ class OmniBot:
     traits = TRAITS
     wake_at = math.inf
     shows_standstill = True
+    refusal = ""
 
     def __init__(self, settings: OmniBotSettings) -> None:
         self._schedule = Schedule(settings.delta_period_s)

@@ -1,0 +1,89 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The MART motion controller: its parameters, and what makes it of them."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final
+
+from omnibot_driver.boards.mart_parameters import DRIVING, SENSORS, WHEELS
+from omnibot_driver.core.geometry.differential import DifferentialKinematics
+from omnibot_driver.core.mart.board import TRAITS, MartBoard
+from omnibot_driver.core.mart.settings import MartSettings
+from omnibot_driver.parameters import table
+from omnibot_driver.transports.udp import UdpPorts
+
+SIMULATOR: Final = "omnibot_driver.simulator.mart"
+PARAMETERS: Final = table(
+    "mart",
+    TRAITS,
+    own={
+        "The robot's wheels": WHEELS,
+        "The MART controller": DRIVING,
+        "Sonars and files": SENSORS,
+    },
+    without=(
+        "baudrate",
+        "axis_signs",
+        "odom_wheel_drift",
+        "odom_wheel_slip",
+        "odom_gap_acceleration",
+        "odom_gap_angular_acceleration",
+        "twist_linear_stddev",
+        "twist_angular_stddev",
+    ),
+    changed={
+        "port": {
+            "default": "udp://192.168.1.50:5000",
+            "description": "Address of the controller, udp://host:port; its stop port is one"
+            " higher. sim:// is a simulated board inside the driver, replay://bag a recorded wire.",
+        },
+    },
+)
+
+
+def make(values: Mapping[str, Any]) -> MartBoard:
+    """The board, nothing of which is heard yet."""
+    return MartBoard(settings(values))
+
+
+def settings(values: Mapping[str, Any]) -> MartSettings:
+    """What its wire does not tell, by checked values."""
+    wheels = kinematics(values)
+    sign = -1 if values["encoder_inverted"] else 1
+    return MartSettings(
+        wheel_radius_m=wheels.wheel_radius_m,
+        track_m=wheels.track_m,
+        metres_per_count=sign * values["odom_linear_scale"] * values["metres_per_count"],
+        speed_per_unit=1.0 / values["linear_scale"],
+        nominal_volts=values["nominal_voltage"],
+        heading_sign=-1 if values["heading_inverted"] else 1,
+        network_delay_s=values["network_delay"],
+        odom_rate_hz=values["odom_rate"],
+        spin_speed=values["spin_speed"],
+        allow_reverse_goals=values["allow_reverse_goals"],
+        dock_distance_m=values["dock_distance"],
+        wheel_scale=values["odom_wheel_scale"],
+        gyro_drift_radps=values["gyro_drift"],
+    )
+
+
+def opener(values: Mapping[str, Any]) -> Callable[[], UdpPorts]:
+    """The command port, and the stop port above it."""
+    return partial(UdpPorts, values["port"], len(TRAITS.channels))
+
+
+def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
+    """Left and right, of the sizes that calibration found."""
+    linear, angular = values["odom_linear_scale"], values["odom_angular_scale"]
+    return DifferentialKinematics(
+        wheel_radius_m=linear * values["wheel_radius"], track_m=linear / angular * values["track"]
+    )
+
+
+def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
+    """Battery, sonars, dock; gyro bias, docking, log and downloads."""
+    from omnibot_driver.boards.mart_topics import MartTopics  # needs ROS
+
+    publish: Mapping[type, Any] = MartTopics(node, link, values).publish
+    return publish

@@ -1,0 +1,149 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The parameters that the MART controller has and other boards need not have. Knows no ROS."""
+
+from typing import Final
+
+from omnibot_driver.parameters import Parameter
+
+WHEELS: Final = (
+    Parameter(
+        "wheel_radius",
+        0.0625,
+        "m",
+        "Radius of a wheel, for joint_states.",
+        low=0.001,
+        high=1.0,
+        calibrated=True,
+    ),
+    Parameter(
+        "track",
+        0.40,
+        "m",
+        "From one wheel to the other.",
+        low=0.01,
+        high=10.0,
+        calibrated=True,
+    ),
+    Parameter(
+        "metres_per_count",
+        0.0004,
+        "m",
+        "Way of the right wheel for one count of its encoder.",
+        low=1e-6,
+        high=1.0,
+        calibrated=True,
+    ),
+    Parameter(
+        "encoder_inverted",
+        False,
+        "",
+        "Whether the encoder counts down while the robot drives forward.",
+        fixed=True,
+        calibrated=True,
+    ),
+)
+
+DRIVING: Final = (
+    Parameter(
+        "linear_scale",
+        128.0,
+        "unit/(m/s)",
+        "Units of motor speed (RM) for 1 m/s at nominal_voltage. It need not be exact: the speed is"
+        " closed by the encoder.",
+        low=10.0,
+        high=10_000.0,
+        calibrated=True,
+    ),
+    Parameter(
+        "nominal_voltage",
+        24.0,
+        "V",
+        "Battery voltage at which linear_scale holds; units are adapted to the measured voltage.",
+        low=6.0,
+        high=40.0,
+    ),
+    Parameter(
+        "heading_inverted",
+        False,
+        "",
+        "Whether the controller's relative angle is positive to the right.",
+        fixed=True,
+        calibrated=True,
+    ),
+    Parameter(
+        "network_delay",
+        0.3,
+        "s",
+        "Longest time that a datagram may take, either way. Commands that a late copy could harm"
+        " wait for it.",
+        low=0.01,
+        high=0.3,
+    ),
+    Parameter(
+        "spin_speed",
+        "custom",
+        "",
+        "Speed of turns on the spot: as commanded (custom, by the undocumented SSP and R CUSTOM), or"
+        " the controller's own SLOW (fixed), which is faster than most commands.",
+        choices=("custom", "fixed"),
+        fixed=True,
+    ),
+    Parameter(
+        "allow_reverse_goals",
+        False,
+        "",
+        "Let cmd_pose back up to a goal behind the robot, instead of turning to it.",
+    ),
+    Parameter(
+        "dock_distance",
+        0.5,
+        "m",
+        "How far ~/dock drives at most.",
+        low=0.05,
+        high=5.0,
+    ),
+    Parameter(
+        "odom_rate",
+        20.0,
+        "Hz",
+        "How often odom and its transform are published, predicted between the polls.",
+        low=1.0,
+        high=50.0,
+    ),
+    Parameter(
+        "set_host_time",
+        True,
+        "",
+        "Set the controller's clock to this computer's (UTC) once, when the robot stands.",
+        fixed=True,
+    ),
+    Parameter(
+        "gyro_drift",
+        0.001,
+        "rad/s",
+        "What the controller's gyro is off by after a calibration, for the covariance of odom.",
+        low=0.0,
+        high=0.1,
+    ),
+)
+
+SENSORS: Final = (
+    Parameter(
+        "range_field_of_view",
+        0.5,
+        "rad",
+        "Field of view of both sonars.",
+        low=0.01,
+        high=3.0,
+    ),
+    Parameter("range_minimum", 0.15, "m", "Nearest that a sonar tells.", low=0.0, high=5.0),
+    Parameter("range_maximum", 6.45, "m", "Farthest (254 inches).", low=0.1, high=20.0),
+    Parameter(
+        "record_directory",
+        ".",
+        "",
+        "Where downloads are written.",
+        fixed=True,
+    ),
+)

@@ -1,0 +1,191 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What only the MART controller has, as topics and services. Wires only."""
+
+import math
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path, PurePosixPath
+from typing import Any, Final, cast
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
+from sensor_msgs.msg import BatteryState, Range
+from std_msgs.msg import Bool, Header
+from std_srvs.srv import Trigger
+
+from omnibot_driver import messages
+from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.mart.board import MartBoard
+from omnibot_driver.core.mart.goal import INCH_M
+from omnibot_driver.core.mart.jobs import Job
+from omnibot_driver.core.mart.readings import (
+    BatteryReading,
+    DockedReading,
+    JobDone,
+    SonarReading,
+)
+from omnibot_driver.core.session import Session
+
+LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+NAN: Final = float("nan")
+TIME_EVERY_S: Final = 5.0
+NOT_READY: Final = (
+    "the robot is not proved to stand, or the controller is not heard: stop the sender, wait a"
+    " second, then call again"
+)
+
+
+class MartTopics:
+    """``publish``: who publishes each type of value."""
+
+    def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
+        self._node, self._link, self._values = node, link, values
+        prefix = values["frame_prefix"]
+        self._battery = node.create_publisher(BatteryState, "battery_state", 10)
+        self._ranges = {
+            side: (node.create_publisher(Range, f"range/{side}", 10), f"{prefix}range_{side}_link")
+            for side in ("front", "rear")
+        }
+        self._docked = node.create_publisher(Bool, "docked", LATCHED)
+        self._shown: bool | None = None
+        self.publish: dict[type, Callable[[Any, int], None]] = {
+            BatteryReading: self._publish_battery,
+            SonarReading: self._publish_range,
+            DockedReading: self._publish_docked,
+            JobDone: self._answer,
+        }
+        group = ReentrantCallbackGroup()
+        for name, job in (
+            ("calibrate_gyro", Job.BIAS),
+            ("dock", Job.DOCK),
+            ("start_log", Job.LOG),
+            ("download_last_move", Job.LAST_MOVE),
+            ("download_last_turn", Job.LAST_TURN),
+            ("download_log", Job.LOG_FILE),
+        ):
+            node.create_service(Trigger, f"~/{name}", self._service(job), callback_group=group)
+        if values["set_host_time"]:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self._timer = node.create_timer(TIME_EVERY_S, self._set_time, clock=steady)
+
+    # From the board
+
+    def _publish_battery(self, battery: BatteryReading, stamp_ns: int) -> None:
+        self._battery.publish(
+            BatteryState(
+                header=Header(stamp=messages.time_message(stamp_ns)),
+                voltage=battery.volts,
+                temperature=NAN,
+                current=NAN,
+                charge=NAN,
+                capacity=NAN,
+                design_capacity=NAN,
+                percentage=NAN,
+                power_supply_status=BatteryState.POWER_SUPPLY_STATUS_UNKNOWN,
+                power_supply_health=BatteryState.POWER_SUPPLY_HEALTH_UNKNOWN,
+                power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_UNKNOWN,
+                present=True,
+            )
+        )
+
+    def _publish_range(self, sonar: SonarReading, stamp_ns: int) -> None:
+        publisher, frame = self._ranges[sonar.side]
+        publisher.publish(
+            Range(
+                header=Header(stamp=messages.time_message(stamp_ns), frame_id=frame),
+                radiation_type=Range.ULTRASOUND,
+                field_of_view=self._values["range_field_of_view"],
+                min_range=self._values["range_minimum"],
+                max_range=self._values["range_maximum"],
+                range=sonar.distance_m,
+            )
+        )
+
+    def _publish_docked(self, docked: DockedReading, _stamp_ns: int) -> None:
+        if docked.docked is not self._shown:
+            self._shown = docked.docked
+            self._docked.publish(Bool(data=docked.docked))
+
+    # To the board
+
+    def _service(self, job: Job) -> Callable[..., Any]:
+        async def serve(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            arguments: tuple[object, ...] = ()
+            if job is Job.DOCK:
+                inches = max(1, math.floor(self._values["dock_distance"] / INCH_M))
+                arguments = ("DOCK", inches)
+            done = await self._ask(job, arguments)
+            response.success, response.message = done.success, done.message
+            if done.success and done.name:
+                response.success, response.message = await self._save(done)
+            return response
+
+        return serve
+
+    async def _ask(self, job: Job, arguments: tuple[object, ...]) -> JobDone:
+        answer = Future()
+
+        def ask(session: Session, now: float) -> str:
+            board = cast(MartBoard, session.board)
+            if session.state != "nominal" or not board.resting or session.estop_active:
+                return NOT_READY
+            try:
+                board.ask(job, answer, now, *arguments)
+            except RequestRefused as error:
+                return str(error)
+            return ""
+
+        if refused := self._link.call(ask):
+            return JobDone(None, False, f"{job.value} refused: {refused}")
+        done: JobDone = await answer
+        return done
+
+    async def _save(self, done: JobDone) -> tuple[bool, str]:
+        """On a thread of its own: a disk may take its time."""
+        answer = Future()
+        directory = Path(self._values["record_directory"]).expanduser()
+        path = (directory / PurePosixPath(done.name).name).absolute()
+
+        def save() -> None:
+            try:
+                directory.mkdir(parents=True, exist_ok=True)
+                path.write_text(done.content.decode("latin-1"), encoding="utf-8")
+                answer.set_result("")
+            except Exception as error:  # whoever asked is owed an answer
+                answer.set_result(str(error))
+            if self._node.executor is not None:
+                self._node.executor.wake()
+
+        threading.Thread(target=save, name="omnibot-save", daemon=True).start()
+        if trouble := await answer:
+            return False, f"{done.message}; not saved: {trouble}"
+        _, _, more = done.message.partition("; ")
+        return True, f"{path}" + (f"; {more}" if more else "")
+
+    def _answer(self, done: JobDone, _stamp_ns: int) -> None:
+        if isinstance(done.token, Future):
+            done.token.set_result(done)
+            if self._node.executor is not None:
+                self._node.executor.wake()
+        elif done.success:
+            self._timer.cancel()
+
+    def _set_time(self) -> None:
+        """Once, when the robot is proved to stand: the server integrates its gyro by this clock."""
+        utc = time.gmtime()
+        fields = (utc.tm_mon, utc.tm_mday, utc.tm_year, utc.tm_hour, utc.tm_min, utc.tm_sec)
+
+        def ask(session: Session, now: float) -> None:
+            board = cast(MartBoard, session.board)
+            if session.state == "nominal" and board.resting:
+                try:
+                    board.ask(Job.TIME, None, now, *fields)
+                except RequestRefused:
+                    return
+
+        self._link.call(ask)
