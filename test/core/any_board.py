@@ -15,6 +15,7 @@ from omnibot_driver.boards import PROFILES
 from omnibot_driver.core.board import Board
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
+from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
@@ -155,7 +156,9 @@ class AnyBench:
         settings = SessionSettings(
             limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
         )
-        self.session = Session(board, settings, run=True)
+        goals_too = {Authority.BASE, Authority.POSE} <= board.traits.authorities
+        control = None if board.traits.own_odometry and goals_too else "velocity"
+        self.session = Session(board, settings, run=True, control=control)
         self.now = 1000.0
         self.hears = self.speaks = True
         self.events: list[Event] = []

@@ -18,8 +18,46 @@ INCH_M: Final = 0.0254
 NEAR_M: Final = 0.04
 NEAR_RAD: Final = math.radians(2.5)
 SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
+ENOUGH_MOVES, ENOUGH_M = 4, 0.08
+"""After so many moves this is near enough: each more would turn round for it."""
+STRETCH: Final = 1.3
+"""Of straight moves, at first: 12 inches were seen to be 15.8."""
+MOST_SURPLUS_DEG: Final = 10.0
 MOST_MOVES: Final = 9
 """A goal that is not reached by then is left as it is."""
+
+
+class Surplus:
+    """By how much controlled moves go beyond what was asked, as they were measured.
+
+    Turns by some degrees, straight ones by a part: the controller ends them by time.
+    """
+
+    def __init__(self) -> None:
+        self._degrees = {True: 0.0, False: 0.0}
+        self._stretch = {True: STRETCH, False: STRETCH}
+
+    def learn(self, request: Request, way_m: float, turned_rad: float) -> None:
+        """A move is over; both have any sign."""
+        parts = request.data.split()
+        slow, asked = b"SLOW" in parts, float(parts[-1])
+        if request.word in (TF, TB):
+            seen = min(2.0, max(0.5, abs(way_m) / INCH_M / asked))
+            self._stretch[slow] += (seen - self._stretch[slow]) / 2
+            return
+        beyond = abs(math.degrees(turned_rad)) - asked
+        before = self._degrees[slow]
+        self._degrees[slow] = min(MOST_SURPLUS_DEG, max(0.0, before + (beyond - before) / 2))
+
+    def degrees(self, wanted: float, *, slow: bool) -> int:
+        """What to ask for, to turn so many degrees; 0 for less than can be turned."""
+        surplus = self._degrees[slow]
+        return max(1, round(wanted - surplus)) if wanted > surplus / 2 else 0
+
+    def inches(self, way_m: float) -> tuple[int, bool]:
+        """What to ask for, to drive so far, and whether slowly."""
+        slow = way_m / INCH_M < SLOW_BELOW_IN
+        return max(1, round(way_m / INCH_M / self._stretch[slow])), slow
 
 
 @dataclass(slots=True)
@@ -31,27 +69,29 @@ class Move:
     given_up: bool = False
 
 
-def next_move(move: Move, pose: Pose, settings: MartSettings) -> Request | None:
+def next_move(move: Move, pose: Pose, settings: MartSettings, surplus: Surplus) -> Request | None:
     """What leads on from here; None at the goal, or when it is given up."""
     if move.given_up or move.said >= MOST_MOVES:
         return None
     way = pose.way_to(move.place)
-    inches = round(way.way_m / INCH_M)
-    if way.way_m <= NEAR_M or inches < 1:
-        return _turn(way.yaw_rad)
+    if way.way_m <= (NEAR_M if move.said < ENOUGH_MOVES else ENOUGH_M):
+        return _turn(way.yaw_rad, NEAR_RAD, surplus)
     bearing_rad = math.atan2(way.y_m, way.x_m)
     backward = settings.allow_reverse_goals and abs(bearing_rad) > math.pi / 2
     if backward:
         bearing_rad = math.remainder(bearing_rad - math.pi, math.tau)
-    if turn := _turn(bearing_rad, max(NEAR_RAD, math.atan2(NEAR_M / 2, way.way_m))):
+    if turn := _turn(bearing_rad, max(NEAR_RAD, math.atan2(NEAR_M / 2, way.way_m)), surplus):
         return turn
     word = TB if backward else TF
-    return word.request(*(("SLOW",) if inches < SLOW_BELOW_IN else ()), inches)
+    inches, slow = surplus.inches(way.way_m)
+    return word.request(*(("SLOW",) if slow else ()), inches)
 
 
-def _turn(angle_rad: float, near_rad: float = NEAR_RAD) -> Request | None:
-    degrees = round(abs(math.degrees(angle_rad)))
-    if abs(angle_rad) <= near_rad or degrees < 1:
+def _turn(angle_rad: float, near_rad: float, surplus: Surplus) -> Request | None:
+    wanted = abs(math.degrees(angle_rad))
+    slow = wanted < SLOW_BELOW_DEG
+    degrees = surplus.degrees(wanted, slow=slow)
+    if abs(angle_rad) <= near_rad or not degrees:
         return None
     word = MCL if angle_rad > 0.0 else MCR
-    return word.request(*(("SLOW",) if degrees < SLOW_BELOW_DEG else ()), degrees)
+    return word.request(*(("SLOW",) if slow else ()), degrees)

@@ -62,7 +62,7 @@ class MartOdometry:
         self.motion = Motion.NONE
         self.counted_s = self._heading_s = -math.inf
         self._count: int | None = None
-        self._zeroed = False
+        self._zeroed = self._begins = False
         self._heading_rad: float | None = None
         self._rate_radps = 0.0
         self._turned_rad = self._turned_by_now_rad = 0.0
@@ -85,7 +85,7 @@ class MartOdometry:
         return self._heading_s
 
     def zeroed(self) -> None:
-        """The count may begin anew: what a motion does, and the check of the IMU."""
+        """The count may begin anew, by the check of the IMU."""
         self._zeroed = True
 
     def rest(self) -> None:
@@ -98,8 +98,9 @@ class MartOdometry:
         """A motion has begun, and the count with it."""
         self.motion = motion
         self.left_over_right = None
-        self._zeroed = True
-        self._heading_rad = None
+        self._count, self._zeroed, self._begins = 0, True, True
+        if motion is Motion.REFERENCE:
+            self._heading_rad = None
         self._turned_rad = self._turned_by_now_rad = 0.0
         self.heading_changed_s = now
         self.spun_rad = self.moved_m = 0.0
@@ -137,8 +138,9 @@ class MartOdometry:
         speed_mps, rate_radps = self.speeds
         wheel_mps = speed_mps + rate_radps * settings.track_m / 2
         most_m = DOUBT_M + ACCELERATION_MPS2 * seconds * seconds / 2
-        if doubtful and abs(wheel_m - wheel_mps * seconds) > most_m:
+        if doubtful and not self._begins and abs(wheel_m - wheel_mps * seconds) > most_m:
             return None
+        self._begins = False
         self._count, self.counted_s, self._zeroed = count, at_s, False
         turn_rad = self._turn_rad(wheel_m, at_s)
         way_m = 0.0 if self._on_the_spot else wheel_m - turn_rad * settings.track_m / 2

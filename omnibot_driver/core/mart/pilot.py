@@ -15,7 +15,7 @@ from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer, Conversation
-from omnibot_driver.core.mart.goal import Move, next_move
+from omnibot_driver.core.mart.goal import Move, Surplus, next_move
 from omnibot_driver.core.mart.health import Health
 from omnibot_driver.core.mart.jobs import Jobs
 from omnibot_driver.core.mart.odometry import MartOdometry
@@ -86,6 +86,7 @@ class Pilot:
         self.decoder = MartDecoder()
         self.jobs = Jobs()
         self.proof = StopProof()
+        self._surplus = Surplus()
         self._polls = Polls()
         self.readings: list[Reading] = []
         self.lost = 0
@@ -115,6 +116,7 @@ class Pilot:
         self._stopping: Stopping | None = None
         self._move: Move | None = None
         self._start: Word | None = None
+        self._moved_by: Request | None = None
         self._proved_s = self._started_s = self._begun_s = self._harmful_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
         self._spin_radps = self._spin_seen_radps = 0.0
@@ -337,6 +339,7 @@ class Pilot:
     def _stopped(self, now: float) -> None:
         """The server has answered the stop."""
         stopping, self._stopping = self._stopping, None
+        self._moved_by = None  # it was cut short
         assert stopping is not None
         result, motion = stopping.result, stopping.motion
         if motion is Motion.SPIN and isinstance(result, Ok) and result.form is Form.INTEGER:
@@ -495,6 +498,9 @@ class Pilot:
         self.readings.append(reading)
         speed, rate = self.odometry.speeds
         if self.state is State.STILL:
+            if self._moved_by is not None and self.odometry.motion is not Motion.NONE:
+                self._surplus.learn(self._moved_by, self.odometry.moved_m, self.odometry.spun_rad)
+                self._moved_by = None
             self.odometry.rest()
             self._watch_stray(before, count, now)
         elif self.state is State.TURNING:
@@ -684,6 +690,7 @@ class Pilot:
         self.odometry.forget_speeds()
         self.odometry.begin(self.motion, now)
         if start.word.kind is Kind.MOVE:
+            self._moved_by = start
             self.state = State.MOVING
             self.commanded = None
         elif self.motion is Motion.REFERENCE:
@@ -752,7 +759,7 @@ class Pilot:
     def _next_goal_move(self, order: GoTo, now: float) -> Request | None:
         if self._move is None:
             self._move = Move(order.place)
-        request = next_move(self._move, self.odometry.pose, self._settings)
+        request = next_move(self._move, self.odometry.pose, self._settings, self._surplus)
         if request is None:
             return None
         if request.word in NEEDS_IMU and now > self._proved_s + PROVED_S:
