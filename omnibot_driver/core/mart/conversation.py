@@ -87,9 +87,12 @@ class Conversation:
     def _owed(self, word: Word, now: float) -> bool:
         return any(self._owed_until_s.get(form, -math.inf) > now for form in word.forms)
 
-    def ask(self, request: Request, now: float) -> Packets:
-        """Send a request that is to be answered."""
-        self.pending = Pending(request, now, now + self._patience_s(request.word))
+    def ask(self, request: Request, now: float, takes_s: float | None = None) -> Packets:
+        """Send a request that is to be answered; ``takes_s``: at most, if not as its word says."""
+        patience_s = self._patience_s(request.word)
+        if takes_s is not None:
+            patience_s = takes_s + 2 * self.delay_s
+        self.pending = Pending(request, now, now + patience_s)
         return ((request.word.channel, request.data),)
 
     def give_up(self, now: float) -> Word | None:

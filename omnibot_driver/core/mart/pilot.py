@@ -34,7 +34,7 @@ from omnibot_driver.core.mart.states import (
     State,
     may_say,
 )
-from omnibot_driver.core.mart.stopping import Stopping
+from omnibot_driver.core.mart.stopping import ANSWERS, Stopping
 from omnibot_driver.core.mart.words import Form, Kind, Request, Word
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
@@ -127,6 +127,7 @@ class Pilot:
         self._stray_s = self._swept_s = -math.inf
         self._negative_sweep = self._check_wanted = False
         self._rested_s = -math.inf
+        self._counted_at_rest = 0
         self._unanswered = 0
         self._fresh = False
         self._told: set[str] = set()
@@ -291,7 +292,8 @@ class Pilot:
         if why:
             self._notice(f"{why}; robot stopped", halt=True)
         pending = self.conversation.pending
-        owed = int(pending is not None and pending.word.kind is Kind.START)
+        answers = ANSWERS.get(self.motion, ())
+        owed = int(pending is not None and any(form in answers for form in pending.word.forms))
         self.conversation.give_up(now)
         move = self._start if self.motion in (Motion.STRAIGHT, Motion.TURN) else None
         self._stopping = Stopping(
@@ -320,7 +322,7 @@ class Pilot:
         if said:
             self.proof.stopped(now)
             self.commanded = STANDING
-            if not self.greeted:
+            if not self.greeted or stopping.asks_name(now):
                 packets += self._greet(now)
         return packets
 
@@ -362,6 +364,7 @@ class Pilot:
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
         self._rested_s = now
+        self._counted_at_rest = 0
         self._unanswered = 0
         self._next_s = -math.inf
 
@@ -431,6 +434,8 @@ class Pilot:
             return
         self.health.stranger = ""
         self.conversation.hear(reply, now)
+        if self._stopping is not None and self._stopping.asks_name(now):
+            self._stopped(now)  # the command port is free: the move is over, its reply was lost
         if self.state is State.LOST:
             self._notice("the server answers again; it is stopped first", halt=True)
             self.state, self.motion = State.UNKNOWN, Motion.UNKNOWN
@@ -462,7 +467,7 @@ class Pilot:
         if word.kind is Kind.START:
             self._halt(now, f"{word.text} was not answered")
         elif word.kind is Kind.MOVE:
-            self._halt(now, f"{word.text} was not answered in its time")
+            self._halt(now)  # its reply is lost, or it takes too long; the way is planned anew
         elif word is words.CHECK:
             self.state = State.STILL
             self._again_s = now + 0.1
@@ -515,8 +520,10 @@ class Pilot:
 
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
         """A robot that stands is counted: a late copy of a start, another client, or a push."""
-        stray = before is not None and abs(count - before) > STRAY_COUNTS and abs(count) > 2
-        if not stray or now - self._rested_s < 0.3 or now - self._stray_s < STRAY_AGAIN_S:
+        self._counted_at_rest += 1
+        if self._counted_at_rest < 2 or now - self._rested_s < 0.3 or before is None:
+            return
+        if abs(count - before) <= STRAY_COUNTS or now - self._stray_s < STRAY_AGAIN_S:
             return
         if self._negative_sweep and now - self._swept_s < 2.0:
             # Neither word found a motion, and it still moves: the check ends with the motors off.
@@ -592,13 +599,17 @@ class Pilot:
         start = self._next_start(now)
         if start is None:
             return self._job(now)
-        if now < self._again_s or now < self._harmful_s + self._delay_s:
+        if now < self._again_s:
             return NO_PACKETS
         if why := self.refusal:
             self._notice(why, halt=True)
             return NO_PACKETS
+        if packets := self._prepare_spin(start, now):
+            return packets
         if start.word in NEEDS_IMU and now > self._proved_s + PROVED_S:
-            return self._prepare_spin(start, now) or self._check(now)
+            return self._check(now)
+        if now < self._harmful_s + self._delay_s:
+            return NO_PACKETS
         return self._begin(start, now)
 
     @property
@@ -699,7 +710,7 @@ class Pilot:
             self.loop.begin(SLOW_UNITS, True, now)
         elif self._spin_is_fixed:
             self._spin_units = SLOW_UNITS
-        return self._ask(start, now)
+        return self.conversation.ask(start, now, takes_s=_longest_s(start))
 
     def _started(self, reply: Ok | Fail, now: float) -> None:
         if isinstance(reply, Fail):
@@ -840,8 +851,21 @@ class Pilot:
 
 
 _ROLLING: Final = (State.DRIVING, State.REVERSING, State.TURNING)
+STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
+"""Of the slowest controlled moves, with a margin."""
 SLOW_UNITS: Final = 20
 """Of B SLOW, R SLOW and L SLOW."""
+
+
+def _longest_s(start: Request) -> float:
+    """How long the server may take to answer it."""
+    if start.word.kind is not Kind.MOVE:
+        return start.word.takes_s
+    asked = float(start.data.split()[-1])
+    straight = STARTS[start.word] is Motion.STRAIGHT
+    return min(
+        start.word.takes_s, 3.0 + asked * (STRAIGHT_S_PER_IN if straight else TURN_S_PER_DEG)
+    )
 
 
 def _stands(wanted: Wanted) -> bool:

@@ -20,6 +20,15 @@ LEAST_S: Final = 0.12
 ROUNDS: Final = 3
 """So often it is said before the stop port is."""
 STOP_PORT_TIMES: Final = 3
+ANSWERS: Final = {
+    Motion.REFERENCE: (Form.NOTHING,),
+    Motion.REVERSE: (Form.NOTHING,),
+    Motion.SPIN: (Form.NOTHING, Form.INTEGER),
+    Motion.UNKNOWN: (Form.NOTHING, Form.INTEGER),
+}
+"""What follows ``ok`` when the server has stopped it."""
+ASK_NAME_S: Final = 0.9
+"""After the first stop of a controlled move, which ends within this time."""
 
 
 class Stopping:
@@ -45,7 +54,7 @@ class Stopping:
         self.last_port = 0
         """How often the stop port was used as the last resort."""
         self._sure_from_s = started_s + delay_s
-        self._needed = 1 + owed
+        self._needed, self._owed = 1, owed
         self._heard = 0
         self._rounds = 0
         self._negative: set[str] = set()
@@ -69,6 +78,12 @@ class Stopping:
             return (*words, *LAST_HALTS[self.motion])
         return words
 
+    def asks_name(self, now: float) -> bool:
+        """Whether the server is asked for its name too: the reply to a move may have been lost,
+        and whoever tells its name is done with the move.
+        """
+        return self.move is not None and now >= self.began_s + ASK_NAME_S
+
     @property
     def failed(self) -> bool:
         """Neither port has brought an answer."""
@@ -78,9 +93,10 @@ class Stopping:
         """Whether it is over by this reply."""
         if self.move is not None:
             return self._hear_move(reply, self.move, now)
-        if now < self.began_s + LEAST_S and isinstance(reply, Ok) and reply.form is Form.INTEGER:
-            return False
         if not self._is_answer(reply):
+            return False
+        if now < self.began_s + LEAST_S and isinstance(reply, Ok) and self._owed:
+            self._owed -= 1
             return False
         if isinstance(reply, Fail) and reply.reason in (NO_MOTION, NOT_IN_MOTION):
             self._negative.add(reply.reason)
@@ -89,12 +105,12 @@ class Stopping:
         self._heard += 1
         if self.motion is Motion.UNKNOWN:
             return len(self._negative) == len(HALTS[Motion.UNKNOWN])
-        return self._heard >= self._needed
+        return self._heard >= self._needed + self._owed
 
     def _is_answer(self, reply: Reply) -> bool:
         words = HALTS[self.motion]
         if isinstance(reply, Ok):
-            return any(reply.form in word.forms for word in words)
+            return reply.form in ANSWERS.get(self.motion, ())
         return isinstance(reply, Fail) and any(reply.reason in word.fails for word in words)
 
     def _hear_move(self, reply: Reply, move: Word, now: float) -> bool:
