@@ -84,8 +84,8 @@ DRIVING: Final = (
         "spin_speed",
         "custom",
         "",
-        "Speed of turns on the spot: as commanded (custom, by the undocumented SSP and R CUSTOM), or"
-        " the controller's own SLOW (fixed), which is faster than most commands.",
+        "Speed of turns on the spot: as commanded (custom, by the undocumented SSP and R CUSTOM),"
+        " or the controller's own SLOW (fixed), which is faster than most commands.",
         choices=("custom", "fixed"),
         fixed=True,
     ),

@@ -122,6 +122,7 @@ class Pilot:
         self._spin_radps = self._spin_seen_radps = 0.0
         self._spin_units = 0
         self._custom_units: int | None = None
+        self._custom_s = -math.inf
         self._custom_refused = False
         self._blocked: Motion = Motion.NONE
         self._stray_s = self._swept_s = -math.inf
@@ -606,10 +607,12 @@ class Pilot:
             return NO_PACKETS
         if packets := self._prepare_spin(start, now):
             return packets
-        if start.word in NEEDS_IMU and now > self._proved_s + PROVED_S:
-            return self._check(now)
         if now < self._harmful_s + self._delay_s:
             return NO_PACKETS
+        if start.word in NEEDS_IMU and now > self._proved_s + PROVED_S:
+            return self._check(now)
+        if self.odometry.counted_s < self._harmful_s + self._delay_s:
+            return NO_PACKETS  # a late copy of a move would have the port now
         return self._begin(start, now)
 
     @property
@@ -651,10 +654,10 @@ class Pilot:
             return NO_PACKETS
         _, twist = self._wish(now)
         units = self.loop.spin_units(twist.yaw_rate_radps)
-        if units == self._custom_units:
-            return NO_PACKETS
+        if units == self._custom_units or now < self._custom_s + self._delay_s:
+            return NO_PACKETS  # a copy of an older speed must not come after a newer one
         self._spin_units = units
-        self._harmful_s = now
+        self._custom_s = now
         return self._ask(words.SSP.request(5, units), now)
 
     def _custom_set(self, reply: Ok | Fail) -> None:

@@ -82,7 +82,7 @@ MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
     State.STILL: QUICK
     | {SFC, SRC, TD, CHECK, SSP, RM, B, R, L, TF, TB, MCR, MCL, SRM, SM, SL, SS}
     | {SB, TIME, LOG, LAST_MOVE, LAST_TURN, EXIT},
-    State.CHECKING: frozenset({SS}),
+    State.CHECKING: frozenset(),
     State.STARTING: frozenset({SRM, SM}),
     State.DRIVING: QUICK | {RMCS, SRM},
     State.REVERSING: QUICK | {CS, SM},
@@ -131,9 +131,10 @@ STARTS: Final[Mapping[Word, Motion]] = {
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB})
 """With a dead IMU these start the motors and never answer, or start when it is back."""
 
-HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME, SSP})
+HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})
 """A copy of one of these that arrives late does something else than it was meant to do, once
-another motion has begun: none begins before no copy can come any more."""
+another motion has begun: no motion begins, and no check is made for one, before no copy can come
+any more."""
 
 WHILE: Final[Mapping[Motion, State]] = {
     Motion.NONE: State.STILL,

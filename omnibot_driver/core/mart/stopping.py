@@ -93,6 +93,8 @@ class Stopping:
         """Whether it is over by this reply."""
         if self.move is not None:
             return self._hear_move(reply, self.move, now)
+        if self.last_port:
+            return False  # the stop port may have left the server unable to begin or end anything
         if not self._is_answer(reply):
             return False
         if now < self.began_s + LEAST_S and isinstance(reply, Ok) and self._owed:

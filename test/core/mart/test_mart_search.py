@@ -1,0 +1,125 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""No sequence of wishes, losses, copies and delays leads to a server that hangs or is orphaned."""
+
+from collections.abc import Callable
+from typing import Final
+
+import mart_model as model
+import pytest
+from mart_model import Server
+
+from omnibot_driver.core.mart.states import Motion, State
+from omnibot_driver.simulator.mart import FIRMWARE, Kind, MartServer, MartSettings
+
+SETTLES_S: Final = 0.9
+"""Longer than any answer but those of controlled moves, which are chosen to last."""
+ON_THE_WIRE: Final = {
+    "RM": b"RM 30",
+    "TF": b"TF 200",
+    "MCR": b"MCR 350",
+    "CHECK": b"MCR SLOW 0",
+    "B": b"B SLOW",
+    "R": b"R SLOW",
+    "L": b"L SLOW",
+}
+KINDS: Final = {
+    None: Motion.NONE,
+    Kind.REFERENCE: Motion.REFERENCE,
+    Kind.LINEAR: Motion.REVERSE,
+    Kind.SPIN: Motion.SPIN,
+    Kind.CONTROLLED_LINEAR: Motion.STRAIGHT,
+    Kind.CONTROLLED_SPIN: Motion.TURN,
+}
+
+
+def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
+    """With up to two copies on their way, a late reply, and an IMU that may die at any step."""
+    found = model.search()
+    assert found.bad == ()
+    assert found.worlds > 10_000
+
+
+TRAPS: Final[dict[str, tuple[Callable[[State, str, Motion], bool], str]]] = {
+    "SL before SM": (
+        lambda state, word, motion: word == "SL" and state is State.REVERSING,
+        "the next stop will hang",
+    ),
+    "SS during RM": (
+        lambda state, word, motion: word == "SS" and state is State.DRIVING,
+        "the next stop will hang",
+    ),
+    "L during RM": (
+        lambda state, word, motion: word == "L" and state is State.DRIVING,
+        "the command port hangs",
+    ),
+}
+
+
+@pytest.mark.parametrize("trap", TRAPS)
+def test_a_planted_trap_is_found(trap: str) -> None:
+    """A table that allows one word too many."""
+    more, trouble = TRAPS[trap]
+    found = model.search(lambda *asked: model.table(*asked) or more(*asked))
+    assert trouble in found.bad[-1]
+    assert any(step.startswith(trap.split()[0]) for step in found.bad)
+
+
+def test_a_driver_that_does_not_wait_for_late_copies_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Without the rule about what is harmful late."""
+    monkeypatch.setattr(model, "HARMFUL_LATE", frozenset())
+    assert model.search().bad
+
+
+class Desk:
+    """The simulated firmware, to which every datagram is delivered."""
+
+    def __init__(self) -> None:
+        self.server = MartServer(MartSettings(quirks=FIRMWARE))
+        self.now_s = 1.0
+
+    def do(self, what: str) -> None:
+        if what == "the IMU dies":
+            self.server.imu.alive = False
+        else:
+            port = int(what in ("SL", "SS"))
+            data = ON_THE_WIRE.get(what, what.encode())
+            self.server.receive(data, port, None, self.now_s)
+        self.now_s += SETTLES_S
+        self.server.advance(self.now_s)
+
+    @property
+    def seen(self) -> Server:
+        server = self.server
+        port = "hung" if server.hung or server.blocked else "busy" if server.busy else "free"
+        motion = KINDS[server.motion]
+        moving = server.moving
+        released = motion is not Motion.NONE and port == "free" and not moving
+        return Server(motion, moving, port, released, server.imu.alive, bool(server.crashed))
+
+
+def compared(server: Server) -> Server:
+    """What can be seen of it: a port that is silent for good does not tell why."""
+    if server.port in ("waits", "hung"):
+        return server._replace(port="hung", motion=Motion.NONE, released=False)
+    return server
+
+
+@pytest.mark.parametrize("word", [*model.SAID, "the IMU dies"])
+def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
+    """In every state of the server that answers; one that is busy keeps what comes for later."""
+    for server, way in model.servers().items():
+        if server.port in ("hung", "waits") or (server.released and word == "L"):
+            continue
+        if server.port == "busy" and word not in ("SL", "SS"):
+            continue
+        if word == "the IMU dies":
+            expected = server._replace(imu=False)
+        else:
+            expected, _ = model.execute(server, word)
+        desk = Desk()
+        for what in (*way, word):
+            desk.do(what)
+        assert compared(desk.seen) == compared(expected), (way, word)
