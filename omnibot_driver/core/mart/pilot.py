@@ -116,6 +116,7 @@ class Pilot:
         self._stopping: Stopping | None = None
         self._move: Move | None = None
         self._start: Word | None = None
+        self._moved_last = False
         self._moved_by: Request | None = None
         self._proved_s = self._started_s = self._begun_s = self._harmful_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
@@ -333,11 +334,15 @@ class Pilot:
     def _send(self, said: tuple[Word, ...], now: float) -> Packets:
         """Words that nothing is awaited of."""
         for word in said:
-            if not may_say(self.state, word, self.motion):
-                raise AssertionError(f"{word.text} in {self.state}")
+            self._require(word)
             if word in HARMFUL_LATE:
                 self._harmful_s = now
         return tuple((word.channel, word.request().data) for word in said)
+
+    def _require(self, word: Word) -> None:
+        """Whatever is sent is in the table; anything else is a defect, and is not sent."""
+        if not may_say(self.state, word, self.motion):
+            raise AssertionError(f"{word.text} must not be said while {self.state.value}")
 
     def _stopped(self, now: float) -> None:
         """The server has answered the stop."""
@@ -578,6 +583,7 @@ class Pilot:
         if change is None:
             return NO_PACKETS
         right, left = change
+        self._require(words.RMCS if self.state is State.DRIVING else words.CS)
         self.loop.changed(right, left, now)
         if self.state is State.DRIVING:
             return self._ask(words.RMCS.request(right, left), now)
@@ -591,10 +597,10 @@ class Pilot:
         if self._check_wanted:
             self._check_wanted = False
             return self._check(now)
-        if self._unanswered >= 2 and now - self._harmful_s < 30.0:
+        if self._unanswered >= 2 and self._moved_last:
             # A late copy of a controlled move would keep the port silent.
             self._unanswered = 0
-            return self._send((words.SL, words.SS), now)
+            return self._send((words.SL, words.SS), now)  # RM and B would hang by them
         if self.odometry.counted_s < self._rested_s:
             return NO_PACKETS  # how it rolled out is counted before the count begins anew
         start = self._next_start(now)
@@ -671,6 +677,7 @@ class Pilot:
         )
 
     def _check(self, now: float) -> Packets:
+        self._require(words.CHECK)
         self.state = State.CHECKING
         self.odometry.zeroed()
         return self._ask(words.CHECK.request(0), now)
@@ -691,6 +698,8 @@ class Pilot:
             self._notice(f"the check of the IMU failed: {reply.reason or 'fail'}", halt=True)
 
     def _begin(self, start: Request, now: float) -> Packets:
+        self._require(start.word)
+        self._moved_last = start.word.kind is Kind.MOVE
         self.state, self.motion = State.STARTING, STARTS[start.word]
         self._start = start.word
         self._started_s = now
@@ -810,6 +819,7 @@ class Pilot:
         self.jobs.sent(request, now)
         if request.word in STARTS:
             return self._begin(request, now)
+        self._require(request.word)
         self.state = State.SERVING
         if request.word in HARMFUL_LATE:
             self._harmful_s = now
@@ -818,6 +828,7 @@ class Pilot:
     def _poll(self, now: float) -> Packets:
         for word in self._polls.due(self.state, now):
             if self.conversation.may_ask(word, now):
+                self._require(word)
                 self._polls.asked(word, now)
                 return self._ask(word.request(), now)
         return NO_PACKETS

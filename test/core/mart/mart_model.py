@@ -59,7 +59,8 @@ class Server(NamedTuple):
 
 
 class Driver(NamedTuple):
-    """``proved``: the IMU was, just now. ``pending``: what is to be answered. ``unanswered``: stops.
+    """``proved``: the IMU was, just now. ``pending``: what is to be answered. ``unanswered``: so
+    many stops.
 
     ``moved``: the last motion that was begun was a controlled move; ``counted``: the encoder was
     answered since the robot stands, and since no harmful copy can come any more.
@@ -160,9 +161,9 @@ def allowed(world: World, word: str, rules: Rules) -> bool:
         BY_TEXT[copy] in HARMFUL_LATE for copy in world.copies
     ):
         return False
-    if row in STARTS and driver.state is State.STILL:
-        if not driver.counted or (row in NEEDS_IMU and not driver.proved):
-            return False
+    unproved = not driver.counted or (row in NEEDS_IMU and not driver.proved)
+    if row in STARTS and driver.state is State.STILL and unproved:
+        return False
     if word in ("SL", "SS") and driver.state is State.STILL:
         return driver.moved
     if driver.state is State.STOPPING and word not in {row.text for row in HALTS[driver.motion]}:
