@@ -136,7 +136,6 @@ MAKERS: dict[str, Callable[[], tuple[Board, Any]]] = {
     "lois_ecu as documented": lambda: lois_ecu("documented"),
     "mart": lambda: mart("firmware"),
     "mart as documented": lambda: mart("documented"),
-    "mart as its source": lambda: mart("source"),
     "two lines": lambda: (line_board.make({}), LineRobot()),
     "requests": lambda: (request_board.make({}), RequestRobot()),
 }

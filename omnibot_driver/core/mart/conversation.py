@@ -29,6 +29,8 @@ from omnibot_driver.core.packets import Packets
 QUICKEST_S: Final = 0.1
 """Less patience than this a query never needs."""
 SMOOTHING: Final = 0.2
+LOSS, LOSS_S = 1.5, 0.02
+"""A query that was not answered may have been given up too soon: the next is waited for longer."""
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Asked at once, whatever reply may still come."""
 
@@ -110,6 +112,8 @@ class Conversation:
         """The pending request, where its time is over; it is given up."""
         if self.pending is None or now < self.pending.until_s:
             return None
+        if self.pending.word.kind is Kind.QUERY:
+            self._trip_s = min(self.delay_s, LOSS * self._trip_s + LOSS_S)
         return self.give_up(now)
 
     def hear(self, reply: Reply, now: float) -> Answer | None:

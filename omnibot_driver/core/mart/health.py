@@ -120,7 +120,7 @@ class Health:
             return f"the motor board reports {self.tripped}: check motors, wiring and power"
         if self.imu_dead:
             return "the IMU does not answer (MPU6050 connection lost): check its wiring and restart"
-        if self.reference_fails >= 2:
+        if self.reference_fails:
             return "this server answers 'fail' to RM although the robot moves: update the server"
         return ""
 

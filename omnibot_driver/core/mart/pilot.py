@@ -127,7 +127,7 @@ class Pilot:
         self._custom_refused = False
         self._blocked: Motion = Motion.NONE
         self._stray_s = self._swept_s = -math.inf
-        self._negative_sweep = self._check_wanted = False
+        self._negative_sweep = self._rescue = False
         self._rested_s = -math.inf
         self._counted_at_rest = 0
         self._unanswered = 0
@@ -274,7 +274,7 @@ class Pilot:
         """Whether the present motion is the one that is wanted."""
         motion, twist = self._wish(now)
         if self.motion in (Motion.STRAIGHT, Motion.TURN):
-            return self._move is not None or self.jobs.moving
+            return self._move is not None or self.jobs.moving or self._rescue
         if motion is not self.motion:
             return False
         if motion is Motion.SPIN:
@@ -363,6 +363,7 @@ class Pilot:
         self._rest(now)
 
     def _rest(self, now: float) -> None:
+        self._rescue = False
         self.state, self.motion = State.STILL, Motion.NONE
         self._start = None
         self.commanded = STANDING
@@ -532,10 +533,13 @@ class Pilot:
         if abs(count - before) <= STRAY_COUNTS or now - self._stray_s < STRAY_AGAIN_S:
             return
         if self._negative_sweep and now - self._swept_s < 2.0:
-            # Neither word found a motion, and it still moves: the check ends with the motors off.
             self._stray_s = now
-            self._again_s = now
-            self._check_wanted = True
+            self._rescue = True
+            self._notice(
+                "the robot moves, and the server knows of no motion: a turn by 1 degree is begun,"
+                " which ends with the motors off",
+                halt=True,
+            )
             return
         self._notice(
             "the robot moves without a command: a late copy of one, another client, or a push;"
@@ -594,9 +598,8 @@ class Pilot:
             self._estop_said_s = now
             self.proof.stopped(now)
             return self._send(HALTS[Motion.UNKNOWN], now)
-        if self._check_wanted:
-            self._check_wanted = False
-            return self._check(now)
+        if self._rescue:
+            return self._begin(words.MCR.request("SLOW", 1), now)
         if self._unanswered >= 2 and self._moved_last:
             # A late copy of a controlled move would keep the port silent.
             self._unanswered = 0

@@ -1,0 +1,159 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A session with a simulated MART controller in simulated time, and a bad network in between."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from any_board import AnyBench, MartRobot
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.events import Extra
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.mart import MartSettings as Settings
+from omnibot_driver.core.mart.board import MartBoard
+from omnibot_driver.core.mart.jobs import Job
+from omnibot_driver.core.mart.readings import JobDone
+from omnibot_driver.core.packets import Packet
+from omnibot_driver.simulator.common.network import FaultyNetwork, NetworkFaults
+from omnibot_driver.simulator.mart import QUIRKS, Firmware, MartSettings, SimulatedMart
+
+POLLS = {b"ENC", b"RMRA", b"MCSTAT", b"VOLTS", b"SFC", b"SRC", b"DOCKED", b"HELLO"}
+
+
+class NetworkRobot(MartRobot):
+    """The simulated controller behind a network with faults."""
+
+    def __init__(self, faults: NetworkFaults, seed: int, **settings: Any) -> None:
+        self.board = SimulatedMart(MartSettings(seed=seed, **settings))
+        self.network = [FaultyNetwork(faults, f"{seed} {channel}") for channel in (0, 1)]
+
+    def receive(self, data: bytes, now: float, channel: int) -> None:
+        self.network[channel].to_board.send(data, self.board.now_s)
+
+    def advance(self) -> list[Packet]:
+        out: list[Packet] = []
+        for _ in range(5):
+            now_s = self.board.now_s
+            for channel, way in enumerate(self.network):
+                for data in way.to_board.arrived(now_s):
+                    self.board.receive(data, now_s, channel)
+            for channel, data in self.board.advance():
+                self.network[channel].from_board.send(data, self.board.now_s)
+            for channel, way in enumerate(self.network):
+                out += [(channel, data) for data in way.from_board.arrived(self.board.now_s)]
+        return out
+
+
+class MartBench(AnyBench):
+    """``server``: the simulated one."""
+
+    def __init__(
+        self,
+        firmware: Firmware = "firmware",
+        faults: NetworkFaults | None = None,
+        *,
+        seed: int = 0,
+        settings: Settings | None = None,
+        **simulated: Any,
+    ) -> None:
+        robot = NetworkRobot(faults or NetworkFaults(), seed, quirks=QUIRKS[firmware], **simulated)
+        super().__init__(MartBoard(settings or Settings()), robot)
+        self.server = robot.board.server
+        self.board: Any = self.session.board
+
+    def ready(self) -> "MartBench":
+        """Nominal, and seen to stand."""
+        self.open()
+        self.run_until(lambda: self.session.state == "nominal", 30.0)
+        self.run(1.5)
+        return self
+
+    def command(self, vx: float, yaw_rate: float, seconds: float) -> None:
+        """Ten times a second; what is refused is refused."""
+        for _ in range(round(seconds / 0.1)):
+            self.try_command(vx, yaw_rate)
+            self.run(0.1)
+
+    def try_command(self, vx: float, yaw_rate: float) -> str:
+        """Once; why it was refused, if it was."""
+        try:
+            self.session.command_twist(BodyTwist(vx, 0.0, yaw_rate), self.now)
+        except CommandRefused as error:
+            return str(error)
+        finally:
+            self.settle()
+        return ""
+
+    def go_to(self, x_m: float, y_m: float, yaw_rad: float) -> None:
+        """As soon as it is not refused."""
+        for _ in range(50):
+            try:
+                self.session.command_pose(Pose(x_m, y_m, yaw_rad), self.now)
+            except CommandRefused:
+                self.run(0.1)
+            else:
+                break
+            finally:
+                self.settle()
+
+    def until_it_stands(self, limit_s: float = 20.0) -> float:
+        """How long it takes."""
+        began_s = self.now
+        self.run_until(lambda: self.robot.stands, limit_s)
+        return self.now - began_s
+
+    @property
+    def truth(self) -> Pose:
+        chassis = self.server.chassis
+        return Pose(chassis.x_m, chassis.y_m, chassis.yaw_rad)
+
+    @property
+    def error(self) -> Pose:
+        """Of the odometry."""
+        return self.odometry[-1].pose - self.truth
+
+    def said(self, since: int = 0) -> list[bytes]:
+        """What went out, but for polls."""
+        return [data for _, data in self.written[since:] if data not in POLLS]
+
+    def job(self, job: Job, *arguments: object, limit_s: float = 95.0) -> JobDone:
+        """Ask for it, and wait for its answer."""
+        seen = len(self.events)
+        self.board.ask(job, "token", self.now, *arguments)
+
+        def answers() -> list[JobDone]:
+            return [
+                event.value
+                for event in self.events[seen:]
+                if isinstance(event, Extra) and isinstance(event.value, JobDone)
+            ]
+
+        self.run_until(lambda: bool(answers()), limit_s)
+        return answers()[0]
+
+    def extras(self, kind: type) -> list[Any]:
+        return [e.value for e in self.events if isinstance(e, Extra) and isinstance(e.value, kind)]
+
+
+def steer_along(bench: MartBench, corners: list[tuple[float, float]], near_m: float = 0.04) -> None:
+    """As a ROS program would: by odometry, turning on the spot at each corner."""
+    for x_m, y_m in corners:
+        for _ in range(600):
+            way = bench.odometry[-1].pose.way_to(Pose(x_m, y_m, 0.0))
+            bearing = math.atan2(way.y_m, way.x_m)
+            if way.way_m < near_m or (way.way_m < 0.3 and abs(bearing) > 1.2):
+                break
+            if abs(bearing) > 0.3:
+                bench.try_command(0.0, math.copysign(0.5, bearing))
+            else:
+                ahead = min(0.3, max(0.05, 1.5 * way.way_m))
+                bench.try_command(ahead, max(-0.5, min(0.5, 2 * bearing)))
+            bench.run(0.05)
+        else:
+            raise AssertionError((x_m, y_m, bench.odometry[-1].pose))
+
+
+Predicate = Callable[[], bool]

@@ -1,0 +1,172 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Replies, and which request each belongs to. Texts as the running server was seen to send them."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.core.mart import Fail, Form, Kind, MartDecoder, Ok, Other, parse, words
+from omnibot_driver.core.mart.conversation import Conversation
+from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, MAY_SAY, Motion, State, may_say
+from omnibot_driver.core.mart.stopping import REPEAT_S, Stopping
+
+GOLDEN = {
+    b"ok": Ok(Form.NOTHING),
+    b"ok BBB": Ok(Form.NAME, "BBB"),
+    b"ok 25.31": Ok(Form.DECIMAL, "25.31"),
+    b"ok -1": Ok(Form.INTEGER, "-1"),
+    b"ok -49": Ok(Form.INTEGER, "-49"),
+    b"ok true": Ok(Form.TRUTH, "true"),
+    b"ok MotionController946684800.log 1093": Ok(Form.FILE, "MotionController946684800.log 1093"),
+    b"fail": Fail(""),
+    b"fail ": Fail(""),
+    b"fail conflicting action in progress": Fail("conflicting action in progress"),
+    b"fail Insufficient front clearance.": Fail("Insufficient front clearance."),
+    b"Calculated motion (\xb0): 3.1": Other(b"Calculated motion (\xb0): 3.1"),
+    b"hello": Other(b"hello"),
+}
+
+
+@pytest.mark.parametrize("data", GOLDEN)
+def test_a_reply_is_read(data: bytes) -> None:
+    """Each form, by its text."""
+    assert parse(data) == GOLDEN[data]
+
+
+@given(st.binary(max_size=600))
+def test_no_datagram_raises(data: bytes) -> None:
+    """Whatever comes is a reply, or something else; an empty one is nothing."""
+    assert len(MartDecoder().feed(data, 0.0)) == bool(data)
+
+
+def test_a_request_fits_the_servers_buffer() -> None:
+    """One to 49 bytes of ASCII; an empty datagram would end the server."""
+    assert words.RMCS.request(5, -5).data == b"RMCS 5 -5"
+    assert words.CHECK.request(0).data == b"MCR SLOW 0"
+    assert words.TF.request("SLOW", 24).data == b"TF SLOW 24"
+    with pytest.raises(ValueError, match="1 to 49 bytes"):
+        words.TIME.request("1" * 60)
+
+
+def conversation() -> Conversation:
+    return Conversation(0.3)
+
+
+def test_a_reply_answers_the_pending_request() -> None:
+    """And says how long it took."""
+    talk = conversation()
+    assert talk.ask(words.ENC.request(), 1.0) == ((0, b"ENC"),)
+    answer = talk.hear(parse(b"ok 123"), 1.01)
+    assert answer is not None
+    assert (answer.word, answer.took_s) == (words.ENC, pytest.approx(0.01))
+    assert not answer.doubtful
+    assert talk.pending is None
+
+
+@pytest.mark.parametrize(
+    ("word", "late"),
+    [
+        (words.ENC, b"ok 1.25"),
+        (words.ENC, b"ok"),
+        (words.RMRA, b"ok 12"),
+        (words.RM, b"fail no motion in progress"),
+        (words.RMCS, b"fail conflicting action in progress"),
+        (words.CHECK, b"fail no motion"),
+        (words.HELLO, b"ok true"),
+    ],
+)
+def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, late: bytes) -> None:
+    """It has another form, or a reason that this command never has."""
+    talk = conversation()
+    talk.ask(word.request(), 1.0)
+    assert talk.hear(parse(late), 1.4) is None
+    assert talk.discarded == 1
+    assert talk.pending is not None
+
+
+def test_no_late_ok_proves_the_imu() -> None:
+    """The check takes half a second; a reply to what came before is later by 0.3 s at most."""
+    talk = conversation()
+    talk.ask(words.CHECK.request(0), 1.0)
+    assert talk.hear(parse(b"ok"), 1.3) is None
+    assert talk.hear(parse(b"ok"), 1.5) is not None
+    assert all(
+        word.least_s > talk.delay_s for word in words.WORDS if word.kind in (Kind.CHECK, Kind.MOVE)
+    )
+
+
+def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
+    """And what the robot is driven by is asked at once, and marked."""
+    talk = conversation()
+    talk.ask(words.SFC.request(), 1.0)
+    assert talk.overdue(1.1) is None
+    assert talk.overdue(2.0) is words.SFC
+    talk.ask(words.SFC.request(), 2.0)
+    talk.give_up(2.1)
+    assert not talk.may_ask(words.SRC, 2.1)
+    assert talk.may_ask(words.DOCKED, 2.1)
+    assert talk.may_ask(words.ENC, 2.1)
+    talk.ask(words.ENC.request(), 2.1)
+    answer = talk.hear(parse(b"ok 7"), 2.2)
+    assert answer is not None
+    assert answer.doubtful
+    assert talk.may_ask(words.SRC, 2.9)
+
+
+def test_every_motion_is_stopped_by_its_own_word() -> None:
+    """As seen on the running server; the stop port is for controlled moves."""
+    texts = {motion: [word.text for word in said] for motion, said in HALTS.items()}
+    assert texts == {
+        Motion.NONE: [],
+        Motion.REFERENCE: ["SRM"],
+        Motion.REVERSE: ["SM"],
+        Motion.SPIN: ["SM"],
+        Motion.STRAIGHT: ["SL"],
+        Motion.TURN: ["SS"],
+        Motion.UNKNOWN: ["SRM", "SM"],
+    }
+    for state in (State.DRIVING, State.REVERSING, State.TURNING):
+        assert not MAY_SAY[state] & {words.SL, words.SS, words.L, words.R, words.RM}
+    assert not may_say(State.MOVING, words.SS, Motion.STRAIGHT)
+
+
+def stopping(motion: Motion, *, started_s: float = 0.0, owed: int = 0) -> Stopping:
+    return Stopping(motion, 10.0, delay_s=0.3, started_s=started_s, owed=owed)
+
+
+def test_a_stop_is_repeated_until_it_is_answered() -> None:
+    """A second one fails with no motion, which tells as much."""
+    stop = stopping(Motion.REFERENCE)
+    assert stop.due(10.0) == (words.SRM,)
+    assert stop.due(10.1) == ()
+    assert stop.due(10.0 + REPEAT_S) == (words.SRM,)
+    assert stop.hear(parse(b"fail no motion in progress"), 10.5)
+
+
+def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> None:
+    """The start was sent 0.1 s before: one of the replies must be to a later stop."""
+    stop = stopping(Motion.REFERENCE, started_s=9.9)
+    assert stop.due(10.0) == (words.SRM,)
+    assert not stop.hear(parse(b"fail no motion in progress"), 10.1)
+    assert stop.due(10.3) == (words.SRM,)
+    assert stop.hear(parse(b"ok"), 10.9)
+
+
+def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
+    """Both are a bare ok."""
+    stop = stopping(Motion.REFERENCE, owed=1)
+    stop.due(10.0)
+    assert not stop.hear(parse(b"ok"), 10.05)
+    assert stop.hear(parse(b"ok"), 10.5)
+
+
+def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
+    """After three stops without an answer, and all the time that they may take."""
+    stop = stopping(Motion.REVERSE)
+    said = [word for tick in range(60) for word in stop.due(10.0 + 0.1 * tick)]
+    before = said.index(words.SL)
+    assert said[:before].count(words.SM) >= 3
+    assert LAST_HALTS[Motion.REVERSE] == (words.SL,)
+    assert stop.failed
+    assert not stop.hear(parse(b"ok"), 17.0)

@@ -1,0 +1,123 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is asked of the controller besides motion: bias, dock, log, files, clock."""
+
+import pytest
+from mart_bench import MartBench
+
+from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.mart.jobs import Job
+
+
+def test_the_gyro_is_calibrated_at_rest() -> None:
+    """SB, and its reply."""
+    done = MartBench().ready().job(Job.BIAS)
+    assert (done.token, done.success) == ("token", True)
+
+
+def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
+    """TF DOCK; a command meanwhile cancels it."""
+    bench = MartBench(dock_m=0.3).ready()
+    assert bench.job(Job.DOCK, "DOCK", 20).success
+    bench.run(2.0)
+    assert bench.server.docked
+    bench = MartBench().ready()
+    bench.board.ask(Job.DOCK, "token", bench.now, "DOCK", 40)
+    bench.run_until(lambda: not bench.robot.stands)
+    bench.estop(True)
+    bench.run(3.0)
+    assert bench.robot.stands
+    assert b"SL" in bench.said()
+    assert bench.board._pilot.jobs.job is None
+
+
+def test_the_last_move_and_turn_are_downloaded_whole() -> None:
+    """In pieces of 512 bytes of Latin-1."""
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.command(0.0, 0.5, 2.0)
+    bench.run(3.0)
+    for job in (Job.LAST_MOVE, Job.LAST_TURN):
+        done = bench.job(job)
+        assert done.success, done
+        assert done.content == bench.server.files[done.name.rpartition("/")[2]].content
+
+
+def test_nothing_to_download_is_told() -> None:
+    """As the controller words it."""
+    done = MartBench().ready().job(Job.LAST_MOVE)
+    assert not done.success
+    assert "no file available" in done.message
+
+
+@pytest.mark.parametrize("spoil", ["lose", "double"])
+def test_a_piece_that_is_lost_or_comes_twice_spoils_the_file(spoil: str) -> None:
+    """It is noticed, and nothing is saved."""
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(3.0)
+    inner, pieces = bench.robot.advance, 0
+
+    def advance() -> list[tuple[int, bytes]]:
+        nonlocal pieces
+        out: list[tuple[int, bytes]] = []
+        for packet in inner():
+            pieces += len(packet[1]) == 512
+            second = len(packet[1]) == 512 and pieces == 2
+            out += [packet] * ((0 if spoil == "lose" else 2) if second else 1)
+        return out
+
+    bench.robot.advance = advance  # type: ignore[method-assign]
+    done = bench.job(Job.LAST_MOVE)
+    assert not done.success
+    assert ("lost" if spoil == "lose" else "twice") in done.message
+
+
+def test_only_a_log_that_was_started_ends_the_server() -> None:
+    """EXIT is said by nothing else; the answer says that the controller must be started again."""
+    bench = MartBench().ready()
+    with pytest.raises(RequestRefused, match="start_log"):
+        bench.board.ask(Job.LOG_FILE, "token", bench.now)
+    assert bench.job(Job.LOG).success
+    done = bench.job(Job.LOG_FILE)
+    assert done.success
+    assert "must be started again" in done.message
+    assert bench.server.crashed == "EXIT"
+    assert bench.said().count(b"EXIT") == 1
+    bench.run(5.0)
+    assert bench.session.state == "connecting"
+
+
+def test_the_clock_is_set_while_the_robot_stands() -> None:
+    """Six numbers, in UTC."""
+    bench = MartBench().ready()
+    assert bench.job(Job.TIME, 11, 22, 2026, 20, 15, 30).success
+    assert b"TIME 11 22 2026 20 15 30" in bench.said()
+    assert not bench.server.crashed
+    bench.command(0.3, 0.0, 1.0)
+    bench.board.ask(Job.TIME, "token", bench.now, 1, 1, 2027, 0, 0, 0)
+    bench.command(0.3, 0.0, 1.0)
+    assert b"TIME 1 1 2027 0 0 0" not in bench.said()
+
+
+def test_another_server_is_refused_by_its_name() -> None:
+    """It answers HELLO, but not as this controller does."""
+    bench = MartBench()
+    bench.open()
+    bench.run(0.5)
+    for _ in range(30):
+        bench.session.receive(b"ok ROVER", bench.now)
+        bench.run(0.1)
+    assert "ROVER" in bench.session.board.refusal
+    assert any("ROVER" in notice for notice in bench.notices)
+
+
+def test_nobody_answers() -> None:
+    """One sentence, and no motion."""
+    bench = MartBench()
+    bench.speaks = False
+    bench.open()
+    bench.run(12.0)
+    assert bench.session.state == "connecting"
+    assert sum("nothing comes from the board" in notice for notice in bench.notices) == 1
+    assert bench.try_command(0.3, 0.0)
