@@ -1,0 +1,191 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The driver with a simulated MART controller on real UDP sockets of the loopback."""
+
+import math
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from driver_process import Driver
+from geometry_msgs.msg import PoseStamped, Twist
+from nav_msgs.msg import Odometry
+from probe import Probe
+from sensor_msgs.msg import BatteryState, Range
+from std_msgs.msg import Bool
+from std_srvs.srv import SetBool, Trigger
+
+from omnibot_driver.simulator.common.serving import ServedBoard
+from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
+
+Start = Callable[..., Any]
+PATIENCE_S: Final = 30.0
+STANDS_TICKS: Final = 750
+"""A second and a half of the simulated controller."""
+MOTIONS: Final = {
+    "RM": (0.3, 0.2),
+    "B": (-0.2, 0.0),
+    "L": (0.0, 0.5),
+}
+
+
+class Mart:
+    """A simulated controller in real time."""
+
+    def __init__(self, served: "ServedBoard[SimulatedMart]") -> None:
+        self.served = served
+
+    @property
+    def url(self) -> str:
+        return self.served.addresses[0]
+
+    def wait_for(self, predicate: Callable[[SimulatedMart], object]) -> None:
+        found = self.served.wait_for(lambda board: bool(predicate(board)), PATIENCE_S)
+        assert found, list(self.served.board.server.executed)[-20:]
+
+    def do(self, action: Callable[[SimulatedMart], Any]) -> Any:
+        with self.served.lock:
+            return action(self.served.board)
+
+    def stands_for_good(self) -> None:
+        since: list[int] = []
+
+        def stood(board: SimulatedMart) -> bool:
+            if board.server.moving:
+                since.clear()
+                return False
+            since.append(board.ticks)
+            return since[-1] - since[0] >= STANDS_TICKS
+
+        self.wait_for(stood)
+        assert not self.do(lambda board: board.server.hung)
+
+
+@pytest.fixture
+def mart(stack: ExitStack) -> Mart:
+    return Mart(stack.enter_context(ServedBoard(SimulatedMart(MartSettings(dock_m=5.0)))))
+
+
+@pytest.fixture
+def driver(mart: Mart, start_driver: Start, tmp_path: Path) -> Driver:
+    started: Driver = start_driver(mart.url, board="mart", record_directory=str(tmp_path))
+    return started
+
+
+@pytest.fixture
+def probe(driver: Driver, probe_of: Start) -> Probe:
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    return probe
+
+
+@contextmanager
+def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[None]:
+    """Commanded ten times a second; begins when it moves."""
+    publisher = probe.publisher(Twist, "cmd_vel")
+    twist = Twist()
+    twist.linear.x, twist.angular.z = vx, yaw_rate
+    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
+    try:
+        mart.wait_for(lambda board: board.server.chassis.moving)
+        yield
+    finally:
+        probe.remove(timer)
+
+
+def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
+    """A metre; commands that cease stop it; battery and sonars are told."""
+    odometry = probe.listen(Odometry, "odom")
+    batteries = probe.listen(BatteryState, "battery_state")
+    ranges = probe.listen(Range, "range/front")
+    docked = probe.listen(Bool, "docked", latched=True)
+    with driven(probe, mart, 0.3, 0.0):
+        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 1.0)
+    mart.stands_for_good()
+    x_m = mart.do(lambda board: board.server.chassis.x_m)
+    probe.wait_for(lambda: abs(odometry[-1].pose.pose.position.x - x_m) < 0.01)
+    probe.wait_for(lambda: batteries and ranges and docked)
+    assert batteries[-1].voltage == pytest.approx(24.0, abs=0.05)
+    assert math.isinf(ranges[-1].range)
+    assert ranges[-1].header.frame_id == "range_front_link"
+    assert not docked[-1].data
+
+
+def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
+    """By its own word, and the server answers on."""
+    for motion in MOTIONS.values():
+        with driven(probe, mart, *motion):
+            assert probe.call(SetBool, "estop", data=True).success
+            mart.stands_for_good()
+        assert probe.call(SetBool, "estop", data=False).success
+
+
+@pytest.mark.parametrize(
+    ("motion", "number"), [("RM", signal.SIGINT), ("RM", signal.SIGKILL), ("L", signal.SIGKILL)]
+)
+def test_whatever_ends_the_driver_stops_each_motion(
+    mart: Mart, driver: Driver, probe: Probe, motion: str, number: signal.Signals
+) -> None:
+    """Its own exit, or the guard, which has the word of the present motion."""
+    with driven(probe, mart, *MOTIONS[motion]):
+        driver.process.send_signal(number)
+        mart.stands_for_good()
+
+
+@pytest.mark.parametrize("word", ["RM ", "TF"])
+def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
+    mart: Mart, driver: Driver, probe: Probe, word: str
+) -> None:
+    """The command is on its way, or a controlled move is under way."""
+    if word == "TF":
+        goal = PoseStamped()
+        goal.header.frame_id = "odom"
+        goal.pose.orientation.w = 1.0
+        goal.pose.position.x = 2.0
+        probe.publisher(PoseStamped, "cmd_pose").publish(goal)
+    else:
+        vx, yaw_rate = MOTIONS[word.strip()]
+        publisher = probe.publisher(Twist, "cmd_vel")
+        twist = Twist()
+        twist.linear.x, twist.angular.z = vx, yaw_rate
+        probe.node.create_timer(0.1, lambda: publisher.publish(twist))
+    mart.wait_for(lambda board: board.server.executed[-1].startswith(word))
+    driver.process.send_signal(signal.SIGKILL)
+    mart.stands_for_good()
+
+
+def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe) -> None:
+    """Half a second without a heartbeat."""
+    with driven(probe, mart, 0.3, 0.0):
+        driver.process.send_signal(signal.SIGSTOP)
+        mart.stands_for_good()
+    driver.process.send_signal(signal.SIGCONT)
+    mart.stands_for_good()
+
+
+def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
+    """Bias, log and downloads; the last ends the server."""
+    with driven(probe, mart, 0.3, 0.0):
+        pass
+    mart.stands_for_good()
+    done = probe.call(Trigger, "calibrate_gyro")
+    assert done.success, done.message
+    done = probe.call(Trigger, "download_last_move")
+    assert done.success, done.message
+    assert Path(done.message).parent == tmp_path
+    assert Path(done.message).read_text(encoding="utf-8")
+    assert not probe.call(Trigger, "download_log").success
+    assert probe.call(Trigger, "start_log").success
+    done = probe.call(Trigger, "download_log")
+    assert done.success, done.message
+    assert "must be started again" in done.message
+    assert mart.do(lambda board: board.server.crashed) == "EXIT"
+
+
+def test_a_server_that_does_not_answer_is_told(start_driver: Start) -> None:
+    """Nothing listens there."""
+    driver = start_driver("udp://127.0.0.1:9", board="mart")
+    driver.wait_for_line("nothing comes from the board")
