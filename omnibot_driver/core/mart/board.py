@@ -17,9 +17,10 @@ from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.jobs import Job
-from omnibot_driver.core.mart.pilot import SLOWEST_MPS, SLOWEST_RADPS, Pilot
+from omnibot_driver.core.mart.pilot import Pilot
 from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.states import State
+from omnibot_driver.core.mart.stops import SLOWEST_MPS, SLOWEST_RADPS
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading, Reading
 from omnibot_driver.core.traits import Traits

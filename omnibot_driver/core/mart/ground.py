@@ -1,0 +1,174 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the parts of the pilot stand on: what is believed of server and robot, and how it is said.
+
+Knows states and words; not why something is said. Time is an argument.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.commands.actuator import Wanted
+from omnibot_driver.core.commands.stop_proof import StopProof
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.conversation import Conversation
+from omnibot_driver.core.mart.goal import Move, Surplus
+from omnibot_driver.core.mart.health import Health
+from omnibot_driver.core.mart.jobs import Jobs
+from omnibot_driver.core.mart.odometry import MartOdometry
+from omnibot_driver.core.mart.polls import Polls
+from omnibot_driver.core.mart.replies import MartDecoder
+from omnibot_driver.core.mart.settings import MartSettings
+from omnibot_driver.core.mart.speed_loop import SpeedLoop
+from omnibot_driver.core.mart.states import (
+    HARMFUL_LATE,
+    Motion,
+    State,
+    may_say,
+)
+from omnibot_driver.core.mart.stopping import Stopping
+from omnibot_driver.core.mart.words import Request, Word
+from omnibot_driver.core.packets import Packets
+from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
+
+STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
+ESTOP_REPEAT_S: Final = 0.5
+
+
+class Ground:
+    """``readings``: what came of the replies, to be taken. ``settings`` may be replaced."""
+
+    def __init__(self, settings: MartSettings) -> None:
+        self._settings = settings
+        self.conversation = Conversation(settings.network_delay_s)
+        self.odometry = MartOdometry(settings)
+        self.loop = SpeedLoop(settings)
+        self.health = Health()
+        self.decoder = MartDecoder()
+        self.jobs = Jobs()
+        self.proof = StopProof()
+        self._surplus = Surplus()
+        self._polls = Polls()
+        self.readings: list[Reading] = []
+        self.lost = 0
+        self.connect()
+
+    @property
+    def settings(self) -> MartSettings:
+        """Sizes and scales."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: MartSettings) -> None:
+        self._settings = self.odometry.settings = self.loop.settings = settings
+        self.conversation.delay_s = settings.network_delay_s
+
+    def connect(self) -> None:
+        """The line is new: the server may be moving the robot."""
+        self.conversation.connect()
+        self.jobs.cancel("the line was lost meanwhile; call again once it is back")
+        self.jobs.logging = self.jobs.ended = False
+        self.odometry.connect()
+        self._polls.connect()
+        self.health.connect()
+        self.state, self.motion = State.UNKNOWN, Motion.UNKNOWN
+        self.commanded: BodyTwist | None = STANDING
+        self._wanted: Wanted = None
+        self._stopping: Stopping | None = None
+        self._move: Move | None = None
+        self._start: Word | None = None
+        self._moved_last = False
+        self._moved_by: Request | None = None
+        self._proved_s = self._started_s = self._begun_s = self._harmful_s = -math.inf
+        self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
+        self._spin_radps = self._spin_seen_radps = 0.0
+        self._spin_units = 0
+        self._custom_units: int | None = None
+        self._custom_s = -math.inf
+        self._custom_refused = False
+        self._blocked: Motion = Motion.NONE
+        self._stray_s = self._swept_s = -math.inf
+        self._negative_sweep = self._rescue = False
+        self._rested_s = -math.inf
+        self._counted_at_rest = 0
+        self._unanswered = 0
+        self._fresh = False
+        self._told: set[str] = set()
+        self.heard_s = -math.inf
+        self.greeted = False
+        self.began_s: float | None = None
+        self._next_s = -math.inf
+
+    @property
+    def blind_since_s(self) -> float | None:
+        """Since when a controlled move is under way."""
+        moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
+        return self._started_s if moves and self.state is not State.LOST else None
+
+    @property
+    def refusal(self) -> str:
+        """Why the robot is not to be driven, and what to do; empty if it may be."""
+        if self.state is State.LOST:
+            return (
+                "the server is lost: cut the motor power if the robot moves, then restart the"
+                " server"
+            )
+        return self.health.refusal
+
+    def told(self, now: float) -> OdometryReading:
+        """The odometry, predicted to this time."""
+        slowing_s = self._stopping.began_s if self._stopping is not None else None
+        return self.odometry.told(now, blind_since_s=self.blind_since_s, slowing_since_s=slowing_s)
+
+    def take(self) -> list[Reading]:
+        """What came of the replies since the last call."""
+        if self.jobs.done:
+            self.readings += map(ExtraReading, self.jobs.done)
+            self.jobs.done.clear()
+        readings, self.readings = self.readings, []
+        return readings
+
+    def _rest(self, now: float) -> None:
+        self._rescue = False
+        self.state, self.motion = State.STILL, Motion.NONE
+        self._start = None
+        self.commanded = STANDING
+        self._fresh = False
+        self._polls.press(words.RMRA)
+        self._polls.press(words.ENC)
+        self._rested_s = now
+        self._counted_at_rest = 0
+        self._unanswered = 0
+        self._next_s = -math.inf
+
+    def _require(self, word: Word) -> None:
+        """Whatever is sent is in the table; anything else is a defect, and is not sent."""
+        if not may_say(self.state, word, self.motion):
+            raise AssertionError(f"{word.text} must not be said while {self.state.value}")
+
+    def _send(self, said: tuple[Word, ...], now: float) -> Packets:
+        """Words that nothing is awaited of."""
+        for word in said:
+            self._require(word)
+            if word in HARMFUL_LATE:
+                self._harmful_s = now
+        return tuple((word.channel, word.request().data) for word in said)
+
+    def _greet(self, now: float) -> Packets:
+        return ((words.COMMAND, words.HELLO.request().data),)
+
+    def _ask(self, request: Request, now: float) -> Packets:
+        return self.conversation.ask(request, now)
+
+    def _notice(self, text: str, *, halt: bool) -> None:
+        self.readings.append(NoticeReading(text, halt))
+
+    def _once(self, text: str) -> None:
+        if text not in self._told:
+            self._told.add(text)
+            self._notice(text, halt=False)
+
+    @property
+    def _delay_s(self) -> float:
+        return self._settings.network_delay_s

@@ -1,0 +1,269 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How a motion begins and is changed: a fresh proof of the IMU, then the one word for it.
+
+Knows what is wanted and the words that start; not when a motion must end. Time is an argument.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.commands.orders import EmergencyStop, GoTo
+from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.goal import Move, next_move
+from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S
+from omnibot_driver.core.mart.replies import Fail, Ok
+from omnibot_driver.core.mart.states import (
+    HALTS,
+    HARMFUL_LATE,
+    NEEDS_IMU,
+    STARTS,
+    WHILE,
+    Motion,
+    State,
+)
+from omnibot_driver.core.mart.stops import Stops
+from omnibot_driver.core.mart.words import Kind, Request
+from omnibot_driver.core.packets import NO_PACKETS, Packets
+
+PROVED_S: Final = 0.2
+"""So old a proof of the IMU may be when a motion starts."""
+CHECK_S: Final = 0.5
+"""The check takes at least about so long; what it took longer, the proof may be older."""
+AGAIN_S: Final = 1.0
+"""After a start that failed."""
+STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
+"""Of the slowest controlled moves, with a margin."""
+SLOW_UNITS: Final = 20
+"""Of B SLOW, R SLOW and L SLOW."""
+
+
+class Starts(Stops):
+    """The part of the pilot that starts, and adjusts."""
+
+    def _act(self, now: float) -> Packets:
+        if self.state is State.STILL:
+            return self._act_still(now)
+        if self.state in (State.DRIVING, State.REVERSING) and self._fresh:
+            return self._adjust(now)
+        return NO_PACKETS
+
+    def _adjust(self, now: float) -> Packets:
+        """One change of the motors' units, where the measured speed asks for one."""
+        self._fresh = False
+        _, twist = self._wish(now)
+        change = self.loop.change(abs(twist.vx_mps), twist.yaw_rate_radps, now)
+        self.commanded = twist
+        if change is None:
+            return NO_PACKETS
+        right, left = change
+        self._require(words.RMCS if self.state is State.DRIVING else words.CS)
+        self.loop.changed(right, left, now)
+        if self.state is State.DRIVING:
+            return self._ask(words.RMCS.request(right, left), now)
+        return self._ask(words.CS.request(-right, -left), now)
+
+    def _act_still(self, now: float) -> Packets:
+        if isinstance(self._wanted, EmergencyStop) and now - self._estop_said_s >= ESTOP_REPEAT_S:
+            self._estop_said_s = now
+            self.proof.stopped(now)
+            return self._send(HALTS[Motion.UNKNOWN], now)
+        if self._rescue:
+            return self._begin(words.MCR.request("SLOW", 1), now)
+        if self._unanswered >= 2 and self._moved_last:
+            # A late copy of a controlled move would keep the port silent.
+            self._unanswered = 0
+            return self._send((words.SL, words.SS), now)  # RM and B would hang by them
+        if self.odometry.counted_s < self._rested_s:
+            return NO_PACKETS  # how it rolled out is counted before the count begins anew
+        start = self._next_start(now)
+        if start is None:
+            return self._job(now)
+        if now < self._again_s:
+            return NO_PACKETS
+        if why := self.refusal:
+            self._notice(why, halt=True)
+            return NO_PACKETS
+        if packets := self._prepare_spin(start, now):
+            return packets
+        if now < self._harmful_s + self._delay_s:
+            return NO_PACKETS
+        if start.word in NEEDS_IMU and now > self._proved_s + PROVED_S:
+            return self._check(now)
+        if self.odometry.counted_s < self._harmful_s + self._delay_s:
+            return NO_PACKETS  # a late copy of a move would have the port now
+        return self._begin(start, now)
+
+    def _next_start(self, now: float) -> Request | None:
+        order = self._order(now)
+        if isinstance(order, GoTo):
+            return self._next_goal_move(order, now)
+        motion, twist = self._wish(now)
+        if motion is Motion.NONE or motion is self._blocked:
+            return None
+        if motion is Motion.SPIN:
+            return self._spin_request(twist.yaw_rate_radps)
+        if self.health.obstacle(motion, now):
+            self._block(motion, "an obstacle is too near")
+            return None
+        if motion is Motion.REFERENCE:
+            units = self.loop.first_units(twist.vx_mps, twist.yaw_rate_radps)
+            return words.RM.request(units)
+        return words.B.request("SLOW")
+
+    def _spin_request(self, rate_radps: float) -> Request:
+        word = words.L if rate_radps > 0.0 else words.R
+        if self._spin_is_fixed:
+            return word.request("SLOW")
+        return word.request("CUSTOM")
+
+    def _prepare_spin(self, start: Request, now: float) -> Packets:
+        """R and L take their speed from SSP, which has to come before the check of the IMU."""
+        if start.word not in (words.R, words.L) or self._spin_is_fixed:
+            return NO_PACKETS
+        _, twist = self._wish(now)
+        units = self.loop.spin_units(twist.yaw_rate_radps)
+        if units == self._custom_units or now < self._custom_s + self._delay_s:
+            return NO_PACKETS  # a copy of an older speed must not come after a newer one
+        self._spin_units = units
+        self._custom_s = now
+        return self._ask(words.SSP.request(5, units), now)
+
+    def _custom_set(self, reply: Ok | Fail) -> None:
+        if isinstance(reply, Ok):
+            self._custom_units = self._spin_units
+            return
+        self._custom_refused = True
+        self._once(
+            "the server has no speeds for turns on the spot but its own: they are faster than"
+            " commanded (`spin_speed`: fixed)"
+        )
+
+    def _check(self, now: float) -> Packets:
+        self._require(words.CHECK)
+        self.state = State.CHECKING
+        self.odometry.zeroed()
+        return self._ask(words.CHECK.request(0), now)
+
+    def _checked(self, reply: Ok | Fail, took_s: float, now: float) -> None:
+        self.state = State.STILL
+        if isinstance(reply, Ok):
+            self.health.imu_dead = False
+            self._proved_s = now - max(0.0, took_s - CHECK_S)
+            if self._proved_s + PROVED_S <= now:
+                self._again_s = now
+            return
+        self._again_s = now + AGAIN_S
+        if reply.reason == words.IMU_LOST:
+            self.health.imu_dead = True
+            self._notice(self.health.refusal, halt=True)
+        else:
+            self._notice(f"the check of the IMU failed: {reply.reason or 'fail'}", halt=True)
+
+    def _begin(self, start: Request, now: float) -> Packets:
+        self._require(start.word)
+        self._moved_last = start.word.kind is Kind.MOVE
+        self.state, self.motion = State.STARTING, STARTS[start.word]
+        self._start = start.word
+        self._started_s = now
+        self._proved_s = -math.inf
+        _, twist = self._wish(now)
+        self.commanded = twist
+        self._spin_radps = twist.yaw_rate_radps
+        if start.word in HARMFUL_LATE:
+            self._harmful_s = now
+        self.proof.moved()
+        self.odometry.forget_speeds()
+        self.odometry.begin(self.motion, now)
+        if start.word.kind is Kind.MOVE:
+            self._moved_by = start
+            self.state = State.MOVING
+            self.commanded = None
+        elif self.motion is Motion.REFERENCE:
+            self.loop.begin(int(start.data.split()[1]), False, now)
+        elif self.motion is Motion.REVERSE:
+            self.loop.begin(SLOW_UNITS, True, now)
+        elif self._spin_is_fixed:
+            self._spin_units = SLOW_UNITS
+        return self.conversation.ask(start, now, takes_s=_longest_s(start))
+
+    def _started(self, reply: Ok | Fail, now: float) -> None:
+        if isinstance(reply, Fail):
+            self._start_failed(reply, now)
+            return
+        self.state = WHILE[self.motion]
+        self._begun_s = now
+        self.odometry.heading_changed_s = now
+        self._polls.press(words.RMRA)
+        self._polls.press(words.ENC)
+
+    def _start_failed(self, reply: Fail, now: float) -> None:
+        """It may move all the same."""
+        word = self._start
+        assert word is not None
+        self._again_s = now + AGAIN_S
+        if reply.reason == words.CONFLICT:
+            self.motion = Motion.UNKNOWN
+            why = "another motion is in progress"
+        else:
+            why = self._obstacle(reply, self.motion)
+        if word is words.RM and reply.reason == "":
+            self.health.reference_fails += 1
+        if word in (words.R, words.L) and reply.reason == words.UNSUPPORTED:
+            self._custom_refused = True
+        self._halt(now, f"{word.text} failed ({reply.reason or 'no reason given'}): {why}")
+
+    def _next_goal_move(self, order: GoTo, now: float) -> Request | None:
+        if self._move is None:
+            self._move = Move(order.place)
+        request = next_move(self._move, self.odometry.pose, self._settings, self._surplus)
+        if request is None:
+            return None
+        if request.word in NEEDS_IMU and now > self._proved_s + PROVED_S:
+            return request
+        self._move.said += 1
+        return request
+
+    def _moved(self, reply: Ok | Fail, now: float) -> None:
+        """A controlled move is over, by its own reply."""
+        motion = self.motion
+        if motion is Motion.STRAIGHT:
+            self.odometry.finish_straight()
+        self.jobs.moved(reply, now)
+        self._rest(now)
+        if isinstance(reply, Fail):
+            if self._move is not None:
+                self._move.given_up = True
+            self._notice(
+                f"controlled move ended: {reply.reason or 'fail'}; the goal is discarded; clear the"
+                " cause, then send it again",
+                halt=True,
+            )
+            if reply.reason == words.IMU_LOST:
+                self.health.imu_dead = True
+
+    def _job(self, now: float) -> Packets:
+        request = self.jobs.next(now, stands=self.proof.proved)
+        if request is None:
+            return NO_PACKETS
+        if request.word in NEEDS_IMU and now > self._proved_s + PROVED_S:
+            return self._check(now)
+        self.jobs.sent(request, now)
+        if request.word in STARTS:
+            return self._begin(request, now)
+        self._require(request.word)
+        self.state = State.SERVING
+        if request.word in HARMFUL_LATE:
+            self._harmful_s = now
+        return self._ask(request, now)
+
+
+def _longest_s(start: Request) -> float:
+    """How long the server may take to answer it."""
+    if start.word.kind is not Kind.MOVE:
+        return start.word.takes_s
+    asked = float(start.data.split()[-1])
+    straight = STARTS[start.word] is Motion.STRAIGHT
+    return min(
+        start.word.takes_s, 3.0 + asked * (STRAIGHT_S_PER_IN if straight else TURN_S_PER_DEG)
+    )

@@ -1,0 +1,239 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""When a motion must not go on, and how it is ended. Whatever is in doubt is stopped.
+
+Knows what is wanted, what is measured, and the words that stop; not how a motion begins. Time is an
+argument.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.commands.actuator import Wanted
+from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Stop
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.ground import STANDING, Ground
+from omnibot_driver.core.mart.replies import Fail, Ok
+from omnibot_driver.core.mart.speed_loop import turn_is_on_the_spot
+from omnibot_driver.core.mart.states import (
+    HALTS,
+    Motion,
+    State,
+)
+from omnibot_driver.core.mart.stopping import ANSWERS, Stopping
+from omnibot_driver.core.mart.words import Form
+from omnibot_driver.core.packets import NO_PACKETS, Packets
+
+BLIND_S: Final = 0.8
+"""A robot that drives and is not counted for so long is stopped."""
+FROZEN_S: Final = 0.5
+"""A heading that does not change at all while the robot drives so long comes of no living IMU."""
+NO_START_S: Final = 1.5
+"""A wheel that is driven turns by then."""
+SPIN_RATIO: Final = 0.35
+"""A turn on the spot keeps its speed; one that is commanded so much otherwise starts anew."""
+LOST_REPEAT_S: Final = 1.0
+SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
+"""A slower command stands still."""
+NAMES: Final = {
+    Motion.REFERENCE: "RM",
+    Motion.REVERSE: "B",
+    Motion.SPIN: "R or L",
+    Motion.STRAIGHT: "TF or TB",
+    Motion.TURN: "MCR or MCL",
+    Motion.UNKNOWN: "a motion of another program",
+    Motion.NONE: "nothing",
+}
+ROLLING: Final = (State.DRIVING, State.REVERSING, State.TURNING)
+
+
+class Stops(Ground):
+    """The part of the pilot that stops."""
+
+    def _order(self, now: float) -> Drive | GoTo | None:
+        wanted = self._wanted
+        if wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.is_zero:
+            return None
+        order = wanted.order(now)
+        return order if isinstance(order, Drive | GoTo) else None
+
+    def _wish(self, now: float) -> tuple[Motion, BodyTwist]:
+        """The motion that is wanted, and how fast."""
+        order = self._order(now)
+        if not isinstance(order, Drive):
+            return Motion.NONE, STANDING
+        speed, rate = order.twist.vx_mps, order.twist.yaw_rate_radps
+        if abs(speed) < SLOWEST_MPS and abs(rate) < SLOWEST_RADPS:
+            return Motion.NONE, STANDING
+        if turn_is_on_the_spot(speed, rate, self._settings.track_m):
+            return Motion.SPIN, BodyTwist(0.0, 0.0, rate)
+        motion = Motion.REFERENCE if speed > 0.0 else Motion.REVERSE
+        return motion, BodyTwist(speed, 0.0, rate)
+
+    def _agrees(self, now: float) -> bool:
+        """Whether the present motion is the one that is wanted."""
+        motion, twist = self._wish(now)
+        if self.motion in (Motion.STRAIGHT, Motion.TURN):
+            return self._move is not None or self.jobs.moving or self._rescue
+        if motion is not self.motion:
+            return False
+        if motion is Motion.SPIN:
+            rate = twist.yaw_rate_radps
+            return (
+                rate * self._spin_radps > 0.0
+                and abs(rate - self._spin_radps) <= SPIN_RATIO * abs(self._spin_radps)
+            ) or (self._spin_is_fixed and rate * self._spin_radps > 0.0)
+        return True
+
+    @property
+    def _spin_is_fixed(self) -> bool:
+        return self._custom_refused or self._settings.spin_speed == "fixed"
+
+    def _why_stop(self, now: float) -> str:
+        """Why what is under way must not go on: a sentence, "wanted", or empty."""
+        if self.state not in (State.STARTING, State.MOVING, *ROLLING):
+            return ""
+        if self.health.tripped:
+            return f"the motor board reports {self.health.tripped}"
+        if not self._agrees(now):
+            return "wanted"
+        if self.state not in ROLLING:
+            return ""
+        odometry, rolling_s = self.odometry, now - self._begun_s
+        if now - max(odometry.counted_s, self._begun_s) > BLIND_S:
+            return "the encoder is not answered while the robot drives"
+        if rolling_s > NO_START_S and abs(odometry.speeds[0]) + abs(odometry.speeds[1]) < 1e-3:
+            return "the robot is driven and does not move"
+        frozen_s = now - max(odometry.heading_changed_s, self._begun_s)
+        if frozen_s > FROZEN_S and self._heading_is_told and self._angles_heard > FROZEN_S:
+            return "the relative heading does not change: the IMU is dead"
+        return ""
+
+    @property
+    def _heading_is_told(self) -> bool:
+        return self.state is State.DRIVING or (
+            self.state is State.REVERSING and self.health.heading_in_reverse
+        )
+
+    @property
+    def _angles_heard(self) -> float:
+        """For how long of this motion headings have come."""
+        return self.odometry.heading_s - self._begun_s
+
+    def _halt(self, now: float, why: str = "") -> None:
+        """Stop what is, or may be, under way."""
+        if why:
+            self._notice(f"{why}; robot stopped", halt=True)
+        pending = self.conversation.pending
+        answers = ANSWERS.get(self.motion, ())
+        owed = int(pending is not None and any(form in answers for form in pending.word.forms))
+        self.conversation.give_up(now)
+        move = self._start if self.motion in (Motion.STRAIGHT, Motion.TURN) else None
+        self._stopping = Stopping(
+            self.motion,
+            now,
+            delay_s=self._delay_s,
+            started_s=self._started_s,
+            owed=owed,
+            move=move,
+        )
+        self.state = State.STOPPING
+
+    def _keep_stopping(self, now: float) -> Packets:
+        stopping = self._stopping
+        assert stopping is not None
+        if stopping.failed and now >= stopping.wake_at:
+            if self.greeted:
+                self._lose(now)
+            else:
+                self.state = State.UNKNOWN
+                self._halt(now)
+                return self._greet(now)
+            return self._repeat_lost(now)
+        said = stopping.due(now)
+        packets = self._send(said, now)
+        if said:
+            self.proof.stopped(now)
+            self.commanded = STANDING
+            if not self.greeted or stopping.asks_name(now):
+                packets += self._greet(now)
+        return packets
+
+    def _stopped(self, now: float) -> None:
+        """The server has answered the stop."""
+        stopping, self._stopping = self._stopping, None
+        self._moved_by = None  # it was cut short
+        assert stopping is not None
+        result, motion = stopping.result, stopping.motion
+        if motion is Motion.SPIN and isinstance(result, Ok) and result.form is Form.INTEGER:
+            self._spin_over(result.number, now)
+        if motion is Motion.STRAIGHT:
+            self.odometry.finish_straight()
+        if isinstance(result, Fail):
+            self._failed(motion, result, now)
+        if motion is Motion.UNKNOWN:
+            self._negative_sweep = result is None
+            self._swept_s = now
+            self.greeted = True
+        self._rest(now)
+
+    def _spin_over(self, degrees: float, now: float) -> None:
+        spun_rad = self.odometry.spun_rad
+        if abs(math.radians(degrees) - spun_rad) > 0.3 + 0.4 * abs(spun_rad):
+            return
+        self.odometry.spin_told(degrees)
+        seconds = now - self._begun_s
+        if seconds > 1.0 and self._spin_units and abs(spun_rad) > 0.3:
+            steady_radps = self._spin_seen_radps * abs(math.radians(degrees) / spun_rad)
+            self.loop.spun(self._spin_units, steady_radps)
+
+    def _lose(self, now: float) -> None:
+        """The server answers no more, and may be moving the robot."""
+        self._stopping = None
+        self.state = State.LOST
+        self.lost += 1
+        self._said_lost_s = -math.inf
+        self._notice(
+            f"lost: the server does not answer the stop of {NAMES[self.motion]}; motion is refused;"
+            " cut the motor power if the robot moves, then restart the server",
+            halt=True,
+        )
+
+    def _repeat_lost(self, now: float) -> Packets:
+        if now < self._said_lost_s + LOST_REPEAT_S:
+            return NO_PACKETS
+        self._said_lost_s = now
+        said = HALTS[self.motion] if self.motion is not Motion.UNKNOWN else HALTS[Motion.UNKNOWN]
+        return self._send(said, now) + self._greet(now)
+
+    def _obstacle(self, reply: Fail, motion: Motion) -> str:
+        """What a failure within a motion means."""
+        if reply.reason in words.OBSTACLES:
+            self._block(motion, reply.reason)
+            return f"the controller reports an obstacle ({reply.reason})"
+        return f"the controller has ended the motion ({reply.reason or 'no reason given'})"
+
+    def _failed(self, motion: Motion, reply: Fail, now: float) -> None:
+        """How a motion ended, by the reply to its stop."""
+        if reply.reason in words.OBSTACLES:
+            self._block(motion, reply.reason)
+        elif reply.reason == words.IMU_LOST:
+            self.health.imu_dead = True
+            self._notice(self.health.refusal, halt=True)
+        else:
+            self._notice(f"the controller reports: {reply.reason or 'fail'}", halt=True)
+
+    def _block(self, motion: Motion, why: str) -> None:
+        """Not that way, until the way is another or the command has ceased."""
+        if self._blocked is not motion:
+            self._blocked = motion
+            where = "behind" if motion is Motion.REVERSE else "in front"
+            self._notice(
+                f"obstacle {where} ({why}): that way is refused until another command comes",
+                halt=False,
+            )
+
+
+def stands(wanted: Wanted) -> bool:
+    return wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.is_zero
