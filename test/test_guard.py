@@ -410,3 +410,21 @@ def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> No
         assert again.recv(99) == b"SM"
     late.join()
     driver.close()
+
+
+def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
+    """They are in the guard's pipe before the driver is gone."""
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    keeper.beat(time.monotonic())
+    for word in (b"first", b"second", b"newest"):
+        keeper.replace_words(packed(word), packed(LATCHED_WORDS))
+    keeper.end(stopped=False)
+    assert line.hear(guard.TIMES * b"newest") == guard.TIMES * b"newest"
+
+
+def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
+    """Words hold the letter of a latched beat; what is cut is completed by the next read."""
+    assert guard.parted(b"..e") == (b"..e", b"", b"")
+    assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")
+    assert guard.parted(b".=3:be") == (b".", b"", b"=3:be")
+    assert guard.parted(b"=3:be" + b"ef 3:00\n=4:01 4:02\n.") == (b".", b"4:01 4:02", b"")
