@@ -417,7 +417,7 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.beat(time.monotonic())
     for word in (b"first", b"second", b"newest"):
-        keeper.replace_words(packed(word), packed(LATCHED_WORDS))
+        keeper.change(packed(word), packed(LATCHED_WORDS))
     keeper.end(stopped=False)
     assert line.hear(guard.TIMES * b"newest") == guard.TIMES * b"newest"
 

@@ -9,7 +9,9 @@ often pauses stood where they should. It knows places and times; not what is in 
 frames are believed (``decoder``).
 """
 
-from collections.abc import Sequence
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from operator import attrgetter
 from typing import Final
 
 from omnibot_driver.core.omnibot import cost_model
@@ -24,6 +26,8 @@ TICK_BYTES: Final = 14 + 9 + 15
 """All that one tick can bring. More at once after a pause means that we were late, not the line."""
 PAUSES_TO_TRUST: Final = 16
 """So many pauses that stood where they should, and they are taken for the line's own."""
+
+_FIRST: Final = attrgetter("first")
 
 
 class InterFrameGaps:
@@ -85,14 +89,13 @@ class InterFrameGaps:
         """What the pauses within these bytes cost, if they are taken for a frame."""
         return sum(
             gap.price
-            for gap in self.gaps
-            if gap.within(start, end)
-            and self._cause(gap, data, start, end) is not Cause.LATE_READER
+            for gap in self._within(start, end)
+            if self._cause(gap, data, start, end) is not Cause.LATE_READER
         )
 
     def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
         """Whether what follows may still tell why there was a pause within this frame."""
-        causes = [self._cause(gap, data, start, end) for gap in self.gaps if gap.within(start, end)]
+        causes = [self._cause(gap, data, start, end) for gap in self._within(start, end)]
         return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes
 
     def silent_within(self, start: int, end: int) -> bool:
@@ -115,6 +118,15 @@ class InterFrameGaps:
     def clear(self) -> None:
         """Time tells nothing about the bytes held."""
         self.gaps, self._reads = [], []
+
+    def _within(self, start: int, end: int) -> Iterator[Gap]:
+        """Those that stand between the first and the last of these bytes."""
+        gaps = self.gaps
+        for number in range(bisect_right(gaps, start, key=_FIRST), len(gaps)):
+            if gaps[number].first >= end:
+                return
+            if gaps[number].before <= end:
+                yield gaps[number]
 
     def _cause(self, gap: Gap, data: bytes | bytearray, start: int, end: int) -> Cause:
         return cause(gap, self._reads, data, start, end, self._byte_s)

@@ -10,9 +10,11 @@ bytes, that frame and all that follow are late by whole ticks, for good. A late 
 This module knows lengths, ticks and times; not what is in a frame, nor which one is believed.
 """
 
+from bisect import bisect_right
 from enum import Enum
 from itertools import pairwise
 from math import remainder
+from operator import attrgetter
 from typing import Final, NamedTuple
 
 from omnibot_driver.core.omnibot.frames import (
@@ -62,6 +64,9 @@ class Read(NamedTuple):
     now: float
 
 
+_END: Final = attrgetter("end")
+
+
 class Gap(NamedTuple):
     """Somewhere from ``first`` on, and before ``before``, the line was idle, or the reader late.
 
@@ -72,10 +77,6 @@ class Gap(NamedTuple):
     before: int
     price: float
     pause_s: float
-
-    def within(self, start: int, end: int) -> bool:
-        """Whether it stands between the first and the last of these bytes."""
-        return start < self.first < end and self.before <= end
 
 
 def cause(
@@ -102,9 +103,7 @@ def cause(
     on_time_s = latest_s = steady_s = 0.0
     to_prove = 1 if gap.pause_s >= IDLE_S else TICKS_TO_PROVE
     proofs, proved, paced = 0, -1, False
-    for read_end, now in reads:
-        if read_end <= gap.first:
-            continue
+    for read_end, now in reads[bisect_right(reads, gap.first, key=_END) :]:
         while end < read_end:
             if end >= size:
                 return Cause.UNDECIDED

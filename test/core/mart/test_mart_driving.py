@@ -227,7 +227,7 @@ def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
     bench.server.chassis.motor_status = bits
     bench.command(0.3, 0.0, 2.0)
     assert b"SRM" in bench.said()
-    name = bench.session.figures(bench.now).board.more["Motor board"]
+    name = bench.session.figures(bench.now).board.own["Motor board"]
     assert name.startswith("motor ")
     assert name in bench.try_command(0.3, 0.0)
 

@@ -15,9 +15,7 @@ def test_every_command_has_its_row() -> None:
     """What the driver says, and what it never says; in no row twice."""
     section = PAGE.read_text(encoding="utf-8").split("## Every command")[1].split("\n## ")[0]
     rows = re.findall(r"^\| ([A-Z][A-Z ,]*) \| (.+) \|$", section, re.MULTILINE)
-    listed = {
-        name: ("never" in used) for names, used in rows for name in names.split(", ")
-    }
+    listed = {name: ("never" in used) for names, used in rows for name in names.split(", ")}
     said = {word.text for word in WORDS if word.kind is not Kind.CHECK}
     assert said | set(NEVER_SAID) <= set(listed)
     assert all(listed[name] for name in NEVER_SAID)
