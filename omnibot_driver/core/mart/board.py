@@ -21,7 +21,7 @@ from omnibot_driver.core.mart.pilot import Pilot
 from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.states import State
 from omnibot_driver.core.mart.stops import SLOWEST_MPS, SLOWEST_RADPS
-from omnibot_driver.core.packets import NO_PACKETS, Packets
+from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import DisplacementReading, Reading
 from omnibot_driver.core.traits import Traits
 
@@ -153,8 +153,8 @@ class MartBoard(Board):
         return Conductor(self._pilot)
 
     def wake(self) -> Packets:
-        """The pilot stops whatever the server does, before anything else, and awaits the reply."""
-        return NO_PACKETS
+        """Stop; the pilot says it again, and awaits the reply before anything else."""
+        return self.stop()
 
     def stop(self) -> Packets:
         """What stops the present state of motion."""

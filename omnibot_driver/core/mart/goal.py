@@ -62,7 +62,7 @@ class Surplus:
 
 @dataclass(slots=True)
 class Move:
-    """The way to one goal. ``said``: moves so far; ``given_up``: one of them has failed."""
+    """The way to one goal. ``said``: moves so far; ``given_up``: it is over, or a move failed."""
 
     place: Pose
     said: int = 0

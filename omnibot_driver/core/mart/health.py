@@ -39,12 +39,12 @@ ENCODER_FAILS: Final = 3
 
 class Health:
     """``imu_dead``: the last check found no IMU; ``stranger``: what another server answers;
-    ``heading_in_reverse``: RMRA was seen to change while B drives; ``reference_fails``: how often
-    RM was answered by a bare ``fail``.
+    ``heading_told``: motions besides RM in which RMRA was seen to change; ``reference_fails``: how
+    often RM was answered by a bare ``fail``.
     """
 
     def __init__(self) -> None:
-        self.heading_in_reverse = False
+        self.heading_told: set[Motion] = set()
         self.reference_fails = 0
         self.connect()
 

@@ -213,8 +213,9 @@ class Pilot(Starts):
             self._counted(int(reply.number), at_s, now, doubtful=answer.doubtful)
         elif word is words.RMRA:
             self.odometry.turned(reply.number, at_s, doubtful=answer.doubtful)
-            if self.state is State.REVERSING and self.odometry.heading_changed_s > self._begun_s:
-                self.health.heading_in_reverse = True
+            rolling = self.state in (State.REVERSING, State.TURNING)
+            if rolling and self.odometry.heading_changed_s > self._begun_s:
+                self.health.heading_told.add(self.motion)
         else:
             self.readings += self.health.measured(word, reply, now)
             self.loop.volts = self.health.volts_or(self._settings.nominal_volts)
@@ -238,7 +239,7 @@ class Pilot(Starts):
         else:
             self._fresh = True
             self.loop.measured(speed, rate, reading.dyaw_rad, now)
-        if self.state is State.REVERSING and not self.health.heading_in_reverse:
+        if self.state is State.REVERSING and Motion.REVERSE not in self.health.heading_told:
             right, left = self.loop.units
             if now - self._begun_s > FROZEN_S and right:
                 self.odometry.left_over_right = left / right

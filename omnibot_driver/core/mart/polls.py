@@ -24,7 +24,7 @@ STILL: Final[Mapping[Word, float]] = {
     SRC: 0.5,
 }
 DRIVING: Final[Mapping[Word, float]] = {RMRA: MOTION_S, ENC: MOTION_S, MCSTAT: 0.5, VOLTS: 2.0}
-TURNING: Final[Mapping[Word, float]] = {ENC: MOTION_S, MCSTAT: 0.5, VOLTS: 2.0}
+TURNING: Final[Mapping[Word, float]] = {ENC: MOTION_S, RMRA: 0.15, MCSTAT: 0.5, VOLTS: 2.0}
 PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.STILL: STILL,
     State.DRIVING: DRIVING,

@@ -218,6 +218,7 @@ class Starts(Stops):
             self._move = Move(order.place)
         request = next_move(self._move, self.odometry.pose, self._settings, self._surplus)
         if request is None:
+            self._move.given_up = True  # it is over: whoever pushes the robot away keeps it there
             return None
         if request.word in NEEDS_IMU and now > self._proved_s + PROVED_S:
             return request

@@ -64,6 +64,8 @@ class Stops(Ground):
         if not isinstance(order, Drive):
             return Motion.NONE, STANDING
         speed, rate = order.twist.vx_mps, order.twist.yaw_rate_radps
+        if order.twist.vy_mps:
+            self._once("cmd_vel: sideways motion is set to zero, this base has none (said once)")
         if abs(speed) < SLOWEST_MPS and abs(rate) < SLOWEST_RADPS:
             return Motion.NONE, STANDING
         if turn_is_on_the_spot(speed, rate, self._settings.track_m):
@@ -112,9 +114,7 @@ class Stops(Ground):
 
     @property
     def _heading_is_told(self) -> bool:
-        return self.state is State.DRIVING or (
-            self.state is State.REVERSING and self.health.heading_in_reverse
-        )
+        return self.state is State.DRIVING or self.motion in self.health.heading_told
 
     @property
     def _angles_heard(self) -> float:

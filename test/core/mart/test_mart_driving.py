@@ -20,7 +20,7 @@ STEPS = [(0.3, 0.0), (0.15, 0.0), (0.3, 0.3), (0.3, -0.3), (-0.2, 0.0), (-0.2, 0
 def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
     volts: float, unequal: float
 ) -> None:
-    """By its mean over the next two; turns on the spot within 8 %, as they go in whole units."""
+    """By its mean over the next two."""
     bench = MartBench(volts=volts, motor_inequality=unequal).ready()
     for vx, yaw_rate in STEPS:
         bench.command(vx, yaw_rate, 2.0)
@@ -30,9 +30,8 @@ def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
             facts = bench.robot.board.facts
             speeds.append(facts["speed_mps"])
             rates.append(facts["yaw_rate_radps"])
-        slack = 0.05 if vx else 0.08
         assert mean(speeds) == pytest.approx(vx, rel=0.05, abs=0.004), (vx, yaw_rate)
-        assert mean(rates) == pytest.approx(yaw_rate, rel=slack, abs=0.015), (vx, yaw_rate)
+        assert mean(rates) == pytest.approx(yaw_rate, rel=0.05, abs=0.015), (vx, yaw_rate)
     assert bench.notices == []
 
 
@@ -55,7 +54,8 @@ def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
         bench.command(vx, yaw_rate, 2.0)
     bench.run(2.0)
     said = [data.split()[0] for data in bench.said() if not data.startswith((b"RMCS", b"CS"))]
-    said = [word for word, before in zip(said[2:], said[1:], strict=False) if word != before]
+    said = said[said.index(b"MCR") :]
+    said = [word for word, before in zip(said, [b"", *said], strict=False) if word != before]
     assert said == [
         *(b"MCR", b"RM", b"SRM"),
         *(b"MCR", b"B", b"SM"),
@@ -186,16 +186,16 @@ def test_a_dead_imu_refuses_motion_until_it_is_back() -> None:
     assert "IMU" in bench.try_command(0.3, 0.0)
 
 
-def test_an_imu_that_dies_while_the_robot_drives_stops_it_and_loses_the_server() -> None:
+@pytest.mark.parametrize("motion", [(0.3, 0.0), (-0.2, 0.0), (0.0, 0.5)])
+def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
+    motion: tuple[float, float],
+) -> None:
     """The heading is frozen: half a second, and the time of a stop."""
     bench = MartBench().ready()
-    bench.command(0.3, 0.0, 2.0)
+    bench.command(*motion, 2.5)
+    assert not bench.robot.stands
     bench.server.imu.alive = False
-    for _ in range(20):
-        bench.try_command(0.3, 0.0)
-        bench.run(0.1)
-        if bench.robot.stands:
-            break
+    bench.command(*motion, 1.2)
     assert bench.robot.stands
     bench.run(6.0)
     assert any("heading does not change" in notice for notice in bench.notices)
