@@ -79,6 +79,7 @@ class Ground:
         self._move: Move | None = None
         self._start: Word | None = None
         self._moved_last = False
+        self._copies_stopped_s = -math.inf
         self._moved_by: Request | None = None
         self._proved_s = self._started_s = self._begun_s = self._harmful_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
@@ -92,7 +93,6 @@ class Ground:
         self._negative_sweep = self._rescue = False
         self._rested_s = -math.inf
         self._counted_at_rest = 0
-        self._unanswered = 0
         self._fresh = False
         self._told: set[str] = set()
         self.heard_s = -math.inf
@@ -139,7 +139,6 @@ class Ground:
         self._polls.press(words.ENC)
         self._rested_s = now
         self._counted_at_rest = 0
-        self._unanswered = 0
         self._next_s = -math.inf
 
     def _require(self, word: Word) -> None:

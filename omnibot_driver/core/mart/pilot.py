@@ -21,12 +21,15 @@ from omnibot_driver.core.mart.states import (
     Motion,
     State,
 )
+from omnibot_driver.core.mart.stopping import REPEAT_S
 from omnibot_driver.core.mart.stops import FROZEN_S, LOST_REPEAT_S, stands
 from omnibot_driver.core.mart.words import Form, Kind, Word
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 STOPS_S: Final = 1.0
 """The answer to a stop takes no longer, as a rule."""
+COPY_S: Final = 0.25
+"""After a controlled move the encoder is answered by then, unless a copy of the move runs."""
 STRAY_COUNTS: Final = 3
 """A robot that stands and is counted so far since the last count moves."""
 STRAY_AGAIN_S: Final = 3.0
@@ -94,7 +97,7 @@ class Pilot(Starts):
         if self.state is State.LOST:
             return self._said_lost_s + LOST_REPEAT_S
         if pending is not None:
-            return min(pending.until_s, self.jobs.wake_at)
+            return min(pending.until_s, self.jobs.wake_at, self._copy_stop_s)
         if self.state is State.SERVING:
             return self.jobs.wake_at
         times = [max(self._polls.wake_at(self.state), now + 0.004)]
@@ -120,9 +123,23 @@ class Pilot(Starts):
         if why := self._why_stop(now):
             self._halt(now, "" if why == "wanted" else why)
             return self._keep_stopping(now)
+        if now >= self._copy_stop_s:
+            self._copies_stopped_s = now
+            return self._send((words.SL, words.SS), now)
         if self.conversation.pending is not None:
             return NO_PACKETS
         return self._act(now) or self._poll(now)
+
+    @property
+    def _copy_stop_s(self) -> float:
+        """When to stop a late copy of a controlled move that seems to keep the port silent.
+
+        SL and SS would hang a server that drives by RM or B; but the last motion was none of these.
+        """
+        suspected = self._moved_last and self.odometry.counted_s < self._rested_s
+        if self.state is not State.STILL or not suspected:
+            return math.inf
+        return max(self._rested_s + COPY_S, self._copies_stopped_s + REPEAT_S)
 
     def hear(self, data: bytes, now: float) -> None:
         """A datagram of the command port."""
@@ -146,7 +163,6 @@ class Pilot(Starts):
             return
         answer = self.conversation.hear(reply, now)
         if answer is not None:
-            self._unanswered = 0
             self._answered(answer, now)
 
     def _named(self, reply: Ok, now: float) -> None:
@@ -201,7 +217,6 @@ class Pilot(Starts):
             self.jobs.missed(word, now)
         else:
             self._polls.press(word)
-            self._unanswered += 1
 
     def _measured(self, answer: Answer, at_s: float, now: float) -> None:
         word, reply = answer.word, answer.reply

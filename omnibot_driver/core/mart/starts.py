@@ -70,10 +70,6 @@ class Starts(Stops):
             return self._send(HALTS[Motion.UNKNOWN], now)
         if self._rescue:
             return self._begin(words.MCR.request("SLOW", 1), now)
-        if self._unanswered >= 2 and self._moved_last:
-            # A late copy of a controlled move would keep the port silent.
-            self._unanswered = 0
-            return self._send((words.SL, words.SS), now)  # RM and B would hang by them
         if self.odometry.counted_s < self._rested_s:
             return NO_PACKETS  # how it rolled out is counted before the count begins anew
         start = self._next_start(now)
