@@ -126,7 +126,7 @@ class LoisEcu:
         self._said: SetRpm | SetDuty | None = None
         self._stopped_at_s = math.inf
         self._stood = False
-        self._stall = StallWatch()
+        self._stall = StallWatch(self._settings.track_m)
         self._request = RecordRequest()
         self._damaged = 0
         self._clears_left = outbound.CLEARED_TIMES

@@ -3,18 +3,21 @@
 """Whether a wheel stands that is commanded to turn: it may never start by itself.
 
 In the eyes of the public firmware's controller a wheel that stands keeps its last speed. If that is
-more than a new, slower set-point, the motor gets no power. RPM 0/0 clears it. Knows set-points,
-reports and times.
+more than a new, slower set-point, the motor gets no power. RPM 0/0 clears it. Of a wheel that is to
+turn backward 0x20 tells: its pose stands while nothing ticks, and while the other wheel ticks its
+velocity shows the same speed of this one again and again. Knows set-points, reports and times.
 """
 
 import math
 from typing import Final
 
+from omnibot_driver.core.lois_ecu.board_odometry import rim_speeds
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Ticks
 
 STALLED_S: Final = 2.0
 """Without a sign of motion. With the firmware's own gains a wheel takes half as long to start."""
 LEAST_RPM: Final = 2
+SAME_MPS: Final = 1e-3
 AT_LEAST: Final = 4
 """So many groups must say so: on a bad line few come."""
 
@@ -22,12 +25,14 @@ AT_LEAST: Final = 4
 class StallWatch:
     """``looks_stalled`` once for each ``STALLED_S`` that a commanded wheel stands."""
 
-    def __init__(self) -> None:
+    def __init__(self, track_m: float = 0.47) -> None:
+        self._track_m = track_m
         self._targets = [0, 0]
         self._seen_at = [math.inf, math.inf]
         self._quiet = [0, 0]
         """Groups since then that could have shown this wheel's motion and did not."""
         self._ticks: Ticks | None = None
+        self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
@@ -46,10 +51,14 @@ class StallWatch:
         """A wheel that is to turn forward ticks; of one to turn backward the pose tells."""
         if isinstance(report, BoardOdometry):
             pose = (report.x_m, report.y_m, report.yaw_rad)
+            told = rim_speeds(report, self._track_m)
             for wheel in (0, 1):
                 if self._targets[wheel] < 0:
-                    self._note(wheel, now, turns=pose != self._pose)
+                    turns = pose != self._pose and not self._repeats(wheel, told)
+                    self._note(wheel, now, turns=turns)
             self._pose = pose
+            if told is not None and any(told):
+                self._told = told
             return
         before, self._ticks = self._ticks, report
         if before is not None:
@@ -68,6 +77,13 @@ class StallWatch:
             self._seen_at = [at if at == math.inf else now for at in self._seen_at]
             self._quiet = [0, 0]
         return stalled
+
+    def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
+        """Whether the other wheel has another speed than before, and this one the same."""
+        if told is None or self._told is None:
+            return False
+        same = [abs(a - b) < SAME_MPS for a, b in zip(told, self._told, strict=True)]
+        return abs(told[wheel]) > SAME_MPS and same[wheel] and not same[1 - wheel]
 
     def _note(self, wheel: int, now: float, *, turns: bool) -> None:
         self._quiet[wheel] += 1

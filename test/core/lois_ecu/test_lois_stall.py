@@ -2,6 +2,8 @@
 
 """A wheel that stands although it is commanded: the public firmware may hold it."""
 
+import math
+
 from omnibot_driver.core.lois_ecu import BoardOdometry, SetDuty, SetRpm, Ticks
 from omnibot_driver.core.lois_ecu.stall import StallWatch
 
@@ -39,6 +41,30 @@ def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
     """Its ticks are not counted."""
     assert watched(SetRpm(-10, 10), ticks=(0, 1), ways_m=0.01) == []
     assert watched(SetRpm(-10, -10), ticks=(0, 0), ways_m=0.0) == [2.0, 4.0, 6.0]
+
+
+def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
+    """The pose changes, as the firmware integrates the speed that the left wheel had."""
+    watch, unit = StallWatch(0.47), 0.13 * math.tau / 60
+    watch.wrote(SetRpm(-9, 9), 0.0)
+    for step in range(1, 12):
+        left, right = -15 * unit, (8 + step % 3) * unit
+        turning = (right - left) / 0.47
+        group = BoardOdometry(
+            0.0, 0.0, 0.1 * step, *heading(left, right, 0.1 * step), turning, appended=True
+        )
+        watch.heard(group, 0.2 * step)
+        watch.heard(Ticks(200 * step, 0, 2 * step), 0.2 * step)
+        if watch.looks_stalled(0.2 * step):
+            assert step == 11
+            return
+    raise AssertionError("it does not look stalled")
+
+
+def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
+    """The velocity in the earth frame."""
+    speed = (left + right) / 2
+    return speed * math.cos(yaw_rad), speed * math.sin(yaw_rad)
 
 
 def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
