@@ -8,6 +8,7 @@ Also finds out that the board has restarted: its ticks are zero again, or its cl
 import math
 from typing import Final
 
+from omnibot_driver.core.lois_ecu.board_time import BoardTime
 from omnibot_driver.core.lois_ecu.heading_filter import HeadingFilter
 from omnibot_driver.core.lois_ecu.messages import (
     BoardOdometry,
@@ -34,6 +35,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.readings import DisplacementReading
 
 DAY_S: Final = 86400
+TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
 """Counts that are so much nearer to zero are a new beginning, not wheels that roll back."""
@@ -65,6 +67,7 @@ class Translation:
     def _connect(self) -> None:
         self._ticks: Ticks | None = None
         self._unit: ClockUnit | None = None
+        self._time, self._late_s = BoardTime(), 0.0
         self._stamp_s: float | None = None
         self._date: GpsDate | None = None
         self._clock = (0, 0, 0)
@@ -86,32 +89,37 @@ class Translation:
         found: list[LoisReading] = []
         for at, report in zip(times, reports, strict=True):
             found += self._readings(report, clock_unit, at)
-        return found + self.rest(now)
-
-    def rest(self, now: float) -> list[LoisReading]:
-        """What waited for more that did not come."""
-        return self._displaced(self.odometry.rest(now))
+        return found
 
     def _readings(
         self, report: Report, clock_unit: ClockUnit | None, now: float
     ) -> list[LoisReading]:
+        odometry = self.odometry
         match report:
             case Ticks():
                 restarted = self._watch(report, clock_unit, now)
-                return restarted + self._displaced(self.odometry.heard_ticks(report, now))
-            case BoardOdometry():
-                return self._displaced(self.odometry.heard_odometry(report, now))
+                self._late_s = self._time.late_s(report.time_counts, self._unit, now)
+                odometry.late_stddev_s = self._time.stddev_s
+                self._time.sent(TICKS_LINES)
+                return restarted + self._displaced(odometry.heard_ticks(report, now, self._late_s))
+            case BoardOdometry(appended=appended):
+                self._time.sent(ODOMETRY_LINES)
+                late_s = self._late_s if appended else 0.0
+                odometry.heard_odometry(report, now, late_s)
             case GpsPosition(latitude, longitude):
+                self._time.sent(POSITION_LINES)
                 return [FixReading(latitude, longitude, bool(latitude or longitude))]
             case GpsDate():
                 self._date = report if report.month and report.day else None
             case GpsTime():
+                self._time.sent(1)
                 clock = (report.hours, report.minutes, report.seconds)
                 if clock < self._clock:
                     self._date = None  # past midnight it is another one
                 self._clock = clock
                 return [TimeReading(self._utc_s(report))]
             case Heading(heading_deg):
+                self._time.sent(1)
                 return self._heading(heading_deg)
             case EStopButton():
                 self.odometry.halted(now)
@@ -139,6 +147,7 @@ class Translation:
         if late or fewer > rolled:
             self.restarts += 1
             self.odometry.connect()
+            self._time.begin()
             self.headings.forget()
             return [DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True)]
         return []
@@ -166,7 +175,7 @@ class Translation:
                 "body",
                 None if before is None else fused.stamp_s - before,
                 0,
-                measured=self.odometry.counting and not fused.blind,
+                measured=self.odometry.counting and fused.source in ("ticks", "standing"),
             ),
             WheelReading(left_m / radius_m, right_m / radius_m, not fused.blind),
             fused,

@@ -1,12 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a wheel should move by what was commanded, where the board does not tell.
+"""What one wheel is commanded, when that takes effect, and what the firmware then counts.
 
-A speed that nears the commanded one. Also keeps what the board's firmware makes of a command:
-whether it counts this wheel's ticks now. Knows commands and times, no pose.
-
-The public firmware counts ticks while the wheel's RPM target is positive. Duty leaves that target
-as it was, but each tick under negative duty lowers it.
+The public firmware keeps an RPM target for each wheel. Its sign decides whether ticks count, and
+which sign the measured speed gets. Knows set-points and times; no measurement and no pose.
 """
 
 import math
@@ -14,134 +11,91 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final, Literal
 
-LATENCY_S: Final = 0.06
-"""From our writing to the controller's next step: half of 91 ms, the line, the reading."""
-SPEEDING_UP_S: Final = 0.45
-"""Time constant, as far as it is the same with any gains."""
-COASTING_S: Final = 0.14
-STEP_S: Final = 0.02
+HEARD_S: Final = 0.008
+"""From our writing until the board has read the line."""
+STEP_S: Final = 0.2
+FIRMWARE_STEP_S: Final = 0.091
+"""Of the speed controller, by the manual and of the public firmware."""
 
 CommandKind = Literal["rpm", "duty"]
 
 
 @dataclass(frozen=True, slots=True)
-class Commanded:
-    """From ``at_s`` on: in m/s of the rim."""
+class _Effect:
+    """``halts``: the target is zero until the next step; else this is carried out."""
 
     at_s: float
+    halts: bool
     kind: CommandKind
     speed_mps: float
 
 
-@dataclass(slots=True)
-class Expected:
-    """Of one wheel within an interval. ``blind_m``: rolled while no ticks were counted.
-
-    ``blind_s``: for so long; ``unsteady_m``: part of it while the speed was changing.
-    """
-
-    way_m: float = 0.0
-    blind_m: float = 0.0
-    blind_s: float = 0.0
-    unsteady_m: float = 0.0
-    changes_mps: float = 0.0
-    started: bool = False
-    from_mps: float = 0.0
-
-
 class WheelModel:
-    """``rounding_mps``: the controller sees its speed without the fraction of an RPM, and makes up
-    for that. ``gain_reverse``: speed over commanded speed besides, backwards.
+    """Advanced by ``carry_out``. Speeds are of the rim, as commanded.
+
+    kind, target_mps: what the motor is told. hidden_mps: the firmware's RPM target; in duty mode it
+    stays as it was, but ticks under negative duty lower it.
     """
 
-    def __init__(self, rounding_mps: float) -> None:
-        self.speed_mps = 0.0
-        self.gain_reverse = 1.0
-        self.rounding_mps = rounding_mps
-        self._commands: deque[Commanded] = deque(maxlen=64)
-        self._now = Commanded(-math.inf, "rpm", 0.0)
-        self._hidden_mps = 0.0
-        """The RPM target that the firmware keeps in duty mode."""
-        self.steady_since_s = -math.inf
-
-    @property
-    def target_mps(self) -> float:
-        """What is carried out."""
-        return self._now.speed_mps
-
-    @property
-    def final_mps(self) -> float:
-        """What the speed nears."""
-        return self._course()[0]
-
-    @property
-    def kind(self) -> CommandKind:
-        """How it was said."""
-        return self._now.kind
+    def __init__(self) -> None:
+        self.kind: CommandKind = "rpm"
+        self.target_mps = 0.0
+        self.hidden_mps = 0.0
+        self.step_s = STEP_S
+        """What was heard takes effect with the controller's next step, half of this on average."""
+        self._effects: deque[_Effect] = deque(maxlen=128)
+        self._heard: tuple[CommandKind, float] = ("rpm", 0.0)
+        self._rpm_mps = 0.0
 
     @property
     def counting(self) -> bool:
         """Whether the public firmware counts this wheel's ticks."""
-        return self._hidden_mps > 0.0
+        return self.hidden_mps > 0.0
 
     @property
-    def measuring(self) -> bool:
-        """Whether the public firmware measures this wheel's speed."""
-        return self._hidden_mps != 0.0
+    def measured_sign(self) -> int:
+        """The sign that the public firmware gives this wheel's speed; 0: it measures none."""
+        return (self.hidden_mps > 0.0) - (self.hidden_mps < 0.0)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether something else was commanded that did not take effect yet."""
+        return bool(self._effects)
 
     def command(self, at_s: float, kind: CommandKind, speed_mps: float) -> None:
         """This was written then."""
-        last = self._commands[-1] if self._commands else self._now
-        if (last.kind, last.speed_mps) != (kind, speed_mps):
-            self._commands.append(Commanded(at_s + LATENCY_S, kind, speed_mps))
+        if (kind, speed_mps) == self._heard and not (kind == "rpm" and not speed_mps):
+            return
+        halts = kind == "rpm" and (not speed_mps or speed_mps * self._rpm_mps < 0)
+        if kind == "rpm":
+            self._rpm_mps = speed_mps
+        if halts:
+            self._effects.append(_Effect(at_s + HEARD_S, True, kind, 0.0))
+        self._heard = (kind, speed_mps)
+        self._effects.append(_Effect(at_s + HEARD_S + self.step_s / 2, False, kind, speed_mps))
+        if halts:
+            self._effects = deque(sorted(self._effects, key=_at), maxlen=128)
 
-    def advance(self, from_s: float, to_s: float) -> Expected:
-        """What it should do from then to then."""
-        expected = Expected(from_mps=self.speed_mps)
-        at_s = from_s
-        while at_s < to_s:
-            while self._commands and self._commands[0].at_s <= at_s:
-                self._carry_out(self._commands.popleft(), expected)
-            end_s = min(at_s + STEP_S, to_s)
-            if self._commands:
-                end_s = max(min(end_s, self._commands[0].at_s), at_s + 1e-4)
-            self._step(end_s - at_s, expected)
-            at_s = end_s
-        return expected
+    def next_change_s(self) -> float:
+        """When the next effect is due; infinity without any."""
+        return self._effects[0].at_s if self._effects else math.inf
 
-    def ahead(self, duration_s: float) -> float:
-        """The way in the next while, if nothing else is commanded; changes nothing."""
-        final, constant_s = self._course()
-        part = constant_s * (1 - math.exp(-duration_s / constant_s))
-        return final * duration_s + (self.speed_mps - final) * part
+    def carry_out(self, now: float) -> tuple[bool, bool]:
+        """All effects until now. Whether the measured speed was cleared, and the target changed."""
+        cleared = False
+        before = self.kind, self.target_mps
+        while self._effects and self._effects[0].at_s <= now:
+            effect = self._effects.popleft()
+            if effect.halts:
+                self.hidden_mps, cleared = 0.0, True
+                continue
+            self.kind, self.target_mps = effect.kind, effect.speed_mps
+            if effect.kind == "rpm":
+                self.hidden_mps = effect.speed_mps
+            elif effect.speed_mps < 0 and not self.hidden_mps:
+                self.hidden_mps = -1e-3
+        return cleared, before != (self.kind, self.target_mps)
 
-    def _carry_out(self, command: Commanded, expected: Expected) -> None:
-        expected.changes_mps += abs(self._now.speed_mps - command.speed_mps)
-        self._now = command
-        self.steady_since_s = command.at_s
-        if command.kind == "rpm":
-            self._hidden_mps = command.speed_mps
-        elif command.speed_mps < 0:
-            self._hidden_mps = min(self._hidden_mps, -1e-3)
 
-    def _course(self) -> tuple[float, float]:
-        final = self._now.speed_mps
-        if final < 0:
-            final *= self.gain_reverse
-        if final and self._now.kind == "rpm":
-            final += math.copysign(self.rounding_mps, final)
-        return final, SPEEDING_UP_S if final else COASTING_S
-
-    def _step(self, duration_s: float, expected: Expected) -> None:
-        final, constant_s = self._course()
-        before = self.speed_mps
-        expected.started |= not before and final != 0.0
-        self.speed_mps += (final - before) * (1 - math.exp(-duration_s / constant_s))
-        if not final and abs(self.speed_mps) < 0.01:
-            self.speed_mps = 0.0
-        way_m = (before + self.speed_mps) / 2 * duration_s
-        expected.way_m += way_m
-        if not self.counting:
-            expected.blind_m += way_m
-            expected.blind_s += duration_s if way_m else 0.0
-            expected.unsteady_m += abs(final - self.speed_mps) * duration_s
+def _at(effect: _Effect) -> float:
+    return effect.at_s

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from random import Random
 
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu.board import LoisEcu
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import LoisReading
@@ -34,6 +35,21 @@ CLASSES: dict[str, Program] = {
         (5.0, (30, 30)),
     ],
 }
+
+
+MOTIONS = ("straight", "curve", "in place", "reverse", "reverse curve", "jerky", "left", "right")
+"""Of the campaign; the last two are squares."""
+
+
+def jerky(seed: int, seconds: float = 20.0) -> Program:
+    """Other set-points of either sign several times a second."""
+    random, program, left_s = Random(f"jerky {seed}"), [], seconds
+    while left_s > 0:
+        duration_s = random.choice((0.2, 0.3, 0.5, 0.8, 1.2))
+        pair = (random.uniform(-25, 25), random.uniform(-25, 25))
+        program.append((duration_s, STOP if random.random() < 0.15 else pair))
+        left_s -= duration_s
+    return program
 
 
 @dataclass(frozen=True)
@@ -152,12 +168,54 @@ class Rig:
             self.say(self.driver.wheels((left_rpm * unit, right_rpm * unit)))
             self.run(REPEAT_S)
 
+    def drive(self, program: Program) -> Drive:
+        """Then stop."""
+        self.run(4.0)
+        for seconds, (left, right) in [*program, (2.0, STOP)]:
+            self.order(left, right, seconds)
+        return self.outcome()
+
+    def outcome(self) -> Drive:
+        """By the last estimate."""
+        last, true = self.estimates[-1]
+        return Drive(true, self.way_m, self.turned_rad, last, self.driver)
+
+    def square(self, side_m: float, sign: int) -> None:
+        """Steered by the true place, with turns on the spot and stops between."""
+        goal_rad = 0.0
+        for _ in range(4):
+            start = self.place
+            while (
+                math.cos(goal_rad) * (self.place.x_m - start.x_m)
+                + math.sin(goal_rad) * (self.place.y_m - start.y_m)
+                < side_m
+            ):
+                self._steer(0.3, max(-0.15, min(0.15, goal_rad - self.place.yaw_rad)))
+            self.order(*STOP, 1.5)
+            goal_rad += sign * math.pi / 2
+            while abs(goal_rad - self.place.yaw_rad) > 0.15:
+                self._steer(0.0, math.copysign(0.5, goal_rad - self.place.yaw_rad))
+            self.order(*STOP, 1.5)
+
+    def _steer(self, speed_mps: float, turning_radps: float) -> None:
+        self.say(self.driver.velocity(BodyTwist(speed_mps, 0.0, turning_radps)))
+        self.run(REPEAT_S)
+
+
+def motion(settings: LoisSettings, name: str, *, side_m: float = 5.0) -> Drive:
+    """One of ``MOTIONS``, with encoders that begin anywhere between two ticks."""
+    rig = Rig(settings)
+    random = Random(f"encoders {settings.seed}")
+    for encoder in rig.board._encoders:
+        encoder._periods = random.random()
+    if name in ("left", "right"):
+        rig.run(4.0)
+        rig.square(side_m, 1 if name == "left" else -1)
+        rig.order(*STOP, 2.0)
+        return rig.outcome()
+    return rig.drive(jerky(settings.seed) if name == "jerky" else CLASSES[name])
+
 
 def drive(settings: LoisSettings, program: Program, *, loss: float = 0.0) -> Drive:
     """Then stop. Each byte is lost with this chance, both ways."""
-    rig = Rig(settings, loss=loss)
-    rig.run(4.0)
-    for seconds, (left, right) in [*program, (2.0, STOP)]:
-        rig.order(left, right, seconds)
-    last, true = rig.estimates[-1]
-    return Drive(true, rig.way_m, rig.turned_rad, last, rig.driver)
+    return Rig(settings, loss=loss).drive(program)

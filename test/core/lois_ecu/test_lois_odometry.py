@@ -2,17 +2,17 @@
 
 """The odometry of a LOIS robot against the truth, on both kinds of firmware.
 
-``LOIS_DRIVES=50 pytest -s -k honest`` prints the figures of that many drives; a few run always.
+``test/integrity/lois_odometry.py`` prints the figures of many drives; a few run here.
 """
 
 import math
-import os
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from statistics import mean
 
 import pytest
-from lois_drives import CLASSES, STOP, Drive, Rig, drive, nominal, wrong
+from lois_drives import CLASSES, STOP, Drive, Rig, drive, motion, nominal, wrong
 
 from omnibot_driver.core.lois_ecu import (
     BoardOdometry,
@@ -27,8 +27,6 @@ from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import Firmware, LoisSettings
 
-DRIVES = int(os.environ.get("LOIS_DRIVES", "2"))
-MEASURED = ("straight", "curve", "in place", "reverse", "reverse curve")
 BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 
@@ -40,56 +38,66 @@ def off_m(one: Drive) -> float:
 # What is promised
 
 
+@cache
+def driven(firmware: Firmware, name: str) -> Drive:
+    """With wheels of the right size."""
+    return drive(nominal(firmware, 1), CLASSES[name])
+
+
 @BOTH
 @pytest.mark.parametrize("name", ["straight", "curve"])
 def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware, name: str) -> None:
     """With wheels of the right size."""
-    for seed in range(2):
-        one = drive(nominal(firmware, seed), CLASSES[name])
-        assert one.way_m > 5.0
-        assert off_m(one) < max(0.02, 0.02 * one.way_m)
-        assert abs(one.error.yaw_rad) < math.radians(3.0)
+    one = driven(firmware, name)
+    assert one.way_m > 5.0
+    assert off_m(one) < max(0.02, 0.02 * one.way_m)
+    assert abs(one.error.yaw_rad) < math.radians(3.0)
 
 
 @BOTH
-@pytest.mark.parametrize("sign", [1, -1], ids=["left", "right"])
-def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware, sign: int) -> None:
+def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> None:
     """One wheel turns backward: the public firmware counts nothing of it."""
-    one = drive(nominal(firmware), [(12.0, (-15.0 * sign, 15.0 * sign))])
+    one = driven(firmware, "in place")
     assert one.turned_rad > 8.0
     assert abs(one.error.yaw_rad) < 0.03 * one.turned_rad
 
 
 @BOTH
-@pytest.mark.parametrize("name", ["reverse", "reverse curve"])
-def test_backward_it_is_within_10_percent_and_3_sigma(firmware: Firmware, name: str) -> None:
+def test_backward_it_is_within_5_percent_and_3_sigma(firmware: Firmware) -> None:
     """The public firmware counts nothing, and its position stands at equal speeds."""
-    for seed in range(2):
-        one = drive(nominal(firmware, seed), CLASSES[name])
-        assert one.way_m > 5.0
-        assert off_m(one) < 0.1 * one.way_m
-        assert one.sigmas < 3.0
+    one = driven(firmware, "reverse")
+    assert one.way_m > 5.0
+    assert off_m(one) < 0.05 * one.way_m
+    assert one.sigmas < 3.0
 
 
 @BOTH
-@pytest.mark.parametrize("name", MEASURED)
+@pytest.mark.parametrize("name", ["curve", "in place", "reverse", "jerky"])
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
-    """Wheels of wrong sizes that slip, on uneven ground: NEES of three numbers is 3 on average."""
-    made = [drive(wrong(firmware, seed), CLASSES[name]) for seed in range(DRIVES)]
-    found = [one.nees for one in made]
-    spread = math.sqrt(6 / DRIVES)
-    errors = [off_m(one) for one in made]
-    degrees = [abs(math.degrees(one.error.yaw_rad)) for one in made]
-    print(
-        f"\n{firmware} {name}: NEES {mean(found):.2f}, greatest {max(found):.1f},"
-        f" error {mean(errors):.3f} m (greatest {max(errors):.3f}) and {mean(degrees):.1f} degrees"
-        f" of {made[0].way_m:.1f} m"
-    )
-    assert min(1.0, 3 - 4 * spread) < mean(found) < 3 + 4 * spread
+    """Wheels of wrong sizes that slip, on uneven ground: one in 10,000 is further off.
+
+    ``test/integrity/lois_odometry.py`` judges by the mean of many.
+    """
+    assert motion(wrong(firmware, 1000), name).nees < 21.1
+
+
+@pytest.mark.parametrize("name", ["left", "right"])
+def test_after_a_square_with_turns_on_the_spot_it_is_within_3_sigma(name: str) -> None:
+    """Each turn has a wheel of which the public firmware counts nothing."""
+    one = motion(nominal("firmware", 1000), name, side_m=1.0)
+    assert off_m(one) < 0.15
+    assert one.sigmas < 3.0
+
+
+def test_hard_steering_to_both_sides_is_followed() -> None:
+    """Wheels that reverse several times a second, as documented: each tick is told."""
+    one = motion(nominal("documented", 1001), "jerky")
+    assert off_m(one) < 0.05
+    assert abs(one.error.yaw_rad) < math.radians(5.0)
 
 
 @BOTH
-@pytest.mark.parametrize("name", MEASURED)
+@pytest.mark.parametrize("name", ["curve", "in place"])
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(
     firmware: Firmware, name: str
 ) -> None:
@@ -113,7 +121,7 @@ def settled(firmware: Firmware) -> Rig:
 def test_the_boards_own_odometry_would_be_wrong() -> None:
     """Why it is not simply passed on: it misses a good part of a straight drive."""
     rig = settled("firmware")
-    rig.order(20, 20, 20.0)
+    rig.order(20, 20, 8.0)
     board = rig.board.odometry.pose
     truth = rig.board.truth
     assert math.hypot(board[0], board[1]) < 0.85 * math.hypot(truth.x_m, truth.y_m)
@@ -193,7 +201,7 @@ def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
 
 
 def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
-    """Neither its ticks nor its heading."""
+    """Neither its ticks nor its heading; what it rolled on meanwhile is a few centimetres."""
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(20, 20), 0.0)
     for step in range(1, 11):
@@ -203,7 +211,8 @@ def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
     odometry.connect()
     assert odometry.heard_ticks(Ticks(2000, 0, 0), 9.0) == []
     (after,) = odometry.heard_ticks(Ticks(2400, 0, 0), 9.4)
-    assert after.pose == place.pose
+    assert after.pose.way_to(place.pose).way_m < 0.05
+    assert after.pose.yaw_rad == pytest.approx(place.pose.yaw_rad, abs=1e-9)
 
 
 def test_other_wheels_count_from_the_next_group_on() -> None:
@@ -221,8 +230,9 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
     after = ecu.predicted(1.2)
     assert before is not None
     assert after is not None
-    assert before.pose.x_m == pytest.approx(20 * ours.tick_m, rel=1e-3)
-    assert after.pose.x_m == pytest.approx(40 * ours.tick_m, rel=1e-3)
+    assert before.pose.x_m == pytest.approx(20 * ours.tick_m, abs=2 * ours.tick_m)
+    way_m = after.pose.x_m - before.pose.x_m
+    assert way_m == pytest.approx(20 * ours.tick_m, abs=4 * ours.tick_m)
 
 
 def test_a_velocity_that_is_no_number_is_no_speed() -> None:
@@ -234,10 +244,10 @@ def test_a_velocity_that_is_no_number_is_no_speed() -> None:
         now = 0.4 * step
         found += odometry.heard_ticks(Ticks(400 * step, 0, 0), now)
         group = BoardOdometry(0.0, 0.0, 0.0, math.nan, math.inf, math.nan, appended=True)
-        found += odometry.heard_odometry(group, now + 0.01)
+        odometry.heard_odometry(group, now + 0.01)
     last = found[-1]
     assert last.source == "commands and heading"
-    assert last.pose.x_m == pytest.approx(-0.2723 * 1.1 * 7.5, rel=0.1)
+    assert last.pose.x_m == pytest.approx(-0.2723 * 1.1 * 6.5, rel=0.15)
     assert math.isfinite(last.covariance.xx)
 
 
@@ -248,7 +258,6 @@ def test_duty_backward_is_known_by_commands_alone() -> None:
     found: list[FusedOdometry] = []
     for step in range(1, 21):
         found += odometry.heard_ticks(Ticks(400 * step, 0, 0), 0.4 * step)
-        found += odometry.rest(0.4 * step + 0.2)
     last = found[-1]
     assert last.source == "commands"
     assert last.pose.x_m < -1.5

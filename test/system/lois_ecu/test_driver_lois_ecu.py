@@ -117,7 +117,9 @@ def test_it_drives_and_odometry_tells_how_far(ecu: Ecu, probe: Probe) -> None:
     place = odometry[-1].pose.pose.position
     assert math.hypot(place.x - truth.x_m, place.y - truth.y_m) < 0.04
     assert joints[-1].name == ["left_wheel_joint", "right_wheel_joint"]
-    assert sum(joints[-1].position) / 2 * 0.13 == pytest.approx(truth.x_m, abs=0.3)
+    ticks = ecu.do(lambda board: [wheel.ticks for wheel in board.wheels])
+    rolled_m = [ticks_of_wheel * math.tau * 0.13 / 60 for ticks_of_wheel in ticks]
+    assert [angle * 0.13 for angle in joints[-1].position] == pytest.approx(rolled_m, abs=0.06)
     assert 0.0 < odometry[-1].pose.covariance[0] < 0.05
     stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in odometry]
     assert all(after > before for before, after in pairwise(stamps))

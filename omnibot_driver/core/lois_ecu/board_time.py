@@ -1,0 +1,88 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How much later than usual a group of ticks was read, by the board's own time in it.
+
+The public firmware's clock stands while it sends, so it falls behind by 4 to 36 %; what it sent
+since is known, and a line takes about 1.2 ms. The manual's clock goes on. Both are tried, and the
+one that fits the arrivals better is taken: a straight line under the last of them, as a read may be
+late but never early. Knows clock counts, lines and arrival times.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from operator import itemgetter
+from statistics import median
+from typing import Final
+
+from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
+
+LINE_S: Final = 14 * 10 / 115200
+GROUPS_KEPT: Final = 25
+"""Five seconds: a crystal that is off by 100 ppm is off by half a millisecond then."""
+FEWEST: Final = 8
+LATEST_S: Final = 0.25
+"""Later than this is a board that began anew, or a clock that is not understood."""
+UNKNOWN_S: Final = 0.012
+"""Standard deviation of an arrival as long as the clock is not known."""
+LEAST_S: Final = 0.001
+Point = tuple[float, float]
+"""An arrival, and how far the board's time is behind it."""
+UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
+
+
+class BoardTime:
+    """``stddev_s``: of what ``late_s`` says."""
+
+    def __init__(self) -> None:
+        self.stddev_s = UNKNOWN_S
+        self.begin()
+
+    def begin(self) -> None:
+        """The line, or the board, is new."""
+        self._before: tuple[int, float] | None = None
+        self._behind_s = [0.0, 0.0]
+        """Arrivals less board time since the beginning: as it is, and with the lines' time."""
+        self._kept: tuple[deque[Point], deque[Point]] = (
+            deque(maxlen=GROUPS_KEPT),
+            deque(maxlen=GROUPS_KEPT),
+        )
+        self._lines = 0
+        self.stddev_s = UNKNOWN_S
+
+    def sent(self, lines: int) -> None:
+        """So many lines came from the board."""
+        self._lines += lines
+
+    def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
+        """For ticks with this time that came now: at least zero."""
+        if unit is None:
+            return 0.0
+        lines, self._lines = self._lines, 0
+        before, self._before = self._before, (counts, now)
+        if before is None:
+            return 0.0
+        arrived_s = now - before[1]
+        passed_s = wrapped(counts - before[0]) * UNIT_S[unit]
+        if abs(arrived_s - passed_s) > LATEST_S + 0.5 * arrived_s:
+            self.begin()
+            return 0.0
+        for index, sending_s in enumerate((0.0, lines * LINE_S)):
+            self._behind_s[index] += arrived_s - passed_s - sending_s
+            self._kept[index].append((now, self._behind_s[index]))
+        if len(self._kept[0]) < FEWEST:
+            return 0.0
+        late = min(map(_above_line, self._kept), key=max)
+        self.stddev_s = max(median(late), LEAST_S)
+        return late[-1] if late[-1] < LATEST_S else 0.0
+
+
+def _above_line(kept: Sequence[Point]) -> list[float]:
+    """How far each is above a line under them: through the lowest of either half."""
+    half = len(kept) // 2
+    points = list(kept)
+    first_s, first = min(points[:half], key=itemgetter(1))
+    second_s, second = min(points[half:], key=itemgetter(1))
+    slope = (second - first) / (second_s - first_s)
+    heights = [behind_s - slope * at_s for at_s, behind_s in points]
+    least = min(heights)
+    return [height - least for height in heights]

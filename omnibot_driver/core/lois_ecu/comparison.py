@@ -1,0 +1,215 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a LOIS ECU tells against what the motion filter expects: each report corrects the filter.
+
+Ticks are facts where they count. Of 0x20 the heading is compared wherever ticks are missing; the
+way only where both speeds differ, as the public firmware's stands at equal ones; the speeds if the
+wheel has ticked since, as one that stands keeps its speed. Knows counts and what 0x20 tells; not
+where the robot is.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.lois_ecu.board_odometry import Told
+from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
+from omnibot_driver.core.lois_ecu.wheel_motion import (
+    ALONG,
+    BIAS,
+    COUNT,
+    HELD,
+    PER_WHEEL,
+    PUSH,
+    SPEED,
+    TURN,
+    WINDUP_M,
+)
+
+TICKS_AGE_S: Final = 0.005
+ODOMETRY_AGE_S: Final = 0.0135
+"""Lines of 14 characters take 1.2 ms each; the content is that of the first one's beginning."""
+TICK_VARIANCE: Final = 1 / 8
+TURN_VARIANCE: Final = 0.3
+ALONG_VARIANCE: Final = 0.15
+"""In squared ticks: what a count, a heading and a way of 0x20 hide."""
+COUNT_READ_S: Final = 0.003
+SAME_TICKS: Final = 0.6
+"""The same count again tells nothing new of a wheel within this of it."""
+DOUBT: Final = 3.0
+"""Standard deviations: what is further off is not noise, but the filter's belief is wrong."""
+LEAP: Final = 5.0
+LEAP_M: Final = 0.12
+"""A heading that is further off has counted a held speed for the time of a rest."""
+DIFFERING_RPM: Final = 2.5
+CREEPING_RPM: Final = 5.0
+FASTER_RPM: Final = 2.5
+"""A slower speed may be that of a tick that took a rest."""
+LONGEST_PAUSE_S: Final = 0.5
+LONGEST_LAG_S: Final = 0.3
+SPEED_PART: Final = 0.04
+UNSEEN_PART: Final = 0.6
+"""A wheel of which no tick was seen has wound up by this part at the most."""
+
+
+class Comparison:
+    """Corrects ``motion``."""
+
+    def __init__(self, motion: MotionFilter) -> None:
+        self._motion = motion
+        self._counted_m = [0.0, 0.0]
+        self._turned_m = 0.0
+        self._told = [0.0, 0.0]
+        self._repeats = [0, 0]
+
+    # Ticks
+
+    def begin_counts(self) -> None:
+        """The next counts are compared with these."""
+        self._counted_m = [0.0, 0.0]
+        variance = TICK_VARIANCE * self._motion.tick_m**2
+        for wheel in self._motion.wheels:
+            self._motion.filter.forget(wheel.base + COUNT, 0.0, variance)
+
+    def count(self, index: int, ticks: int, late_s: float) -> None:
+        """So many more ticks of this wheel, which came ``late_s`` later than usual."""
+        motion, estimate = self._motion, self._motion.filter
+        wheel, tick_m = motion.wheels[index], motion.tick_m
+        self._counted_m[index] += ticks * tick_m
+        speed = motion.speed_mps(index)
+        counts = wheel.counts(speed, signed=motion.signed)
+        if not counts and wheel.blind:
+            if ticks:  # counted before the target changed, or somebody pushes
+                self._counted_m[index] = estimate.mean[wheel.base + COUNT]
+            return
+        residual = self._counted_m[index] - estimate.mean[wheel.base + COUNT]
+        residual += (TICKS_AGE_S + late_s) * speed * counts
+        if not ticks and abs(residual) < SAME_TICKS * tick_m:
+            return
+        terms = [(wheel.base + COUNT, 1.0)]
+        variance = TICK_VARIANCE * tick_m**2 + (COUNT_READ_S * speed) ** 2
+        if residual**2 > DOUBT**2 * (estimate.variance_of(terms) + variance):
+            motion.doubt(index, abs(residual))
+        estimate.measure(terms, residual, variance)
+
+    # 0x20
+
+    def begin_odometry(self) -> None:
+        """Later headings and ways are compared with those of now."""
+        self._turned_m = 0.0
+        tick2 = self._motion.tick_m**2
+        self._motion.filter.forget(TURN, 0.0, TURN_VARIANCE * tick2)
+        self._begin_way(ALONG_VARIANCE * tick2)
+
+    def _begin_way(self, variance: float) -> None:
+        self._motion.filter.forget(ALONG, 0.0, variance)
+        self._motion.differing_mps = math.inf
+
+    def odometry(self, told: Told, duration_s: float, late_s: float) -> None:
+        """Since the group before, ``duration_s`` ago."""
+        motion = self._motion
+        shown = motion.shown_mps(0), motion.shown_mps(1)
+        if told.still and told.same_velocity:
+            moved = any(told.speeds_mps or ())
+            if moved or max(map(abs, shown)) < CREEPING_RPM * motion.rpm_mps:
+                self._no_tick(duration_s, 1.0 if moved else 2.0)
+                return
+        rolling = abs(motion.speed_mps(0)) + abs(motion.speed_mps(1))
+        pause_s = min(motion.tick_m / max(rolling, 0.01), LONGEST_PAUSE_S)
+        self._turned_m += told.turned_m
+        self._turn(told, shown[1] - shown[0], pause_s, duration_s, late_s)
+        self._along(told, sum(shown) / 2, pause_s)
+        if told.speeds_mps is None:
+            return
+        left, right = (wheel.course.measured_sign for wheel in motion.wheels)
+        differ = abs(shown[1] - shown[0]) > DIFFERING_RPM * motion.rpm_mps
+        if any(told.speeds_mps) or left * right <= 0 or differ:  # else any two equal speeds
+            for index, speed in enumerate(told.speeds_mps):
+                self._speed(index, speed, duration_s)
+
+    def _no_tick(self, duration_s: float, ticks: float) -> None:
+        """Neither wheel has rolled further than this."""
+        motion = self._motion
+        self.begin_odometry()
+        variance = (ticks * motion.tick_m / max(duration_s, 0.01)) ** 2
+        for index, wheel in enumerate(motion.wheels):
+            motion.filter.measure([(wheel.base + SPEED, 1.0)], -motion.speed_mps(index), variance)
+
+    def _turn(
+        self, told: Told, rate_mps: float, pause_s: float, duration_s: float, late_s: float
+    ) -> None:
+        motion, estimate = self._motion, self._motion.filter
+        since_s = ODOMETRY_AGE_S + late_s + pause_s / 2
+        residual = self._turned_m - (estimate.mean[TURN] - rate_mps * since_s)
+        variance = TURN_VARIANCE * motion.tick_m**2 + (rate_mps * pause_s) ** 2 / 6
+        for wheel, speed in zip(motion.wheels, told.speeds_mps or (), strict=False):
+            if wheel.rolls_on and speed:
+                other_mps = abs(speed) - estimate.mean[wheel.base + HELD]
+                variance += (other_mps * min(duration_s, LONGEST_LAG_S)) ** 2
+        unsure = estimate.variance_of([(TURN, 1.0)]) + variance
+        doubtful = [
+            index for index, wheel in enumerate(motion.wheels) if wheel.blind and not wheel.locked
+        ]
+        leaps = residual * residual > LEAP**2 * unsure and abs(residual) > LEAP_M
+        if leaps or not doubtful:
+            self.begin_odometry()
+            return
+        if residual * residual > DOUBT**2 * unsure:
+            for index in doubtful:
+                motion.doubt(index, abs(residual))
+        estimate.measure([(TURN, 1.0)], residual, variance)
+
+    def _along(self, told: Told, rate_mps: float, pause_s: float) -> None:
+        motion, estimate = self._motion, self._motion.filter
+        residual = told.along_m - estimate.mean[ALONG]
+        variance = ALONG_VARIANCE * motion.tick_m**2 + (rate_mps * pause_s) ** 2 / 12
+        whole = motion.differing_mps > DIFFERING_RPM * motion.rpm_mps
+        beyond = residual * estimate.mean[ALONG] > 0
+        unsure = estimate.variance_of([(ALONG, 1.0)]) + variance
+        if (whole or beyond) and residual * residual < LEAP**2 * unsure:
+            estimate.measure([(ALONG, 1.0)], residual, variance)
+        self._begin_way(variance)
+
+    def _speed(self, index: int, speed_mps: float, duration_s: float) -> None:
+        """A speed that was measured over the last tick, and is kept until the next one."""
+        motion, estimate = self._motion, self._motion.filter
+        wheel, base = motion.wheels[index], PER_WHEEL * index
+        rpm_mps, tick_m = motion.rpm_mps, motion.tick_m
+        sign = wheel.course.measured_sign
+        before, self._told[index] = self._told[index], speed_mps
+        if not sign or speed_mps * sign < 0:
+            return
+        repeated = abs(speed_mps - before) < 0.1 * rpm_mps
+        self._repeats[index] = self._repeats[index] + 1 if repeated else 0
+        expected = motion.speed_mps(index)
+        ticked = not repeated or abs(expected) * duration_s > 3.0 * tick_m
+        if not expected and motion.holds:
+            if repeated:
+                wheel.wound_m = min(wheel.wound_m, UNSEEN_PART * WINDUP_M)
+                variance = (tick_m / max(duration_s, 0.01)) ** 2
+                estimate.measure([(base + SPEED, 1.0)], 0.0, variance)
+            elif not wheel.rolls_on:
+                wheel.wound_m = WINDUP_M
+        if wheel.rolls_on and not repeated and not wheel.rolls_on_s:
+            wheel.rolls_on = ticked = False
+        shown = abs(speed_mps) + (motion.rounded_mps(index) if speed_mps else 0.5 * rpm_mps)
+        fast = shown > FASTER_RPM * rpm_mps and wheel.course.kind == "rpm"
+        if ticked and fast and not wheel.rolls_on:
+            self._rolls_at(index, math.copysign(shown, expected or float(sign)))
+        estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
+
+    def _rolls_at(self, index: int, speed_mps: float) -> None:
+        """On average over the last tick."""
+        motion, estimate, base = self._motion, self._motion.filter, PER_WHEEL * index
+        push = estimate.mean[base + PUSH]
+        lag_s = min(motion.tick_m / (2 * abs(speed_mps)) + ODOMETRY_AGE_S, LONGEST_LAG_S)
+        terms = [
+            (base + SPEED, 1.0),
+            (base + PUSH, -lag_s),
+            (BIAS + index, -math.copysign(1.0, speed_mps)),
+        ]
+        residual = speed_mps - (motion.speed_mps(index) - push * lag_s)
+        variance = motion.rpm_mps**2 / 8 + (SPEED_PART * speed_mps) ** 2 + (push * lag_s) ** 2 / 4
+        variance *= 1 + self._repeats[index] ** 2
+        if residual**2 > DOUBT**2 * (estimate.variance_of(terms) + variance):
+            estimate.disturb([(base + SPEED, 1.0)], (residual / 2) ** 2)
+        estimate.measure(terms, residual, variance)

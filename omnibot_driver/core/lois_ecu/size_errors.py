@@ -1,0 +1,62 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How far a pose is off if the wheels are larger or smaller than believed, or slip alike.
+
+Such an error is the same all along a drive, so it turns the robot further and further, and soon no
+longer acts in proportion. So the drive is followed with each error in either direction: the spread
+of where these robots end is the covariance. Knows ways of wheels; no board and no time.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.odometry.covariance import Covariance
+
+KINDS: Final = 3
+"""Left wheel, right wheel, both alike."""
+
+
+class SizeErrors:
+    """``scale``, ``slip``: standard deviations of a wheel's relative size, and of what slip takes
+    from both."""
+
+    def __init__(self, scale: float, slip: float) -> None:
+        spread = math.sqrt(KINDS)
+        self._factors = [
+            (1 + sign * spread * left, 1 + sign * spread * right)
+            for left, right in ((scale, 0.0), (0.0, scale), (slip, slip))
+            for sign in (-1.0, 1.0)
+        ]
+        self._places = [(0.0, 0.0, 0.0)] * len(self._factors)
+        self._believed = 0.0, 0.0, 0.0
+
+    def move(self, left_m: float, right_m: float, track_m: float) -> None:
+        """By these ways; a ``track_m`` below zero turns the other way."""
+        self._believed = _moved(self._believed, left_m, right_m, track_m)
+        self._places = [
+            _moved(place, left * left_m, right * right_m, track_m)
+            for place, (left, right) in zip(self._places, self._factors, strict=True)
+        ]
+
+    def covariance(self, yaw_rad: float) -> Covariance:
+        """For a pose of this heading. The frames of both poses may be turned to each other."""
+        x_m, y_m, yaw = self._believed
+        turn = yaw_rad - yaw
+        cos, sin = math.cos(turn), math.sin(turn)
+        weight = 1 / len(self._places)
+        errors = []
+        for place_x_m, place_y_m, place_yaw in self._places:
+            dx_m, dy_m = place_x_m - x_m, place_y_m - y_m
+            error = Pose(cos * dx_m - sin * dy_m, sin * dx_m + cos * dy_m, place_yaw - yaw)
+            errors.append((weight, error.x_m, error.y_m, error.yaw_rad))
+        return Covariance.diagonal(0.0, 0.0).with_errors(errors)
+
+
+def _moved(
+    place: tuple[float, float, float], left_m: float, right_m: float, track_m: float
+) -> tuple[float, float, float]:
+    x_m, y_m, yaw = place
+    turn, way = (right_m - left_m) / track_m, (left_m + right_m) / 2
+    middle = yaw + turn / 2
+    return x_m + way * math.cos(middle), y_m + way * math.sin(middle), yaw + turn

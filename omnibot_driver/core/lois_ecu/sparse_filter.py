@@ -1,0 +1,79 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A Kalman filter of a few states, in plain numbers. Knows no board, no wheels and no time.
+
+Most of the transition is the identity, and a measurement is of one to three states. Both are given
+as their non-zero terms, so that a step costs little without a matrix library.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+Terms = Sequence[tuple[int, float]]
+"""Pairs of a state and its factor."""
+
+LEAST_VARIANCE: Final = 1e-12
+
+
+class SparseFilter:
+    """``mean`` and the symmetric ``covariance`` of all states; they begin at zero."""
+
+    def __init__(self, states: int) -> None:
+        self.mean = [0.0] * states
+        self.covariance = [[0.0] * states for _ in range(states)]
+
+    def propagate(self, rows: Mapping[int, Terms]) -> None:
+        """The covariance by a transition: ``rows`` are those that differ from the identity.
+
+        The mean is not changed, as its transition need not be linear.
+        """
+        half = _applied(rows, self.covariance)
+        whole = _applied(rows, [list(column) for column in zip(*half, strict=True)])
+        self.covariance = whole
+
+    def disturb(self, terms: Terms, variance: float) -> None:
+        """An error of this variance along ``terms``."""
+        covariance = self.covariance
+        for i, a in terms:
+            row = covariance[i]
+            for j, b in terms:
+                row[j] += variance * a * b
+
+    def forget(self, state: int, mean: float, variance: float) -> None:
+        """The state has this value, independent of all others."""
+        covariance = self.covariance
+        for row in covariance:
+            row[state] = 0.0
+        covariance[state] = [0.0] * len(covariance)
+        covariance[state][state] = variance
+        self.mean[state] = mean
+
+    def variance_of(self, terms: Terms) -> float:
+        """Of this combination of states."""
+        covariance = self.covariance
+        return max(sum(a * b * covariance[i][j] for i, a in terms for j, b in terms), 0.0)
+
+    def measure(self, terms: Terms, residual: float, variance: float) -> None:
+        """``residual``: measured less expected, of this combination of states."""
+        covariance = self.covariance
+        along = [sum(factor * row[state] for state, factor in terms) for row in covariance]
+        total = sum(factor * along[state] for state, factor in terms) + variance
+        if total < LEAST_VARIANCE:
+            return
+        gain = [number / total for number in along]
+        self.mean = [old + part * residual for old, part in zip(self.mean, gain, strict=True)]
+        self.covariance = [
+            [old - part * number for old, number in zip(row, along, strict=True)] if part else row
+            for row, part in zip(covariance, gain, strict=True)
+        ]
+
+
+def _applied(rows: Mapping[int, Terms], matrix: list[list[float]]) -> list[list[float]]:
+    result = list(matrix)
+    for state, terms in rows.items():
+        (first, factor), *rest = terms
+        new = [factor * number for number in matrix[first]]
+        for other, factor in rest:
+            new = [old + factor * number for old, number in zip(new, matrix[other], strict=True)]
+        result[state] = new
+    return result

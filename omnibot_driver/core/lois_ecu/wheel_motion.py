@@ -1,0 +1,169 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How a wheel moves by what it is commanded, as a step of the motion filter.
+
+Three ways: it coasts without power, it follows a duty, or the board's speed controller drives it.
+The controller sees the speed that was measured last. With the public firmware a wheel that stands
+keeps that speed: it may get little power, or none. Gains and motors are the user's, so much of
+this is noise. Knows commands and the states of one wheel; no measurement and no pose.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Final
+
+from omnibot_driver.core.lois_ecu.wheel_model import WheelModel
+
+WAY, SPEED, PUSH, COUNT, HELD = range(5)
+PER_WHEEL: Final = 5
+"""States of a wheel: m rolled, m/s, m/s², m of ticks, m/s that were measured last."""
+X, Y, TURN, ALONG, BIAS = 10, 11, 12, 13, 14
+"""Of the body: place, what 0x20 should show as turned and as rolled; then a bias of each wheel."""
+STATES: Final = 16
+
+CONTROL_RATE: Final = 2.0
+"""Per second: how fast the controller reaches its target, as a critically damped system."""
+PUSH_PER_SPEED: Final = 2.2
+"""Per second: standard deviation of the acceleration after a change of speed."""
+SETTLING_S: Final = 1.5
+ROUGH: Final = 7e-4
+"""In (m/s)² per second: what the ground does to a speed."""
+WINDUP_M: Final = 0.08
+"""A wheel that stands starts when it lacks about this way: the controller winds up by it."""
+DUTY_S: Final = 0.15
+DUTY_PART: Final = 0.3
+COASTING_S: Final = 0.15
+DRY_MPS2: Final = 0.7
+"""Without power: time constant and dry friction."""
+COAST_PART: Final = 0.35
+ROLLS_ON_S: Final = 0.35
+STANDS_MPS: Final = 0.01
+FADED_MPS: Final = 1e-4
+
+Terms = list[tuple[int, float]]
+
+
+@dataclass(slots=True)
+class Step:
+    """One step of the filter: ``new`` means, rows of the transition, and noises.
+
+    ``unsure_mps``: standard deviation of the speed that each wheel's controller sees.
+    """
+
+    dt: float
+    new: list[float]
+    unsure_mps: dict[int, float]
+    rows: dict[int, Terms] = field(default_factory=dict)
+    noises: list[tuple[Terms, float]] = field(default_factory=list)
+
+
+class Wheel:
+    """What is known of one wheel besides the filter's states, which begin at ``base``.
+
+    blind: it moved, or should have, while no ticks counted, since this was last cleared.
+    """
+
+    def __init__(self, base: int) -> None:
+        self.base = base
+        self.course = WheelModel()
+        self.restless_mps = 0.0
+        """Size of the last changes of speed, fading."""
+        self.wound_m = 0.0
+        """What it lacked of its way since its controller began anew."""
+        self.cut = False
+        """Without power until the controller has wound up."""
+        self.rolls_on = False
+        """The speed that is told may be that from before the target changed its sign."""
+        self.rolls_on_s = 0.0
+        self.locked = False
+        """It stands, and the speed that it keeps is more than its target: it gets no power."""
+        self.blind = False
+
+    def begin_anew(self, speed_mps: float) -> None:
+        """The controller was set back while the wheel had this speed."""
+        self.cut, self.wound_m = True, 0.0
+        if abs(speed_mps) > STANDS_MPS:
+            self.rolls_on, self.rolls_on_s = True, ROLLS_ON_S
+
+    def counts(self, speed_mps: float, *, signed: bool) -> float:
+        """Change of the count, in m, for each m rolled forward."""
+        if signed:
+            return 1.0
+        if not self.course.counting:
+            return 0.0
+        return -1.0 if speed_mps < 0 else 1.0
+
+    def roll(self, step: Step, target_mps: float, *, holds: bool, signed: bool) -> None:
+        """One step. ``holds``: the measured speed is kept; ``signed``: ticks count both ways."""
+        base, dt, new = self.base, step.dt, step.new
+        speed = new[base + SPEED]
+        counts = self.counts(speed, signed=signed)
+        if not target_mps or target_mps * speed < 0 or (self.cut and speed):
+            self._coast(step, target_mps, holds=holds)
+        elif self.course.kind == "duty":
+            self._by_duty(step, target_mps)
+        else:
+            self._controlled(step, target_mps, holds=holds)
+        way = (speed + new[base + SPEED]) / 2 * dt
+        new[base + WAY] += way
+        step.rows[base + WAY] = [(base + WAY, 1.0), (base + SPEED, dt)]
+        if counts:
+            new[base + COUNT] += counts * way
+            step.rows[base + COUNT] = [(base + COUNT, 1.0), (base + SPEED, counts * dt)]
+        elif way or target_mps:
+            self.blind = True
+        self.rolls_on_s = max(self.rolls_on_s - dt, 0.0)
+        self.restless_mps *= math.exp(-dt / SETTLING_S)
+        if self.restless_mps < FADED_MPS:
+            self.restless_mps = 0.0
+
+    def _coast(self, step: Step, target_mps: float, *, holds: bool) -> None:
+        v, push, dt, new = self.base + SPEED, self.base + PUSH, step.dt, step.new
+        speed, kept = new[v], math.exp(-dt / COASTING_S)
+        slower = max(abs(speed) * kept - DRY_MPS2 * dt, 0.0)
+        step.rows[v], step.rows[push] = [(v, kept if slower else 0.0)], [(push, 0.0)]
+        step.noises.append(([(v, 1.0)], (COAST_PART * (abs(speed) - slower)) ** 2))
+        if self.cut and target_mps:
+            seen = new[self.base + HELD] if holds else math.copysign(speed, speed * target_mps)
+            self.wound_m += max(abs(target_mps) - seen, 0.0) * dt
+            self.cut = self.wound_m < WINDUP_M
+        new[v], new[push] = math.copysign(slower, speed), 0.0
+
+    def _by_duty(self, step: Step, target_mps: float) -> None:
+        v, push, new = self.base + SPEED, self.base + PUSH, step.new
+        bias = BIAS + self.base // PER_WHEEL
+        part = 1 - math.exp(-step.dt / DUTY_S)
+        change = part * (target_mps * (1 + new[bias]) - new[v])
+        step.rows[v], step.rows[push] = [(v, 1 - part), (bias, part * target_mps)], [(push, 0.0)]
+        step.noises.append(([(v, 1.0)], ROUGH * step.dt + (DUTY_PART * change) ** 2))
+        new[v], new[push] = new[v] + change, 0.0
+
+    def _controlled(self, step: Step, target_mps: float, *, holds: bool) -> None:
+        v, push, dt, new = self.base + SPEED, self.base + PUSH, step.dt, step.new
+        sign = math.copysign(1.0, target_mps)
+        seen, factor = (self.base + HELD, sign) if holds else (v, 1.0)
+        lacking = sign * target_mps - sign * factor * new[seen]
+        self.locked = holds and not new[v] and lacking + 2 * step.unsure_mps[self.base] <= 0.0
+        if self.locked:
+            new[push] = 0.0
+            step.rows[push], step.rows[v] = [(push, 0.0)], [(v, 0.0)]
+            return
+        if not new[v]:
+            lacking = max(lacking, 0.0)
+            self.wound_m += lacking * dt
+        wound = min(self.wound_m / WINDUP_M, 1.0)
+        if wound < 1.0:
+            lacking = 0.0
+        else:
+            self.cut = False
+        pull = CONTROL_RATE * CONTROL_RATE * dt
+        kept = 1 - 2 * CONTROL_RATE * dt
+        new[push] = kept * new[push] + sign * pull * lacking
+        new[v] += dt * new[push]
+        step.rows[push] = [(push, kept), (seen, -pull * factor)]
+        step.rows[v] = [(v, 1.0), (push, dt * kept), (seen, -dt * pull * factor)]
+        jerk = 4 * CONTROL_RATE * (PUSH_PER_SPEED * self.restless_mps * wound) ** 2
+        step.noises.append(([(push, 1.0), (v, dt)], jerk * dt))
+        step.noises.append(([(v, 1.0)], ROUGH * dt * wound))
+        if new[v] * sign < 0:
+            new[v] = new[push] = 0.0

@@ -1,0 +1,43 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How late ticks were read, by the time in them."""
+
+from random import Random
+
+import pytest
+
+from omnibot_driver.core.lois_ecu.board_time import BoardTime
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.067], ids=["goes on", "stands while it sends"])
+def test_a_read_that_is_late_is_told(lost: float) -> None:
+    """Whether the clock stands while eleven lines of 1.2 ms are sent in 0.2 s, or not."""
+    board = BoardTime()
+    found = []
+    for step in range(60):
+        late_s = 0.04 if step == 50 else 0.0
+        board.sent(11)
+        counts = round(200 * step * (1 - lost))
+        found.append(board.late_s(counts, "ms", 10.0 + 0.2 * step + late_s))
+    assert found[50] == pytest.approx(0.04, abs=0.003)
+    assert max(found[10:50]) < 0.003
+    assert board.stddev_s < 0.003
+
+
+def test_its_error_is_that_of_the_reads() -> None:
+    """Reads that are late by up to 30 ms leave an error of about half of it."""
+    board, random = BoardTime(), Random(1)
+    for step in range(100):
+        board.sent(4)
+        board.late_s(200_000_000 * step % 2**32, "ns", 0.2 * step + random.uniform(0.0, 0.03))
+    assert 0.005 < board.stddev_s < 0.025
+
+
+def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
+    """A clock that jumps back is a new one."""
+    board = BoardTime()
+    assert board.late_s(0, None, 0.0) == 0.0
+    for step in range(20):
+        board.late_s(200 * step, "ms", 0.2 * step)
+    assert board.late_s(0, "ms", 4.0) == 0.0
+    assert board.stddev_s == 0.012
