@@ -1,0 +1,51 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How honest the odometry of a LOIS ECU is: errors and NEES of many simulated drives.
+
+``python test/integrity/lois_odometry.py --drives 50 --seed 1000`` prints a table; ``--nominal``:
+with wheels of the right size. Seeds below 100 were used to choose constants: judge by others.
+"""
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from statistics import mean
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "core" / "lois_ecu"))
+
+from lois_drives import MOTIONS, motion, nominal, wrong
+
+from omnibot_driver.simulator.lois_ecu import QUIRKS
+
+
+def main() -> None:
+    """One row for each motion and firmware."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--drives", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1000)
+    parser.add_argument("--firmware", choices=tuple(QUIRKS), action="append")
+    parser.add_argument("--motion", choices=MOTIONS, action="append")
+    parser.add_argument("--nominal", action="store_true")
+    wanted = parser.parse_args()
+    robot = nominal if wanted.nominal else wrong
+    seeds = range(wanted.seed, wanted.seed + wanted.drives)
+    print("| Firmware | Motion | Way, turn | Off by, mean (greatest) | Heading off by | NEES |")
+    print("|---|---|---|---|---|---|")
+    for firmware in wanted.firmware or QUIRKS:
+        for name in wanted.motion or MOTIONS:
+            drives = [motion(robot(firmware, seed), name) for seed in seeds]
+            off = [math.hypot(one.error.x_m, one.error.y_m) for one in drives]
+            turned = [abs(math.degrees(one.error.yaw_rad)) for one in drives]
+            nees = [one.nees for one in drives]
+            print(
+                f"| {firmware} | {name} | {mean(one.way_m for one in drives):.1f} m,"
+                f" {math.degrees(mean(one.turned_rad for one in drives)):.0f}° |"
+                f" {mean(off):.3f} m ({max(off):.3f}) | {mean(turned):.1f}° ({max(turned):.1f}) |"
+                f" {mean(nees):.1f} (greatest {max(nees):.0f}) |",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
