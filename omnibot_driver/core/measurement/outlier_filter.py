@@ -132,7 +132,7 @@ class OutlierFilter:
         seconds = reading.duration_s or None  # two that arrive at once tell of no time
         if seconds is None:
             self._motion_leaps.forget()
-            seconds = None if before_s is None else stamp_s - before_s
+            seconds = None if before_s is None else (stamp_s - before_s) or None
         if seconds is not None and not self._possible(reading, seconds):
             self._refuse(reading)
             return []

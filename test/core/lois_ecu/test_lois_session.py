@@ -5,7 +5,7 @@
 from typing import Any
 
 import pytest
-from any_board import AnyBench, LoisRobot
+from any_board import TICK_S, AnyBench, LoisRobot
 
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
@@ -298,3 +298,21 @@ def test_every_setting_arrives_however_many_there_are(count: int) -> None:
     bench.run(3.5)
     arrived = {line.command for line in bench.board.commands if line.payload == 0x3F000000}
     assert arrived == {int(setting) for setting in names}
+
+
+@FIRMWARE
+def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> None:
+    """They have one arrival time; the robot is driven on, and odometry goes on."""
+    bench = Bench(firmware)
+    for _ in range(8):
+        late: list[bytes] = []
+        for step in range(60):
+            bench.now += TICK_S
+            late += [data for _, data in bench.robot.advance()]
+            if step % 10 == 0:
+                bench.drive(0.3)
+        bench.session.receive(b"".join(late), bench.now)
+        bench.session.tick(bench.now)
+        bench.settle()
+    bench.run(2.0)
+    assert bench.odometry[-1].pose.x_m == pytest.approx(bench.robot.way_m, abs=0.15)

@@ -249,3 +249,12 @@ def bare(reading: Reading) -> Reading:
     if isinstance(reading, DisplacementReading):
         return replace(reading, lost=0, restarted=False, duration_s=None)
     return replace(reading, lost=0) if isinstance(reading, PoseReading) else reading
+
+
+def test_two_displacements_that_came_with_one_read_are_believed() -> None:
+    """Between them no time has passed, as far as is known; that was a division by zero once."""
+    through = gate()
+    assert through.admit(ahead(), 1.0) == [(ahead(), 1.0)]
+    at_once = replace(ahead(), duration_s=0.0)
+    assert through.admit(at_once, 1.0) == [(at_once, 1.0)]
+    assert through.admit(ahead(), 1.04) == [(ahead(), 1.04)]
