@@ -17,12 +17,13 @@ from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.lois_ecu.board import TRAITS, LoisEcu
+from omnibot_driver.core.lois_ecu.board import LoisEcu
 from omnibot_driver.core.lois_ecu.messages import EStopButton, RecordKind, SetLed, Ticks
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import LoisReading, WheelReading
 from omnibot_driver.core.lois_ecu.reset_proof import ResetProof
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.traits import TRAITS
 from omnibot_driver.core.packets import NO_PACKETS, Packets, joined, packed
 from omnibot_driver.core.readings import (
     DisplacementReading,

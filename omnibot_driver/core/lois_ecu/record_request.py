@@ -1,26 +1,38 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A record that is asked for: said more than once, as lines are lost, until it begins to come.
+"""A record that is asked for: said more than once, as lines are lost, until it begins to come, and
+what becomes of it.
 
-Saying it again makes the board begin anew, so all is said within a short time. Knows times and
-counts, no lines.
+Saying it again makes the board begin anew, so all is said within a short time.
 """
 
 import math
+from collections.abc import Mapping
 from typing import Final
 
 from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.lois_ecu.decoder import LoisDecoder
 from omnibot_driver.core.lois_ecu.messages import (
     MOST_SAMPLES,
     Command,
+    Record,
     RecordHeading,
     RecordKind,
     RecordRpm,
     RecordTorque,
 )
+from omnibot_driver.core.lois_ecu.plausibility import ClockUnit
+from omnibot_driver.core.lois_ecu.readings import (
+    LoisReading,
+    RecordComes,
+    RecordFailed,
+    RecordReading,
+)
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
 """Apart by more than the board is deaf for, and by no multiple of its usual periods."""
+COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
+"""Of an RPM record, by the unit of 0x12's time: the public firmware departs in both."""
 
 
 def command_of(kind: RecordKind, samples: int) -> Command:
@@ -45,20 +57,46 @@ class RecordRequest:
         self.kind: RecordKind | None = None
         self._command: Command | None = None
         self._begun_s = math.inf
-        self._said = 0
+        self._said = self._damaged = 0
 
-    def begin(self, kind: RecordKind, samples: int) -> None:
+    def begin(self, kind: RecordKind, samples: int, decoder: LoisDecoder) -> None:
         """From the next ``due`` on; what was awaited before is not awaited any more."""
         self._command, self.kind = command_of(kind, samples), kind
         self._begun_s, self._said = math.inf, 0
+        decoder.expect_record(kind, samples, 0 if kind is RecordKind.HEADING else samples)
+        self._damaged = decoder.group_statistics.damaged_records
 
-    def end(self) -> None:
-        """It came, or failed."""
+    def look(
+        self,
+        found: list[LoisReading],
+        decoder: LoisDecoder,
+        prevented: str,
+        ticks_per_revolution: int,
+    ) -> list[LoisReading]:
+        """These readings with the record that is awaited, or with why it is not going to come.
+
+        ``prevented``: why the board will not send it, in a sentence.
+        """
+        if self.kind is None:
+            return found
+        if decoder.in_record:
+            self._command = None  # it is not to begin anew
+        for place, reading in enumerate(found):
+            if isinstance(reading, Record):
+                self._end()
+                unit = decoder.clock_unit
+                count_s = None if unit is None else COUNT_S[unit]
+                found[place] = RecordReading(reading, count_s, ticks_per_revolution)
+                return found
+        if not prevented and decoder.group_statistics.damaged_records != self._damaged:
+            prevented = "a line of it was lost on its way; call again"
+        if not prevented:
+            return found or ([RecordComes()] if decoder.in_record else [])
+        self._end()
+        return [*found, RecordFailed(prevented)]
+
+    def _end(self) -> None:
         self.kind = self._command = None
-
-    def arrives(self) -> None:
-        """Its first lines are here: it is not to begin anew."""
-        self._command = None
 
     @property
     def wake_at(self) -> float:

@@ -1,0 +1,142 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Set-points for a LOIS ECU: what a motion is in its words, and what was said last.
+
+Why they look as they do is in ``outbound``. Knows commands and times, and bytes that were written.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.differential import DifferentialKinematics
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.lois_ecu import outbound
+from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+CLEAR_AFTER_S: Final = 2.0
+"""After a Stop; then RPM 0/0 ends the counting."""
+CLEAR_AGAIN_S: Final = 0.15
+
+
+class SetPoints:
+    """``saturated``: motions that were too fast; ``stopped_at_s``: since when nothing but zeros was
+    said, infinite while the robot is driven; ``stood``: it was seen to stand since then.
+    """
+
+    def __init__(self, settings: LoisEcuSettings) -> None:
+        self.settings = settings
+        self.saturated = 0
+        self.connect()
+
+    def connect(self) -> None:
+        """The line is new."""
+        self._said: SetRpm | SetDuty | None = None
+        self.stopped_at_s = math.inf
+        self.stood = False
+        self._clears_left = outbound.CLEARED_TIMES
+
+    @property
+    def driving(self) -> bool:
+        """Whether the last set-point moves the robot."""
+        return self._said is not None and _moves(self._said)
+
+    def wrote(self, data: bytes, now: float) -> list[SetRpm | SetDuty]:
+        """These bytes went to the board; the set-points in them."""
+        said = outbound.set_points(data, with_sum=self.settings.with_sum)
+        for command in said:
+            if _moves(command):
+                self.stopped_at_s, self.stood = math.inf, False
+                if isinstance(command, SetDuty):
+                    self._clears_left = outbound.CLEARED_TIMES
+            else:
+                if self.stopped_at_s == math.inf:
+                    self.stopped_at_s = now
+                if isinstance(command, SetRpm):
+                    self._clears_left = max(self._clears_left - 1, 0)
+                elif self.driving:
+                    self._clears_left = outbound.CLEARED_TIMES
+            self._said = command
+        return said
+
+    # RPM 0/0, which makes the firmware forget the speed of a wheel that stands
+
+    def clear_again(self) -> None:
+        """It is to be said before the next set-points."""
+        self._clears_left = outbound.CLEARED_TIMES
+
+    @property
+    def clears_at(self) -> float:
+        """When it is to be said some time after a Stop."""
+        return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
+
+    def clears(self, now: float) -> bool:
+        """Whether it is to be said now; it counts as said."""
+        if now < self.clears_at:
+            return False
+        self.stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S
+        return True
+
+    # Motions
+
+    def wheels(self, rates_radps: Sequence[float]) -> list[SetRpm | SetDuty]:
+        """Left and right in rad/s; Stop when both round to nothing."""
+        settings = self.settings
+        left, right = rates_radps
+        if settings.drive_mode == "duty":
+            percent = settings.wheel_radius_m * settings.duty_scale
+            return [self.duty((left * percent, right * percent))]
+        rpm = 60 / math.tau
+        pair, was_saturated = outbound.saturated((left * rpm, right * rpm), outbound.MOST_RPM)
+        self.saturated += was_saturated
+        if not any(pair):
+            return [outbound.STOP]
+        command = SetRpm(*self._board_order(pair))
+        return [outbound.EMERGENCY_STOP, command] if self._clears_left else [command]
+
+    def duty(self, percents: Sequence[float]) -> SetDuty:
+        """Left and right in percent, open loop. Raises CommandRefused in RPM mode."""
+        if self.settings.drive_mode != "duty":
+            raise CommandRefused(
+                "duty_cmd refused: drive_mode is rpm; set it to duty to drive without the"
+                " speed controller"
+            )
+        left, right = percents
+        most = min(self.settings.max_duty, outbound.MOST_PERCENT)
+        pair, was_saturated = outbound.saturated((left, right), most)
+        self.saturated += was_saturated
+        return SetDuty(*self._board_order(pair))
+
+    def meaning(self, data: bytes) -> BodyTwist:
+        """The body velocity that the last set-point in these bytes commands."""
+        settings = self.settings
+        found = outbound.set_points(data, with_sum=settings.with_sum)
+        if not found:
+            return BodyTwist(0.0, 0.0, 0.0)
+        match found[-1]:
+            case SetRpm(left, right):
+                unit = math.tau / 60
+            case SetDuty(left, right):
+                unit = 1 / (settings.duty_scale * settings.wheel_radius_m)
+        left, right = self._board_order((left, right))
+        return self.kinematics.body_twist((left * unit, right * unit))
+
+    @property
+    def kinematics(self) -> DifferentialKinematics:
+        """Of the robot's own left and right."""
+        settings = self.settings
+        return DifferentialKinematics(
+            wheel_radius_m=settings.wheel_radius_m, track_m=settings.track_m
+        )
+
+    def _board_order(self, pair: tuple[int, int]) -> tuple[int, int]:
+        """The board's left and right, or back."""
+        return (pair[1], pair[0]) if self.settings.inverted else pair
+
+
+def _moves(command: SetRpm | SetDuty) -> bool:
+    match command:
+        case SetRpm(left, right) | SetDuty(left, right):
+            return bool(left or right)

@@ -1,0 +1,47 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a LOIS ECU has and can do, and what to check when a robot with one does not obey."""
+
+from typing import Final
+
+from omnibot_driver.core.commands.set_points import Authority
+from omnibot_driver.core.motion_monitor.monitor import Fault
+from omnibot_driver.core.requests import Request
+from omnibot_driver.core.traits import Traits
+
+STANDS_AFTER_S: Final = 0.6
+"""Without a tick. The slowest wheel that turns, at 2 RPM, ticks each half second."""
+TRAITS: Final = Traits(
+    imu_period_s=None,
+    authorities=frozenset({Authority.BASE, Authority.WHEELS}),
+    requests=frozenset({Request.RESET}),
+    wheels=("left", "right"),
+    unheard_s=1.0,  # groups come each 0.2 s, and may be lost
+    silence_s=1.5,
+    own_odometry=True,
+    stands_after_s=STANDS_AFTER_S,
+    unproved_s=2.0,
+    slack_mps=0.15,  # a tick in 0.2 s is 0.07 m/s
+    slack_radps=1.2,  # with its gains the wheels do not speed up alike
+    advice={
+        Fault.WRONG_WAY: "check `inverted`, and the wiring of motors and encoders",
+        Fault.WRONG_TURN: "check `inverted`, and the wiring of motors and encoders",
+        Fault.TOO_FAST: (
+            "check `wheel_radius` and `ticks_per_revolution`; in duty mode, `duty_scale`"
+        ),
+        Fault.TURNS_TOO_FAST: (
+            "check `track`, `wheel_radius` and `ticks_per_revolution`; in duty mode, `duty_scale`"
+        ),
+        Fault.BEYOND_LIMITS: (
+            "check `wheel_radius`, `track` and `ticks_per_revolution`; in duty mode, `duty_scale`"
+        ),
+        Fault.BLOCKED: (
+            "check motor power, whether the wheels are blocked, the gains that were set, and"
+            " `low_pass`; in duty mode, `duty_scale`"
+        ),
+        Fault.HELD_BY_ESTOP: (
+            "check whether the e-stop button is held, and motor power; the board tells a press"
+            " and a release once"
+        ),
+    },
+)
