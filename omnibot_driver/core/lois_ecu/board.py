@@ -7,7 +7,6 @@ little of where its wheels turn. What the board says is told in ``translation``,
 it in ``opening``, why set-points look as they do in ``outbound``.
 """
 
-import math
 from collections.abc import Sequence
 
 from omnibot_driver.core.board import BoardFigures, Mode
@@ -24,26 +23,22 @@ from omnibot_driver.core.lois_ecu.messages import (
     RecordKind,
     Report,
     Reset,
-    SetTerminalMode,
     Stream,
     TerminalLine,
-    TerminalMode,
     Ticks,
 )
 from omnibot_driver.core.lois_ecu.misconfiguration import Suspicion
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
-from omnibot_driver.core.lois_ecu.opening import RECOVER_AFTER_S, SettingsWriter
 from omnibot_driver.core.lois_ecu.readings import (
     LoisReading,
     TerminalLeft,
 )
-from omnibot_driver.core.lois_ecu.record_request import RecordRequest
 from omnibot_driver.core.lois_ecu.set_points import SetPoints
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.stall import StallWatch
-from omnibot_driver.core.lois_ecu.terminal import ModeChange
 from omnibot_driver.core.lois_ecu.traits import STANDS_AFTER_S, TRAITS
 from omnibot_driver.core.lois_ecu.translation import Translation
+from omnibot_driver.core.lois_ecu.upkeep import Upkeep
 
 
 class LoisEcu:
@@ -54,24 +49,18 @@ class LoisEcu:
     def __init__(self, settings: LoisEcuSettings) -> None:
         self._settings = settings
         self._translation = Translation(settings)
-        self._writer = SettingsWriter(settings)
         self._suspicion = Suspicion()
         self._statistics = DecoderStatistics()
         self._points = SetPoints(settings)
-        self._opened = False
-        self._change = ModeChange()
-        self._change.want(settings.terminal_mode)
+        self._upkeep = Upkeep(settings, self._points)
         self.mode = Mode.UNKNOWN
         self._forget_line()
 
     def _forget_line(self) -> None:
         self._decoder = LoisDecoder(sum_required=self._settings.with_sum)
         self._decoder.statistics = self._statistics
-        self._heard_at_s = -math.inf
-        self._recovered_at_s = -math.inf
         self._points.connect()
         self._stall = StallWatch(self._settings.track_m)
-        self._request = RecordRequest()
 
     @property
     def settings(self) -> LoisEcuSettings:
@@ -80,34 +69,16 @@ class LoisEcu:
 
     @settings.setter
     def settings(self, settings: LoisEcuSettings) -> None:
-        changed = (
-            settings.low_pass,
-            settings.written,
-            settings.periods_ms,
-            settings.with_sum,
-        ) != (
-            self._settings.low_pass,
-            self._settings.written,
-            self._settings.periods_ms,
-            self._settings.with_sum,
-        )
-        if settings.drive_mode != self._settings.drive_mode:
-            self._change.stop_first(f"drive_mode becomes {settings.drive_mode}")
-        if settings.terminal_mode is not self._settings.terminal_mode:
-            self._change.want(settings.terminal_mode)
-        self._settings = self._translation.settings = self._writer.settings = settings
-        self._points.settings = settings
+        self._settings = self._translation.settings = self._points.settings = settings
+        self._upkeep.configure(settings)
         self._decoder.sum_required = settings.with_sum
-        if changed:
-            self._opened = False
 
     # Inbound
 
     def connect(self) -> None:
         """The line is new; the settings are written again."""
         self.mode = Mode.UNKNOWN
-        self._opened = False
-        self._change.connect()
+        self._upkeep.connect()
         self._forget_line()
         self._translation.connect()
 
@@ -124,39 +95,39 @@ class LoisEcu:
         restarts = self._translation.restarts
         if reports:
             own = not all(isinstance(report, TerminalLine) for report in reports)
-            if own and self.mode is Mode.UNKNOWN and self._opened:
-                self._writer.begin(now)  # it may have booted, and forgotten what it was told
+            if own and self.mode is Mode.UNKNOWN and self._upkeep.opened:
+                self._upkeep.writer.begin(now)  # it may have booted, and forgotten what it was told
             self.mode = Mode.NOMINAL
-            self._heard_at_s = now
+            self._upkeep.heard_at_s = now
             self._suspicion.understood()
             if own:
-                self._change.protocol_heard(now)
-                self._decoder.terminal = self._change.terminal
+                self._upkeep.change.protocol_heard(now)
+                self._decoder.terminal = self._upkeep.change.terminal
         times = self._decoder.times
         for at, report in zip(times, reports, strict=True):
             if isinstance(report, Ticks):
-                self._writer.ticks_came(at)
+                self._upkeep.writer.ticks_came(at)
             elif isinstance(report, GpsDate):
-                self._writer.date_came()
+                self._upkeep.writer.date_came()
             if isinstance(report, Ticks | BoardOdometry):
                 self._stall.heard(report, at)
         if self._translation.odometry.appends and self._stall.looks_stalled(now):
             self._points.clear_again()
         found = self._translation.readings(reports, times, self._decoder.clock_unit, now)
         if self._translation.restarts != restarts:
-            self._writer.begin(now)
-        if self._change.left:
-            self._change.left = False
-            self._writer.begin(now)
+            self._upkeep.writer.begin(now)
+        if self._upkeep.change.left:
+            self._upkeep.change.left = False
+            self._upkeep.writer.begin(now)
             found.append(TerminalLeft())
         if self._decoder.in_record:
-            self._heard_at_s = now
-        return self._request.look(
+            self._upkeep.heard_at_s = now
+        return self._upkeep.request.look(
             found,
             self._decoder,
             "the board has restarted; call again"
             if self._translation.restarts != restarts
-            else self._change.reason,
+            else self._upkeep.change.reason,
             self._settings.ticks_per_revolution,
         )
 
@@ -218,69 +189,25 @@ class LoisEcu:
     @property
     def configured(self) -> bool:
         """Whether the settings have gone out; by RPM the wheels do not turn before."""
-        return self._opened and self._writer.done
+        return self._upkeep.opened and self._upkeep.writer.done
 
     @property
     def confirmed(self) -> bool:
         """Whether the board has answered, and shown that it took the period of its ticks."""
-        return self._writer.confirmed
+        return self._upkeep.writer.confirmed
 
     # Outbound
 
     def due(self, now: float) -> bytes:
-        """Settings and what clears up after a Stop; call it at ``wake_at``."""
-        if not self._opened:
-            self._opened = True
-            self._writer.begin(now)
-            self._recovered_at_s = now
-        data = self._writer.due(now, driving=self.driving)
-        data += self._change_mode(now)
-        if (record := self._request.due(now)) is not None:
-            data += self._lines(record)
-        if self._points.clears(now):
-            data += self._lines(outbound.EMERGENCY_STOP)
-        if now >= self._recover_at:
-            self._recovered_at_s = now
-            data += self._writer.recovery()
-            self._writer.begin(now)
+        """Settings, modes, and what clears up after a Stop; call it at ``wake_at``."""
+        data = self._upkeep.due(now, stands=bool(self.stands(now)))
+        self._decoder.terminal = self._upkeep.change.terminal
         return data
-
-    def _change_mode(self, now: float) -> bytes:
-        """Stop, or the terminal mode, while either of them is to be said."""
-        change = self._change
-        if change.stops(now, stands=bool(self.stands(now))):
-            return self._lines(outbound.STOP)
-        mode = change.due(now, settled=self._writer.done)
-        self._decoder.terminal = change.terminal
-        if mode is None:
-            return b""
-        if mode is TerminalMode.HOST:
-            return self._writer.recovery()
-        self._writer.overwritten = True
-        return self._lines(outbound.STOP, *[SetTerminalMode(mode)] * 3)
 
     @property
     def wake_at(self) -> float:
         """When ``due`` has to be asked again."""
-        if not self._opened:
-            return -math.inf
-        return min(
-            self._writer.wake_at,
-            self._points.clears_at,
-            self._recover_at,
-            self._decoder.resolves_at,
-            self._change.wake_at,
-            self._request.wake_at,
-        )
-
-    @property
-    def _recover_at(self) -> float:
-        if self._change.sensor_wanted or self._change.terminal:
-            return math.inf
-        if self.driving:
-            return math.inf
-        silent_since_s = self._recovered_at_s if self._writer.ignored else self._heard_at_s
-        return max(silent_since_s, self._recovered_at_s) + RECOVER_AFTER_S
+        return min(self._upkeep.wake_at, self._decoder.resolves_at)
 
     @property
     def driving(self) -> bool:
@@ -309,8 +236,8 @@ class LoisEcu:
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
         """Left and right in rad/s; Stop when both round to nothing. Raises CommandRefused."""
-        if self._change.reason and any(rates_radps):
-            raise CommandRefused(f"motion command refused: {self._change.reason}")
+        if self._upkeep.change.reason and any(rates_radps):
+            raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")
         return self._lines(*self._points.wheels(rates_radps))
 
     def duty(self, percents: Sequence[float]) -> bytes:
@@ -331,11 +258,11 @@ class LoisEcu:
 
     def write_settings(self, now: float) -> None:
         """All of them again: by the manual a reset is one of controllers and interfaces too."""
-        self._writer.begin(now)
+        self._upkeep.writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:
         """Something that may be repeated, until it has surely arrived."""
-        self._writer.write(command, now)
+        self._upkeep.writer.write(command, now)
 
     def distribute_ball(self) -> bytes:
         """Once; do not repeat it."""
@@ -343,9 +270,9 @@ class LoisEcu:
 
     def record(self, kind: RecordKind, samples: int) -> None:
         """Begin to record. Raises RequestRefused where it could not complete."""
-        if self._change.reason:
-            raise RequestRefused(f"record refused: {self._change.reason}")
-        self._request.begin(kind, samples, self._decoder)
+        if self._upkeep.change.reason:
+            raise RequestRefused(f"record refused: {self._upkeep.change.reason}")
+        self._upkeep.request.begin(kind, samples, self._decoder)
 
     def _lines(self, *commands: Command) -> bytes:
         return outbound.lines(*commands, with_sum=self._settings.with_sum)

@@ -7,6 +7,8 @@ Knows wheels and their nominal geometry; must not know where the robot truly is.
 
 from math import cos, inf, nan, pi, sin
 
+from omnibot_driver.simulator.lois_ecu.settings import LoisSettings
+
 TIMER_COUNTS = 0x10000
 COUNT_S = 1e-4
 
@@ -76,6 +78,16 @@ class FirmwareOdometry(DocumentedOdometry):
             ]
             self.velocity = (rates[0], rates[1], rates[2])
         self.pose = new
+
+
+def odometry_of(settings: LoisSettings) -> DocumentedOdometry:
+    """What this board has."""
+    geometry = settings.steps, settings.wheel_radius_m, settings.track_m
+    quirks = settings.quirks
+    stands, divides = quirks.odometry_stands_at_equal_speeds, quirks.velocity_may_be_nan
+    if stands or divides or quirks.keeps_speed_of_stalled_wheel:
+        return FirmwareOdometry(*geometry, stands=stands, divides=divides)
+    return DocumentedOdometry(*geometry)
 
 
 def _quotient(way: float, time_s: float) -> float:

@@ -1,0 +1,101 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is written to a LOIS ECU besides motions and requests, and when: its settings, its mode, a
+record, RPM 0/0 after a Stop, and what fetches it back where it is silent or obeys nothing.
+
+Composes the parts that know each of these; must not know what is read.
+"""
+
+import math
+
+from omnibot_driver.core.lois_ecu import outbound
+from omnibot_driver.core.lois_ecu.messages import SetTerminalMode, TerminalMode
+from omnibot_driver.core.lois_ecu.opening import RECOVER_AFTER_S, SettingsWriter
+from omnibot_driver.core.lois_ecu.record_request import RecordRequest
+from omnibot_driver.core.lois_ecu.set_points import SetPoints
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.terminal import ModeChange
+
+
+class Upkeep:
+    """``due`` what to write now. ``heard_at_s``: when the board was understood last."""
+
+    def __init__(self, settings: LoisEcuSettings, points: SetPoints) -> None:
+        self._points = points
+        self.writer = SettingsWriter(settings)
+        self.change = ModeChange()
+        self.change.want(settings.terminal_mode)
+        self.connect()
+
+    def connect(self) -> None:
+        """The line is new; the settings are written again."""
+        self.opened = False
+        self.change.connect()
+        self.request = RecordRequest()
+        self.heard_at_s = self._recovered_at_s = -math.inf
+
+    def configure(self, settings: LoisEcuSettings) -> None:
+        """Other settings: what is new of them is written; another mode stops the robot first."""
+        before, self.writer.settings = self.writer.settings, settings
+        if settings.drive_mode != before.drive_mode:
+            self.change.stop_first(f"drive_mode becomes {settings.drive_mode}")
+        if settings.terminal_mode is not before.terminal_mode:
+            self.change.want(settings.terminal_mode)
+        if _written(settings) != _written(before):
+            self.opened = False
+
+    def due(self, now: float, *, stands: bool) -> bytes:
+        """Call it at ``wake_at``. ``stands``: the robot is seen to stand."""
+        if not self.opened:
+            self.opened = True
+            self.writer.begin(now)
+            self._recovered_at_s = now
+        with_sum = self.writer.settings.with_sum
+        data = self.writer.due(now, driving=self._points.driving)
+        data += self._change_mode(now, stands=stands)
+        if (record := self.request.due(now)) is not None:
+            data += outbound.lines(record, with_sum=with_sum)
+        if self._points.clears(now):
+            data += outbound.lines(outbound.EMERGENCY_STOP, with_sum=with_sum)
+        if now >= self._recover_at:
+            self._recovered_at_s = now
+            data += self.writer.recovery()
+            self.writer.begin(now)
+        return data
+
+    @property
+    def wake_at(self) -> float:
+        """When ``due`` has to be asked again."""
+        if not self.opened:
+            return -math.inf
+        return min(
+            self.writer.wake_at,
+            self._points.clears_at,
+            self._recover_at,
+            self.change.wake_at,
+            self.request.wake_at,
+        )
+
+    def _change_mode(self, now: float, *, stands: bool) -> bytes:
+        """Stop, or the terminal mode, while either of them is to be said."""
+        change, with_sum = self.change, self.writer.settings.with_sum
+        if change.stops(now, stands=stands):
+            return outbound.lines(outbound.STOP, with_sum=with_sum)
+        mode = change.due(now, settled=self.writer.done)
+        if mode is None:
+            return b""
+        if mode is TerminalMode.HOST:
+            return self.writer.recovery()
+        self.writer.overwritten = True
+        return outbound.lines(outbound.STOP, *[SetTerminalMode(mode)] * 3, with_sum=with_sum)
+
+    @property
+    def _recover_at(self) -> float:
+        if self.change.sensor_wanted or self.change.terminal or self._points.driving:
+            return math.inf
+        silent_since_s = self._recovered_at_s if self.writer.ignored else self.heard_at_s
+        return max(silent_since_s, self._recovered_at_s) + RECOVER_AFTER_S
+
+
+def _written(settings: LoisEcuSettings) -> tuple[object, ...]:
+    return settings.low_pass, settings.written, settings.periods_ms, settings.with_sum

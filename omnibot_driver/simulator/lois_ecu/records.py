@@ -1,0 +1,68 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Records of tick times, torque and headings: taken, and written as lines when they are complete.
+
+Knows wheels as the board sees them; must not know when it sends.
+"""
+
+from omnibot_driver.simulator.lois_ecu import wire
+from omnibot_driver.simulator.lois_ecu.channel import RECORD_DEPTH, WheelChannel
+from omnibot_driver.simulator.lois_ecu.settings import Quirks
+
+RPM, TORQUE, HEADINGS = 0x04, 0x17, 0x0C
+PADDING, HEADING_PADDING = 10, 0x016A
+
+
+class Recorder:
+    """``number``: of the record that is being taken, as it was asked for; None where none is."""
+
+    def __init__(self, quirks: Quirks, wheels: tuple[WheelChannel, ...]) -> None:
+        self._quirks, self._wheels = quirks, wheels
+        self.number: int | None = None
+        self._headings: list[int] = []
+        self._wanted = 0
+
+    def start(self, number: int, payload: int) -> None:
+        """As commanded; what was recorded is forgotten."""
+        self.number = number
+        if number == HEADINGS:
+            self._headings, self._wanted = [], payload
+            return
+        for channel, samples in zip(self._wheels, (payload >> 16, payload & 0xFFFF), strict=True):
+            channel.start_record(samples)
+
+    def control(self) -> None:
+        """A step of the controllers: a sample of torque."""
+        if self.number == TORQUE:
+            for channel in self._wheels:
+                channel.torque()
+
+    def heading(self, heading: int) -> bytes:
+        """A sample of the compass; the record, where it is complete."""
+        if self.number != HEADINGS or not self._wanted:
+            return b""
+        full = len(self._headings) >= min(self._wanted, 2 * RECORD_DEPTH)
+        if not full:
+            self._headings.append(heading)
+            full = len(self._headings) >= self._wanted
+            if self._quirks.record_waits_for_one_more:
+                return b""
+        if not full:
+            return b""
+        padded = self._headings + [HEADING_PADDING] * (len(self._headings) % 2)
+        lines = [wire.words(HEADINGS, a, b) for a, b in zip(padded[::2], padded[1::2], strict=True)]
+        self.number = None
+        return b"".join([*lines, wire.words(HEADINGS, HEADING_PADDING, HEADING_PADDING)])
+
+    def of_wheels(self) -> bytes:
+        """The record of both wheels, where it is complete."""
+        left, right = self._wheels
+        if self.number not in (RPM, TORQUE) or left.record_left or right.record_left:
+            return b""
+        code = RPM if self._quirks.torque_comes_as_rpm else self.number
+        pairs = max(len(left.record), len(right.record))
+        lefts = left.record + [PADDING] * (pairs - len(left.record))
+        rights = right.record + [PADDING] * (pairs - len(right.record))
+        lines = [wire.words(code, a, b) for a, b in zip(lefts, rights, strict=True)]
+        self.number = None
+        return b"".join([*lines, wire.line(code, 0)])

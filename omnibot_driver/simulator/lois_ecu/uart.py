@@ -1,0 +1,93 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The board's serial port: what it hears at 115200 baud, and what it sends with interrupts off.
+
+Knows characters and steps of a millisecond, no lines.
+"""
+
+from collections import deque
+
+BYTES_PER_STEP = 11.52
+INPUT_DEPTH = 600
+
+
+class Uart:
+    """``loses``: what comes while interrupts are off is lost, but for the first character.
+
+    received: all that reached the port; lost_bytes: of those, what was not heard; input: what was,
+    and was not read yet.
+    """
+
+    def __init__(self, *, loses: bool) -> None:
+        self._loses = loses
+        self.received = bytearray()
+        self.lost_bytes = 0
+        self._inbound: deque[int] = deque()
+        self._in_credit = 0.0
+        self.boot()
+
+    def boot(self) -> None:
+        """What was heard or was to be sent is forgotten; what is on the line still comes."""
+        self.input: deque[int] = deque()
+        self._sending: deque[tuple[bytearray, bool]] = deque()
+        self._out_credit = 0.0
+        self._kept: int | None = None
+
+    @property
+    def sending(self) -> bool:
+        """Whether something is still to be sent."""
+        return bool(self._sending)
+
+    @property
+    def deaf(self) -> bool:
+        """Whether it is sent with interrupts off."""
+        return bool(self._sending) and self._sending[0][1]
+
+    def receive(self, data: bytes) -> None:
+        """They arrive one after the other from now on."""
+        self.received += data
+        self._inbound.extend(data)
+
+    def say(self, data: bytes, *, deaf: bool) -> None:
+        """After what is to be sent already."""
+        self._sending.append((bytearray(data), deaf))
+
+    def listen(self) -> None:
+        """One step."""
+        self._in_credit = min(self._in_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
+        while self._inbound and self._in_credit >= 1.0:
+            self._in_credit -= 1.0
+            byte = self._inbound.popleft()
+            if not (self.deaf and self._loses):
+                self._hear(byte)
+            elif self._kept is None:
+                self._kept = byte
+            else:
+                self.lost_bytes += 1
+
+    def send(self, sent: bytearray) -> bool:
+        """One step; whether interrupts are on again, so that ``hear_kept`` is to follow."""
+        self._out_credit = min(self._out_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
+        while self._sending and self._out_credit >= 1.0:
+            burst, deaf = self._sending[0]
+            count = min(int(self._out_credit), len(burst))
+            sent += burst[:count]
+            del burst[:count]
+            self._out_credit -= count
+            if not burst:
+                self._sending.popleft()
+                if deaf:
+                    return True
+        return False
+
+    def hear_kept(self) -> None:
+        """The character that the hardware has kept."""
+        if self._kept is not None:
+            self._hear(self._kept)
+            self._kept = None
+
+    def _hear(self, byte: int) -> None:
+        if len(self.input) < INPUT_DEPTH:
+            self.input.append(byte)
+        else:
+            self.lost_bytes += 1
