@@ -120,8 +120,9 @@ class LoisEcu:
             self._upkeep.change.left = False
             self._upkeep.writer.begin(now)
             found.append(TerminalLeft())
-        if self._decoder.in_record:
+        if self._decoder.in_record:  # right lines, of which there is no report yet
             self._upkeep.heard_at_s = now
+            self._suspicion.understood()
         return self._upkeep.request.look(
             found,
             self._decoder,

@@ -267,6 +267,7 @@ def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
         assert bench.session.state == "nominal"
     (reading,) = told(bench, RecordReading)
     assert len(reading.record.left) == len(reading.record.right) == 1024
+    assert not [notice for notice in bench.notices if "checksums" in notice]
 
 
 def test_a_terminal_mode_ends_a_record() -> None:
