@@ -14,10 +14,11 @@ between calls, and looks at each byte a bounded number of times.
 from dataclasses import dataclass
 from typing import Final
 
-from omnibot_driver.core.lois_ecu.groups import Assembler, GroupStatistics, Timed
+from omnibot_driver.core.lois_ecu.groups import Assembler, Timed
 from omnibot_driver.core.lois_ecu.lines import BEGIN, END, LENGTH, line_of
 from omnibot_driver.core.lois_ecu.messages import RecordKind, Report, TerminalLine
 from omnibot_driver.core.lois_ecu.plausibility import ClockUnit
+from omnibot_driver.core.lois_ecu.record_lines import GroupStatistics
 
 LONGEST_LINE: Final = 256
 """Longer than any line of a serial sensor."""

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From lines to reports of several lines: groups behind a marker, and records up to their end.
+"""From lines to reports of several lines: groups behind a marker. Records are ``record_lines``'.
 
 A group comes out whole or not at all. A lost line makes it too short, one that stands twice or does
 not belong makes it too long or cuts it. So a group is known to be whole when something else follows
@@ -14,20 +14,15 @@ Knows lines and arrival times, no characters.
 """
 
 import math
-from dataclasses import dataclass
 from operator import eq
 from typing import Final
 
 from omnibot_driver.core.lois_ecu.codec import single_report
-from omnibot_driver.core.lois_ecu.lines import MARKER, Line, signed, to_float, unsigned_pair
+from omnibot_driver.core.lois_ecu.lines import MARKER, Line, to_float
 from omnibot_driver.core.lois_ecu.messages import (
-    HEADING_END,
-    HEADING_PADDING,
-    RECORD_END,
     BoardOdometry,
     Code,
     GpsPosition,
-    Record,
     RecordKind,
     Report,
     Ticks,
@@ -40,6 +35,11 @@ from omnibot_driver.core.lois_ecu.plausibility import (
     odometry_gate,
     wrapped,
 )
+from omnibot_driver.core.lois_ecu.record_lines import (
+    RECORD_CODES,
+    GroupStatistics,
+    RecordAssembler,
+)
 
 QUIET_S: Final = 0.05
 """Lines of a group follow each other within 1.2 ms, and a reader hands them over within this."""
@@ -50,26 +50,10 @@ _LENGTHS: Final = {
     Code.ODOMETRY: (6,),
 }
 _LONGEST: Final = 10
-_RECORD_CODES: Final = (Code.RECORD_RPM, Code.RECORD_TORQUE, Code.RECORD_HEADING)
 
 GroupReport = Ticks | BoardOdometry | GpsPosition
 Timed = tuple[float, Report]
 """When its last line arrived, which may be before it is known to be whole."""
-
-
-@dataclass(slots=True)
-class GroupStatistics:
-    """Counts since they were made.
-
-    ``damaged_groups``: groups and records that were dropped, ``damaged_records`` of them records;
-    ``implausible``: groups that were
-    whole and cannot be true; ``unknown_lines``: right lines that say nothing.
-    """
-
-    damaged_groups: int = 0
-    damaged_records: int = 0
-    implausible: int = 0
-    unknown_lines: int = 0
 
 
 class Assembler:
@@ -82,10 +66,7 @@ class Assembler:
             False: odometry_gate(),
             True: odometry_gate(),
         }
-        self._expected: tuple[RecordKind, int, int] | None = None
-        self._record: list[int] = []
-        self._record_code: int | None = None
-        self._record_damaged = False
+        self._record = RecordAssembler(self.statistics)
         self._code: int | None = None
         self._payloads: list[int] = []
         self._done = False
@@ -108,12 +89,11 @@ class Assembler:
     @property
     def in_record(self) -> bool:
         """Whether the lines of a record are coming."""
-        return self._record_code is not None
+        return self._record.begun
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
         """A record of so many samples was asked for; one that was not is dropped."""
-        self._expected = kind, left, right
-        self._begin_record(None)
+        self._record.expect(kind, left, right)
 
     def forget(self) -> None:
         """The counters begin anew: a reset."""
@@ -125,7 +105,8 @@ class Assembler:
         """The reports that this line completes."""
         code, payload = line.command, line.payload
         if code in _LENGTHS:
-            found = self._break_record()
+            self._record.cut_off()
+            found: list[Timed] = []
             if payload == MARKER and not self._may_be_minus_one(code):
                 found += self._end(now)
                 self._code, self._payloads, self._done, self._astray = code, [], False, False
@@ -133,9 +114,9 @@ class Assembler:
                 return found
             return found + self._value(code, payload, now)
         found = self._end(now)
-        if code in _RECORD_CODES:
-            return found + [(now, record) for record in self._sample(code, payload)]
-        found += self._break_record()
+        if code in RECORD_CODES:
+            return found + [(now, record) for record in self._record.add(code, payload)]
+        self._record.cut_off()
         self._astray = self._after_ticks = False
         report = single_report(line)
         if report is None:
@@ -147,8 +128,7 @@ class Assembler:
         """Characters between two lines were no line."""
         if self._code is not None and not self._done:
             self._drop()
-        if self._record_code is not None:
-            self._record_damaged = True
+        self._record.damage()
 
     def rest(self, now: float) -> list[Timed]:
         """Nothing came until now."""
@@ -156,7 +136,9 @@ class Assembler:
 
     def finish(self, now: float) -> list[Timed]:
         """The line is closed."""
-        return self._end(now) + self._break_record()
+        found = self._end(now)
+        self._record.cut_off()
+        return found
 
     # Groups
 
@@ -243,62 +225,6 @@ class Assembler:
             return []
         self._appends |= isinstance(group, BoardOdometry) and group.appended
         return [(now, group)]
-
-    # Records
-
-    def _begin_record(self, code: int | None) -> None:
-        self._record, self._record_code, self._record_damaged = [], code, False
-
-    def _break_record(self) -> list[Timed]:
-        """Something else came before its end."""
-        if self._record_code is not None:
-            self._drop_record()
-        return []
-
-    def _sample(self, code: int, payload: int) -> list[Record]:
-        if self._record_code is None:
-            self._begin_record(code)
-        self._record_damaged |= code != self._record_code
-        if payload != (HEADING_END if code == Code.RECORD_HEADING else RECORD_END):
-            if self._expected is None or len(self._record) >= max(self._expected[1:]):
-                self._record_damaged = True
-            else:
-                self._record.append(payload)
-            return []
-        record = None if self._record_damaged else self._whole_record(code)
-        if record is None:
-            self._drop_record()
-            return []
-        self._begin_record(None)
-        self._expected = None
-        return [record]
-
-    def _drop_record(self) -> None:
-        self.statistics.damaged_groups += 1
-        self.statistics.damaged_records += 1
-        self._begin_record(None)
-
-    def _whole_record(self, code: int) -> Record | None:
-        if self._expected is None:
-            return None
-        kind, left, right = self._expected
-        if (kind is RecordKind.HEADING) != (code == Code.RECORD_HEADING):
-            return None
-        if kind is RecordKind.RPM and code == Code.RECORD_TORQUE:
-            return None
-        pairs = [unsigned_pair(payload) for payload in self._record]
-        if kind is RecordKind.HEADING:
-            headings = [signed(word) for pair in pairs for word in pair]
-            padding = headings[left:]
-            if len(headings) != left + left % 2 or padding not in ([], [HEADING_PADDING]):
-                return None
-            if not all(-180 <= heading < 360 for heading in headings[:left]):
-                return None
-            return Record(kind, tuple(headings[:left]), ())
-        if len(pairs) != max(left, right):
-            return None
-        lefts, rights = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
-        return Record(kind, tuple(lefts[:left]), tuple(rights[:right]))
 
 
 def _group(code: int, payloads: list[int]) -> GroupReport | None:

@@ -336,12 +336,27 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
     assert results[0] == results[1]
 
 
+@pytest.mark.parametrize("code", [b"17", b"04"])
+def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
+    """0/0 is both; the manual's number, and the one under which the firmware answers."""
+    decoder = LoisDecoder()
+    decoder.expect_record(RecordKind.TORQUE, 3, 3)
+    zero, some = b":" + code + b"00000000", b":" + code + b"00010002"
+    found: list[Report] = []
+    for text in (zero, some, zero, zero):
+        total = 0
+        for character in text:
+            total ^= character
+        found += decoder.feed(text + b"%02x\n" % total, 0.0)
+    assert found == [Record(RecordKind.TORQUE, (0, 1, 0), (0, 2, 0))]
+
+
 def test_a_record_without_end_is_not_kept() -> None:
     """No more than was asked for."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 10, 10)
     decoder.feed(b":04000a000b3d\n" * 5000, 0.0)
-    assert len(decoder._assembler._record) == 10
+    assert len(decoder._assembler._record._payloads) == 10
 
 
 # Byte losses

@@ -1,0 +1,124 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From lines to a record that was asked for, up to its end; whole or not at all.
+
+Knows lines, no characters and no times.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.lois_ecu.lines import signed, unsigned_pair
+from omnibot_driver.core.lois_ecu.messages import (
+    HEADING_END,
+    HEADING_PADDING,
+    RECORD_END,
+    Code,
+    Record,
+    RecordKind,
+)
+
+RECORD_CODES: Final = (Code.RECORD_RPM, Code.RECORD_TORQUE, Code.RECORD_HEADING)
+
+
+@dataclass(slots=True)
+class GroupStatistics:
+    """Counts since they were made.
+
+    ``damaged_groups``: groups and records that were dropped, ``damaged_records`` of them records;
+    ``implausible``: groups that were
+    whole and cannot be true; ``unknown_lines``: right lines that say nothing.
+    """
+
+    damaged_groups: int = 0
+    damaged_records: int = 0
+    implausible: int = 0
+    unknown_lines: int = 0
+
+
+class RecordAssembler:
+    """``add`` its lines; ``cut_off`` where another message comes, ``damage`` where no line does."""
+
+    def __init__(self, statistics: GroupStatistics) -> None:
+        self._statistics = statistics
+        self._expected: tuple[RecordKind, int, int] | None = None
+        self._begin(None)
+
+    def _begin(self, code: int | None) -> None:
+        self._payloads: list[int] = []
+        self._code, self._damaged = code, False
+
+    @property
+    def begun(self) -> bool:
+        """Whether lines of one have come."""
+        return self._code is not None
+
+    def expect(self, kind: RecordKind, left: int, right: int) -> None:
+        """A record of so many samples was asked for; one that was not is dropped."""
+        self._expected = kind, left, right
+        self._begin(None)
+
+    def damage(self) -> None:
+        """A line of it may have been lost."""
+        self._damaged = self.begun
+
+    def cut_off(self) -> None:
+        """Something else came before its end."""
+        if self.begun:
+            self._drop()
+
+    def add(self, code: int, payload: int) -> list[Record]:
+        """The record that this line completes, if it does."""
+        if not self.begun:
+            self._begin(code)
+        self._damaged |= code != self._code
+        if not self._ends(code, payload):
+            if self._expected is None or len(self._payloads) >= max(self._expected[1:]):
+                self._damaged = True
+            else:
+                self._payloads.append(payload)
+            return []
+        record = None if self._damaged else self._whole(code)
+        if record is None:
+            self._drop()
+            return []
+        self._begin(None)
+        self._expected = None
+        return [record]
+
+    def _ends(self, code: int, payload: int) -> bool:
+        """The end of a torque record is what two motors without current read as well."""
+        if code == Code.RECORD_HEADING:
+            return payload == HEADING_END
+        if payload != RECORD_END:
+            return False
+        if self._expected is None or self._expected[0] is not RecordKind.TORQUE:
+            return True
+        return len(self._payloads) >= max(self._expected[1:])
+
+    def _drop(self) -> None:
+        self._statistics.damaged_groups += 1
+        self._statistics.damaged_records += 1
+        self._begin(None)
+
+    def _whole(self, code: int) -> Record | None:
+        if self._expected is None:
+            return None
+        kind, left, right = self._expected
+        if (kind is RecordKind.HEADING) != (code == Code.RECORD_HEADING):
+            return None
+        if kind is RecordKind.RPM and code == Code.RECORD_TORQUE:
+            return None
+        pairs = [unsigned_pair(payload) for payload in self._payloads]
+        if kind is RecordKind.HEADING:
+            headings = [signed(word) for pair in pairs for word in pair]
+            padding = headings[left:]
+            if len(headings) != left + left % 2 or padding not in ([], [HEADING_PADDING]):
+                return None
+            if not all(-180 <= heading < 360 for heading in headings[:left]):
+                return None
+            return Record(kind, tuple(headings[:left]), ())
+        if len(pairs) != max(left, right):
+            return None
+        lefts, rights = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+        return Record(kind, tuple(lefts[:left]), tuple(rights[:right]))
