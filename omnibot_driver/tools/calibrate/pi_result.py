@@ -48,7 +48,7 @@ class Measured:
         errors = []
         for one in self.steps:
             wrong = np.abs(one.rpm / self.final_rpm - 1.0)
-            errors.append(float(np.trapezoid(wrong, one.times_s)))
+            errors.append(float(np.sum((wrong[1:] + wrong[:-1]) / 2 * np.diff(one.times_s))))
         return float(np.mean(errors))
 
 
