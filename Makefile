@@ -12,6 +12,9 @@ PYTHON ?= $(shell for python in python3.12 python3.13 python3.11 python3; do \
 # Whose demo or report: a name of `python -m omnibot_driver.simulator --help`.
 BOARD ?= omnibot
 
+# Folders without ROS; what is slow in them is marked so.
+QUICK := test/core test/simulator
+
 SITE_PACKAGES := import sysconfig; print(sysconfig.get_path("purelib"))
 
 NO_WHEELS = There are no ROS 2 Jazzy wheels for this machine's Python (PyPI has them for CPython \
@@ -29,7 +32,7 @@ unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WH
 ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export ROS_AUTOMATIC_DISCOVERY_RANGE
 
-.PHONY: help demo test docs pictures integrity bench faults soak lint format clean
+.PHONY: help demo check test docs pictures integrity bench faults soak lint format clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1: /p' Makefile | while IFS= read -r line; do \
@@ -40,6 +43,9 @@ demo: $(VENV)/.runtime  ## drive a square on a simulated BOARD, until ctrl-C or 
 
 test: lint $(VENV)/.docs  ## run every check and test
 	$(PY) -m pytest -n 2 --dist loadfile  # two files at a time: most tests wait for real time
+
+check: lint  ## check formatting, style and types, and run the quick tests (a minute)
+	$(PY) -m pytest -n 2 -q -m "not slow" $(QUICK)
 
 docs: $(VENV)/.docs  ## write what is generated, and build the documents as a site in build/docs
 	$(PY) docs/generate.py

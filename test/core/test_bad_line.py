@@ -67,6 +67,7 @@ class Drive:
         return wrong
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("frame", "minutes"), [("earth", 10), ("body", 1)])
 def test_after_minutes_of_losses_odom_is_the_boards_own_pose(frame: str, minutes: int) -> None:
     """One byte in a thousand and five bursts in ten thousand are lost; then a second without."""

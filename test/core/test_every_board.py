@@ -63,6 +63,7 @@ def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
     assert bench.robot.stands
 
 
+@pytest.mark.slow
 def test_an_estop_stops_the_robot_and_nothing_moves_it_until_a_newer_command(
     bench: AnyBench,
 ) -> None:
@@ -90,6 +91,7 @@ EVENTS: dict[str, Callable[[AnyBench], object]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("event", EVENTS.values(), ids=EVENTS)
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: AnyBench, event: Callable[[AnyBench], object]

@@ -7,6 +7,7 @@ from collections import deque
 from dataclasses import dataclass
 from random import Random
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from session_bench import EMERGENCY_STOP, PAUSE, STOP, TICK_S, ZEROS, Bench
@@ -231,6 +232,7 @@ STEPS = st.lists(
 )
 
 
+@pytest.mark.slow
 @given(
     STEPS,
     st.integers(0, 2**16),

@@ -61,5 +61,5 @@ def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
 def test_make_alone_lists_every_target() -> None:
     """The default target explains the others in a line each."""
     listed = {line.split()[1] for line in make().stdout.splitlines()}
-    targets = {"demo", "test", "docs", "pictures", "integrity", "bench", "faults", "soak"}
+    targets = {"demo", "check", "test", "docs", "pictures", "integrity", "bench", "faults", "soak"}
     assert listed == {"help", *targets, "lint", "format", "clean"}

@@ -121,6 +121,7 @@ def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:
     assert bench.written_since(start) == STOP
 
 
+@pytest.mark.slow
 def test_what_comes_after_a_stop_begins_at_rest() -> None:
     """A timeout, an e-stop and a zero command each take the set-point along."""
     bench = running(limits=GENTLE)

@@ -58,6 +58,7 @@ def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench
     assert where(bench) == pytest.approx((1.0, -0.5, 1.571), abs=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signs", [(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])
 @pytest.mark.parametrize("heading", [0.0, 1571.0, -4000.0, 16000.0])
 def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
@@ -154,6 +155,7 @@ def estop(bench: Bench) -> None:
     bench.settle()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "event",
     [

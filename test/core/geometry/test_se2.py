@@ -11,6 +11,7 @@ from synthetic_board import arc, close, xyyaw
 from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 
 
+@pytest.mark.slow
 @given(small_moves)
 def test_roll_is_the_integral_of_a_constant_twist(tangent: Pose) -> None:
     """As in the textbook."""

@@ -163,6 +163,7 @@ def test_a_measurement_that_is_given_up_says_why_once() -> None:
     assert answer(calibration).message.endswith("the port was lost")
 
 
+@pytest.mark.slow
 @given(biases)
 def test_standstills_refine_the_bias_little_by_little(bias: Vector3) -> None:
     """Towards what is seen, by a twentieth of the way a second, and there in the end."""

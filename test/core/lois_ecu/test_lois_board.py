@@ -175,6 +175,7 @@ def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
     assert any(isinstance(reading, DisplacementReading) for reading in rig.readings)
 
 
+@pytest.mark.slow
 def test_a_restarted_board_is_configured_again() -> None:
     """Else its wheels would not turn."""
     rig = Rig(nominal("firmware"))
@@ -205,6 +206,7 @@ def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
     assert rig.board.wheels[0].controller.gains.low_pass == 1.0
 
 
+@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize(
     "before", [TerminalMode.GPS, TerminalMode.HOST_WITHOUT_SUM, TerminalMode.VIRTUAL_COM]
@@ -259,6 +261,7 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
     assert rig.driver.stands(rig.now) is (None if firmware == "firmware" else True)
 
 
+@pytest.mark.slow
 @BOTH
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
     """Also slower, in the same direction, at once: the firmware remembers the old speed."""
@@ -284,6 +287,7 @@ def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
     assert rig.board.standing
 
 
+@pytest.mark.slow
 @BOTH
 def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
     """Latching is the driver's affair."""
@@ -375,6 +379,7 @@ def test_false_headings_at_north_are_refused() -> None:
     assert rig.driver._translation.headings.refused > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", RecordKind)
 @BOTH
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:

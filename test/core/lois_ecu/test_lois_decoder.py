@@ -362,6 +362,7 @@ def test_a_record_without_end_is_not_kept() -> None:
 # Byte losses
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chance", [1e-3, 1e-2])
 @pytest.mark.parametrize("sum_required", [True, False], ids=["with sum", "sum off"])
 @pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])

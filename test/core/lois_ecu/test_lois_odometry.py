@@ -44,6 +44,7 @@ def driven(firmware: Firmware, name: str) -> Drive:
     return drive(nominal(firmware, 1), CLASSES[name])
 
 
+@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("name", ["straight", "curve"])
 def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware, name: str) -> None:
@@ -54,6 +55,7 @@ def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware,
     assert abs(one.error.yaw_rad) < math.radians(3.0)
 
 
+@pytest.mark.slow
 @BOTH
 def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> None:
     """One wheel turns backward: the public firmware counts nothing of it."""
@@ -71,6 +73,7 @@ def test_backward_it_is_within_5_percent_and_3_sigma(firmware: Firmware) -> None
     assert one.sigmas < 3.0
 
 
+@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("name", ["curve", "in place", "reverse", "jerky"])
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
@@ -96,6 +99,7 @@ def test_hard_steering_to_both_sides_is_followed() -> None:
     assert abs(one.error.yaw_rad) < math.radians(5.0)
 
 
+@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("name", ["curve", "in place"])
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(

@@ -253,6 +253,7 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
     assert not bench.robot.stands
 
 
+@pytest.mark.slow
 @FIRMWARE
 def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
     """It takes 1.2 s, in which nothing else comes; the robot is driven on."""

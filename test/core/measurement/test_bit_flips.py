@@ -90,6 +90,7 @@ def begins(data: bytes, kind: bytes) -> int:
     return -1
 
 
+@pytest.mark.slow
 @given(flips)
 @example((DELTA, 6, 0, 0))
 @example((DELTA, 6, 3, 0))
@@ -115,6 +116,7 @@ def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
     assert max(speeds) < 0.42 + 0.34
 
 
+@pytest.mark.slow
 @given(flips.filter(lambda flip: flip[0] == IMU))
 @settings(max_examples=40)
 def test_an_imu_word_is_published_wrong_by_half_a_g_at_the_most(

@@ -133,6 +133,7 @@ def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) ->
     assert through.refused_imu == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("g_rms", [0.003, 0.02, 0.1, 0.5])
 def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
     """Ten minutes of it, without any order from one reading to the next."""

@@ -132,6 +132,7 @@ def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it()
     assert estimate.covariance.yy < 1e-3
 
 
+@pytest.mark.slow
 def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None:
     """Wheels of wrong size (1 %) that slip (2 %): 80 drives, squared errors by their covariance.
 

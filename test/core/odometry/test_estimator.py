@@ -134,6 +134,7 @@ def drive(board: SimulatedBoard, seed: int) -> tuple[list[OdometryEstimate], Odo
     return estimates, odometry
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 @pytest.mark.parametrize(

@@ -50,6 +50,7 @@ def test_an_undamaged_stream_is_decoded_whole_by_ticks_and_byte_by_byte(name: st
     assert byte_by_byte(ticks) == sent
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STREAMS)
 def test_an_undamaged_stream_is_decoded_in_random_chunks(name: str) -> None:
     """Twenty ways of cutting it."""
@@ -61,6 +62,7 @@ def test_an_undamaged_stream_is_decoded_in_random_chunks(name: str) -> None:
         assert decoded(cut(stream, cuts), step_s=1e-3) == sent
 
 
+@pytest.mark.slow
 @given(st.lists(believable_frames, max_size=25), st.data())
 @settings(max_examples=300)
 def test_in_step_any_content_is_delivered_in_any_chunks(
@@ -150,6 +152,7 @@ def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
 # Starting in the middle
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("by", ["whole", "ticks", "bytes"])
 def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(

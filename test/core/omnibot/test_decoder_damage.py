@@ -59,6 +59,7 @@ def damage_places(sent: list[tuple[int, Frame]]) -> list[tuple[int, int]]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
     """One byte lost anywhere, when what follows is in hand; in step again within two frames."""
@@ -74,6 +75,7 @@ def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
             assert is_subsequence(found, [frame for _, frame in sent]), f"damage at {place}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("extra", [0x00, 0x50, 0x7E, 0xFA, 0xFB, 0xFC, 0xFF])
 def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: int) -> None:
@@ -91,6 +93,7 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
         assert len(false) <= 1, f"damage at {place}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
     """Without a checksum a gyro that happens to read a header may do it, once in thirty times."""
@@ -116,6 +119,7 @@ def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes)
     assert found in ([REST, REST, *[REST] * 4], [REST, REST, other, *[REST] * 4])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(name: str) -> None:
     """Byte by byte as well: the FF that completes it waits for the byte that betrays it."""

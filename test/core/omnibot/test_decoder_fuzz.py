@@ -44,6 +44,7 @@ def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
             pytest.fail(f"{frame} is not in the stream, or not there")
 
 
+@pytest.mark.slow
 @given(any_streams, st.data())
 @settings(max_examples=300)
 def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
@@ -145,6 +146,7 @@ def work(
     return done, most
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pattern", ADVERSARIES.values(), ids=ADVERSARIES.keys())
 @pytest.mark.parametrize(("chunk_length", "pause_s"), [(1, 0), (1, 0.005), (13, 0), (1_000_000, 0)])
 def test_work_is_linear_and_memory_bounded(
@@ -159,6 +161,7 @@ def test_work_is_linear_and_memory_bounded(
     assert thrice - twice <= 1.1 * (twice - once) + 5000
 
 
+@pytest.mark.slow
 @given(st.binary(min_size=1, max_size=40), st.sampled_from([1, 5, 13, 62, 4096]))
 @settings(max_examples=40)
 @example(b"\xff\xfb\xff\xfa", 1)

@@ -47,6 +47,7 @@ def off_by_m(bench: Bench) -> float:
     return math.hypot(pose.x_m - truth.x_m, pose.y_m - truth.y_m)
 
 
+@pytest.mark.slow
 @EVERY_PERIOD
 @pytest.mark.parametrize("frame", ["earth", "body", "wheel_counts"])
 def test_twist_pose_and_stamps_are_right_at_any_rate(period_s: float, frame: str) -> None:
@@ -109,6 +110,7 @@ def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_1
             assert (expectation.weigh(pose, after)[0] == 0.0) is on_beat
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 9, 10, 11, 30, 60, 100, 300])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:

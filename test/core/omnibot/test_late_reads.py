@@ -60,6 +60,7 @@ def heard(reads: Reads) -> list[Frame]:
     return found + made.flush(last_s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stop_s", STOPS_S)
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: float) -> None:
@@ -71,6 +72,7 @@ def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: floa
         assert heard(stopped(ticks, place, stop_s)) == sent, f"stopped after {place} bytes"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most", [1, 8, 32])
 @pytest.mark.parametrize("piece", [1, 4])
 def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: int) -> None:
@@ -84,6 +86,7 @@ def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: in
             assert found == sent, f"stopped after {place} bytes for {stop_s} s"
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.tuples(triples, triples, st.booleans()), min_size=4, max_size=12),
     st.lists(st.floats(0.0, 0.03), min_size=1, max_size=12),

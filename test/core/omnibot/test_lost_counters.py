@@ -26,6 +26,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 # Gaps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 10, 25, 60, 100, 250, 300, 600])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
@@ -56,6 +57,7 @@ def test_lost_poses_alone_cost_nothing_but_rounding() -> None:
     assert settled(on)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.01, 0.1, 0.3])
 def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float) -> None:
     """Half a minute of losses, then a second without."""
@@ -70,6 +72,7 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
         assert settled(on)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [1, 5, 10, 20, 25, 26, 40, 100, 250])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
@@ -109,6 +112,7 @@ def test_a_bridge_that_was_far_wrong_is_put_right_at_the_fastest_speed_and_no_fa
     assert estimates[-1].pose.x_m == pytest.approx(x, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [26, 50, 100, 250])
 def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
     """Displacements wait a fifth of a second at the most for the board's pose; no guess is seen."""
@@ -239,6 +243,7 @@ losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
 """How many frames come, then how many are lost, deltas and poses alike."""
 
 
+@pytest.mark.slow
 @given(losses, st.integers(0, 3), st.sampled_from(["earth", "body"]))
 @settings(max_examples=40)
 def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(

@@ -65,6 +65,7 @@ def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> No
         assert told.endswith(f"set the parameter `delta_period` to {sent_s:g}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period_s", [0.04, 0.1])
 @pytest.mark.parametrize("lose", [0.001, 0.01, 0.05])
 def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float) -> None:
@@ -77,6 +78,7 @@ def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float)
     assert driver.advice is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lose", [0.001, 0.005])
 def test_a_wrong_period_is_noticed_on_a_bad_line_too(lose: float) -> None:
     """A delta is a witness also where an IMU frame before it is missing."""
@@ -102,6 +104,7 @@ def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: f
     assert driver.advice is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["earth", "body"])
 @pytest.mark.parametrize("order", ["big", "little"])
 @pytest.mark.parametrize("start", [BoardPose(), BoardPose(1e5, -3.0, 2e4), BoardPose(1e-12, 500.0)])

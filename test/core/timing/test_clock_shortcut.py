@@ -45,6 +45,7 @@ def heard(board: Board, chunker: Chunker, seed: int) -> list[Read]:
     return [(omnibot.receive(data, now), now, omnibot.edge) for now, data in chunks]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", [0.0, 0.01])
 @pytest.mark.parametrize("chunker", [ftdi(latency_s=0.001), bursts, singles, crumbs])
 def test_lines_are_stamped_alike(chunker: Chunker, loss: float) -> None:
@@ -75,6 +76,7 @@ surprises = st.tuples(
 """Readings, ticks since the last, how late they come; and so many calm reads behind them."""
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(st.lists(surprises, max_size=30), st.floats(0.0, 0.004))
 def test_surprises_are_stamped_alike(

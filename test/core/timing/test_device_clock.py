@@ -95,6 +95,7 @@ def run(
     return stamp(clock or DeviceClock(0.01), board, reads)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("imu_only", [False, True])
 @pytest.mark.parametrize("skew", SKEWS)
 @pytest.mark.parametrize(
@@ -112,6 +113,7 @@ def test_stamps_are_even_and_true_to_a_constant(
         assert spread(stamped.errors()) < 0.5e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("imu_only", [False, True])
 @pytest.mark.parametrize("skew", SKEWS)
 def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
@@ -123,6 +125,7 @@ def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
     assert spread(stamped.errors()) < 0.5e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chunker", [bursts, singles], ids=["bursts", "bytes"])
 def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Chunker) -> None:
     """Neither in their error nor in their evenness."""
@@ -141,6 +144,7 @@ def test_blocks_as_large_as_the_hosts_buffer_are_spread_over_their_ticks() -> No
         assert spread(stamped.errors(since_s=20.0)) < 0.5e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chunker", [ftdi(restarted_by_data=True), bursts, crumbs])
 def test_a_host_that_stalls_does_not_move_the_stamps(chunker: Chunker) -> None:
     """Ten stalls of 5 to 200 ms: what came meanwhile is stamped as if there had been none."""
@@ -166,6 +170,7 @@ def test_a_driver_that_finds_a_backlog_does_not_take_it_for_now(imu_only: bool) 
         assert max(map(abs, stamped.errors(since_s=0.1))) < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chunker", [ftdi(restarted_by_data=True), bursts, singles])
 def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
     """One frame in a hundred is lost; the displacements' counter says how many were."""

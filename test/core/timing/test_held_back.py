@@ -5,6 +5,7 @@
 import math
 from itertools import pairwise
 
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from session_bench import TICK_S, Bench
@@ -42,6 +43,7 @@ def step(before: OdometryEstimate, after: OdometryEstimate) -> float:
     return math.hypot(after.pose.x_m - before.pose.x_m, after.pose.y_m - before.pose.y_m)
 
 
+@pytest.mark.slow
 @given(st.integers(20, 700), st.sampled_from(["earth", "body"]), st.floats(-0.4, 0.4))
 @example(ticks=400, frame="earth", vx=0.4)
 @example(ticks=592, frame="earth", vx=0.0)

@@ -326,6 +326,7 @@ def test_every_quirk_has_its_sight() -> None:
     assert set(SEEN) == {field.name for field in fields(Quirks)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
     """All the others being there."""
@@ -333,6 +334,7 @@ def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in SEEN if name != "extra_settings"])
 def test_a_quirk_is_unseen_on_a_board_as_documented(name: str) -> None:
     """All the others being away as well."""

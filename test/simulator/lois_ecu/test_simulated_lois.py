@@ -71,6 +71,7 @@ def test_the_robot_stands_at_the_commanded_speed_after_a_while(quirks: Quirks) -
         assert sum(wheel) / len(wheel) == pytest.approx(20.5, abs=1.0)
 
 
+@pytest.mark.slow
 @BOTH
 def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
     """Within half a second; neither is sooner."""

@@ -62,6 +62,7 @@ def test_every_receiver_understands_each_command_of_the_appendix(
     assert understood("00 00 00" + typed, kind=kind) == [ControlFrame(mode, values)]
 
 
+@pytest.mark.slow
 @every_kind
 @given(typed=st.lists(st.sampled_from([typed for typed, _, _ in APPENDIX.values()]), max_size=20))
 def test_frames_back_to_back_are_all_understood(typed: list[str], kind: ReceiverKind) -> None:
@@ -70,6 +71,7 @@ def test_frames_back_to_back_are_all_understood(typed: list[str], kind: Receiver
     assert understood("".join(typed), kind=kind) == [meanings[one] for one in typed]
 
 
+@pytest.mark.slow
 @every_kind
 @given(noise=st.binary(max_size=300), awake=st.booleans(), control_frames=st.booleans())
 def test_no_bytes_disturb_a_receiver_for_longer_than_a_frame(

@@ -1,0 +1,47 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What `make check` runs stays quick: no ROS, and few examples."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+MOST_EXAMPLES = 200
+"""Of a property that is not marked slow."""
+
+
+def quick_folders() -> list[str]:
+    """As the Makefile names them."""
+    found = re.search(r"^QUICK := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert found
+    return found[1].split()
+
+
+def modules() -> Iterator[tuple[str, ast.Module]]:
+    for folder in quick_folders():
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            yield str(path.relative_to(ROOT)), ast.parse(path.read_text())
+
+
+def test_none_of_them_imports_ros() -> None:
+    """Neither a test nor what it stands on."""
+    for name, module in modules():
+        for node in ast.walk(module):
+            if isinstance(node, ast.Import | ast.ImportFrom):
+                names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+                names += [alias.name for alias in node.names]
+                assert not any(one.split(".")[0] == "rclpy" for one in names), name
+
+
+def test_a_property_of_many_examples_is_marked_slow() -> None:
+    """So that a minute is enough."""
+    for name, module in modules():
+        for node in ast.walk(module):
+            if not isinstance(node, ast.FunctionDef):
+                continue
+            marks = [ast.unparse(decorator) for decorator in node.decorator_list]
+            examples = [int(n) for mark in marks for n in re.findall(r"max_examples=(\d+)", mark)]
+            if "pytest.mark.slow" not in marks:
+                assert max(examples, default=0) <= MOST_EXAMPLES, f"{name}: {node.name}"
