@@ -53,7 +53,7 @@ class Vehicle:
         self.motors = tuple(
             Motor(motor, settings.load_percent, random) for motor in settings.motors
         )
-        self._encoders = tuple(
+        self.encoders = tuple(
             Encoder(
                 settings.steps,
                 long / (short + long),
@@ -73,7 +73,7 @@ class Vehicle:
         settings, state = self._settings, self.truth
         ways: list[float] = []
         edges: list[Edge] = []
-        for index, (motor, encoder) in enumerate(zip(self.motors, self._encoders, strict=True)):
+        for index, (motor, encoder) in enumerate(zip(self.motors, self.encoders, strict=True)):
             turns = motor.advance(duties[index], step_s)
             if turns and (edge := encoder.turn(turns)) is not None:
                 part, is_long, direction = edge

@@ -206,7 +206,7 @@ def motion(settings: LoisSettings, name: str, *, side_m: float = 5.0) -> Drive:
     """One of ``MOTIONS``, with encoders that begin anywhere between two ticks."""
     rig = Rig(settings)
     random = Random(f"encoders {settings.seed}")
-    for encoder in rig.board._encoders:
+    for encoder in rig.board._vehicle.encoders:
         encoder._periods = random.random()
     if name in ("left", "right"):
         rig.run(4.0)

@@ -159,16 +159,6 @@ def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReadin
     assert through.refused_displacements == 1
 
 
-def test_displacements_that_arrive_at_once_are_measured_by_the_one_before() -> None:
-    """An adapter kept them back; that tells of no time, and is no defect."""
-    through = gate()
-    assert through.admit(ahead(), 1.0)
-    at_once = replace(ahead(), duration_s=0.0)
-    assert through.admit(at_once, 1.04) == [(at_once, 1.04)]
-    assert through.admit(at_once, 1.04) == []
-    assert through.refused_displacements == 1
-
-
 def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
     """So that it is not bridged twice."""
     pose = PoseReading(0.0, 0.0, 0.0)
