@@ -214,7 +214,7 @@ class SimulatedLois:
             self._control_late = False
             for channel in self.wheels:
                 channel.settle(self.now_s)
-                channel.control(period_s)
+                channel.control()
             left, right = self.wheels
             self._applied_duty = (left.duty_percent, right.duty_percent)
             self._records.control()

@@ -126,14 +126,14 @@ class WheelChannel:
             self._halt()
             self._next_target = 0
 
-    def control(self, dt_s: float) -> None:
+    def control(self) -> None:
         """One step of the controller."""
         if self.open_loop:
             return
         target = self._next_target if not self._quirks.reverse_runs_fast else self._target
         if self._quirks.limits_rpm:
             target = max(-LIMIT_RPM, min(LIMIT_RPM, target))
-        self.duty_percent = int(self.controller.step(float(self.rpm), float(target), dt_s))
+        self.duty_percent = int(self.controller.step(float(self.rpm), float(target)))
         self._target = self._next_target
 
     def _halt(self) -> None:

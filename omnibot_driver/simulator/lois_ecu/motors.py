@@ -13,6 +13,7 @@ from random import Random
 from omnibot_driver.simulator.lois_ecu.settings import MotorSettings
 
 LOAD_CHANGES_S = 0.5
+NOMINAL_STEP_S = 0.2
 
 
 class Motor:
@@ -130,7 +131,11 @@ class Gains:
 
 
 class SpeedController:
-    """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), and what the firmware adds."""
+    """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)) by the trapezoidal rule, and what the firmware adds.
+
+    The coefficients are for steps of ``NOMINAL_STEP_S``, however often it is called. An output
+    beyond 100 % is not remembered (anti-windup), and one against the target becomes zero.
+    """
 
     def __init__(self, gains: Gains) -> None:
         self.gains = gains
@@ -143,23 +148,25 @@ class SpeedController:
 
     def restart(self) -> None:
         """Forget everything."""
-        self._sum = self._output = self._target = 0.0
+        self._errors = self._outputs = (0.0, 0.0)
+        self._target = 0.0
 
-    def step(self, measured_rpm: float, target_rpm: float, dt_s: float) -> float:
+    def step(self, measured_rpm: float, target_rpm: float) -> float:
         """Duty in percent, -100..100; no power where nothing is wanted."""
         if not target_rpm:
             self.restart()
             return 0.0
         gains = self.gains
         self._target += gains.low_pass * (target_rpm - self._target)
+        half_s, tn, td = NOMINAL_STEP_S / 2, max(gains.tn, 1e-3), gains.td
         error = self._target - measured_rpm
-        gain = dt_s / max(gains.tn, 1e-3)
-        wanted = gains.kp * (error + self._sum + error * gain)
-        output = self._output + (wanted - self._output) * dt_s / (gains.td + dt_s)
-        duty = output + gains.feed_forward * self._target
-        if abs(duty) < 100.0 or duty * error < 0:
-            self._sum += error * gain
-            self._output = output
-        if duty * self._target < 0:
-            return 0.0
-        return max(-100.0, min(100.0, duty))
+        weighed = (tn + half_s) * error + 2 * half_s * self._errors[0]
+        weighed -= (tn - half_s) * self._errors[1]
+        kept = 2 * td * self._outputs[0] - (td - half_s) * self._outputs[1]
+        output = (gains.kp * half_s / tn * weighed + kept) / (td + half_s)
+        if abs(output) < 100.0:
+            self._outputs = (output, self._outputs[0])
+        self._errors = (error, self._errors[0])
+        if output * self._target < 0:
+            output = 0.0
+        return max(-100.0, min(100.0, output + gains.feed_forward * self._target))
