@@ -15,10 +15,12 @@ from typing import Final
 
 from omnibot_driver.core.mart.replies import Fail, Ok, Other, Reply
 from omnibot_driver.core.mart.words import (
+    CONFLICT,
     ENC,
     KNOWN_FAILS,
     MCSTAT,
     RMRA,
+    UNSUPPORTED,
     Form,
     Kind,
     Request,
@@ -33,6 +35,9 @@ LOSS, LOSS_S = 1.5, 0.02
 """A query that was not answered may have been given up too soon: the next is waited for longer."""
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Asked at once, whatever reply may still come."""
+
+AT_ONCE: Final = frozenset({CONFLICT, UNSUPPORTED})
+"""A check that is refused is answered before its least time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +83,7 @@ class Conversation:
         """Nothing was asked."""
         self.pending: Pending | None = None
         self._owed_until_s: dict[Form, float] = {}
+        self._copies_until_s: dict[Form, float] = {}
         self._trip_s = 0.0
 
     def may_ask(self, word: Word, now: float) -> bool:
@@ -85,6 +91,24 @@ class Conversation:
         if self.pending is not None:
             return False
         return word.kind is not Kind.QUERY or word in PRESSING or not self._owed(word, now)
+
+    def heard(self, form: Form, now: float) -> None:
+        """A reply of this form came; a copy of it may be late."""
+        self._copies_until_s[form] = now + self.delay_s
+
+    def certain_from_s(self, word: Word) -> float:
+        """From when on the word's own reply cannot be mistaken for a copy of an earlier one."""
+        until = [
+            each.get(form, -math.inf)
+            for form in word.forms
+            for each in (self._copies_until_s, self._owed_until_s)
+        ]
+        return max(until) - word.least_s
+
+    def settle(self, now: float) -> None:
+        """The server has answered the latest of all: earlier replies are on their way, or lost."""
+        for form, until_s in self._owed_until_s.items():
+            self._owed_until_s[form] = min(until_s, now + self.delay_s)
 
     def _owed(self, word: Word, now: float) -> bool:
         return any(self._owed_until_s.get(form, -math.inf) > now for form in word.forms)
@@ -119,6 +143,8 @@ class Conversation:
     def hear(self, reply: Reply, now: float) -> Answer | None:
         """What this answers; None for what is late, or doubled."""
         pending = self.pending
+        if isinstance(reply, Ok):
+            self.heard(reply.form, now)
         if pending is None or isinstance(reply, Other) or not _matches(reply, pending, now):
             self.discarded += 1
             if isinstance(reply, Ok):
@@ -140,7 +166,8 @@ class Conversation:
 
 def _matches(reply: Ok | Fail, pending: Pending, now: float) -> bool:
     word = pending.word
-    if now < pending.sent_s + word.least_s:
+    refused = word.kind is Kind.CHECK and isinstance(reply, Fail) and reply.reason in AT_ONCE
+    if now < pending.sent_s + word.least_s and not refused:
         return False
     if isinstance(reply, Ok):
         return reply.form in word.forms

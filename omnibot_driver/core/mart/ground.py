@@ -15,6 +15,7 @@ from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Conversation
 from omnibot_driver.core.mart.goal import Move, Surplus
 from omnibot_driver.core.mart.health import Health
+from omnibot_driver.core.mart.imu_proof import ImuProof
 from omnibot_driver.core.mart.jobs import Jobs
 from omnibot_driver.core.mart.odometry import MartOdometry
 from omnibot_driver.core.mart.polls import Polls
@@ -44,7 +45,8 @@ class Ground:
         self.conversation = Conversation(settings.network_delay_s)
         self.odometry = MartOdometry(settings)
         self.loop = SpeedLoop(settings)
-        self.health = Health()
+        self.imu = ImuProof()
+        self.health = Health(self.imu)
         self.decoder = MartDecoder()
         self.jobs = Jobs()
         self.proof = StopProof()
@@ -72,6 +74,7 @@ class Ground:
         self.odometry.connect()
         self._polls.connect()
         self.health.connect()
+        self.imu.connect()
         self.state, self.motion = State.UNKNOWN, Motion.UNKNOWN
         self.commanded: BodyTwist | None = STANDING
         self._wanted: Wanted = None
@@ -81,7 +84,7 @@ class Ground:
         self._moved_last = False
         self._copies_stopped_s = -math.inf
         self._moved_by: Request | None = None
-        self._proved_s = self._started_s = self._begun_s = self._harmful_s = -math.inf
+        self._started_s = self._begun_s = self._harmful_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
         self._spin_radps = self._spin_seen_radps = 0.0
         self._spin_units = 0

@@ -9,6 +9,7 @@ import math
 from typing import Final
 
 from omnibot_driver.core.mart.goal import INCH_M
+from omnibot_driver.core.mart.imu_proof import ImuProof
 from omnibot_driver.core.mart.readings import (
     BatteryReading,
     DockedReading,
@@ -38,19 +39,19 @@ ENCODER_FAILS: Final = 3
 
 
 class Health:
-    """``imu_dead``: the last check found no IMU; ``stranger``: what another server answers;
+    """``imu``: what its checks have found; ``stranger``: what another server answers;
     ``heading_told``: motions besides RM in which RMRA was seen to change; ``reference_fails``: how
     often RM was answered by a bare ``fail``.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, imu: ImuProof) -> None:
+        self._imu = imu
         self.heading_told: set[Motion] = set()
         self.reference_fails = 0
         self.connect()
 
     def connect(self) -> None:
         """Nothing was measured."""
-        self.imu_dead = False
         self.stranger = ""
         self.status: int | None = None
         self.volts: float | None = None
@@ -118,8 +119,11 @@ class Health:
             return f"the server is no motion controller: it calls itself '{self.stranger}'"
         if self.tripped:
             return f"the motor board reports {self.tripped}: check motors, wiring and power"
-        if self.imu_dead:
-            return "the IMU does not answer (MPU6050 connection lost): check its wiring and restart"
+        if self._imu.dead:
+            return (
+                "the IMU does not answer (MPU6050 connection lost): check its wiring, and restart"
+                " server and driver if it stays so"
+            )
         if self.reference_fails:
             return "this server answers 'fail' to RM although the robot moves: update the server"
         return ""

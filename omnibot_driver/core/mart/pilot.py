@@ -158,6 +158,8 @@ class Pilot(Starts):
         if self.state is State.LOST:
             return
         if self._stopping is not None:
+            if isinstance(reply, Ok):
+                self.conversation.heard(reply.form, now)
             if self._stopping.hear(reply, now):
                 self._stopped(now)
             return
@@ -186,8 +188,8 @@ class Pilot(Starts):
         at_s = now - answer.took_s / 2
         if word.kind is Kind.QUERY:
             self._measured(answer, at_s, now)
-        elif word is words.CHECK:
-            self._checked(reply, answer.took_s, now)
+        elif word.kind is Kind.CHECK:
+            self._checked(answer, now)
         elif word.kind is Kind.START:
             self._started(reply, now)
         elif word.kind is Kind.CHANGE:
@@ -209,9 +211,9 @@ class Pilot(Starts):
             self._halt(now, f"{word.text} was not answered")
         elif word.kind is Kind.MOVE:
             self._halt(now)  # its reply is lost, or it takes too long; the way is planned anew
-        elif word is words.CHECK:
+        elif word.kind is Kind.CHECK:
             self.state = State.STILL
-            self._again_s = now + 0.1
+            self.imu.missed(now)
         elif word.kind is Kind.SERVICE:
             self.state = State.STILL
             self.jobs.missed(word, now)

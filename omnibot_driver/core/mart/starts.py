@@ -5,11 +5,11 @@
 Knows what is wanted and the words that start; not when a motion must end. Time is an argument.
 """
 
-import math
 from typing import Final
 
 from omnibot_driver.core.commands.orders import EmergencyStop, GoTo
 from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.conversation import Answer
 from omnibot_driver.core.mart.goal import Move, next_move
 from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S
 from omnibot_driver.core.mart.replies import Fail, Ok
@@ -26,10 +26,6 @@ from omnibot_driver.core.mart.stops import Stops
 from omnibot_driver.core.mart.words import Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
-PROVED_S: Final = 0.2
-"""So old a proof of the IMU may be when a motion starts."""
-CHECK_S: Final = 0.5
-"""The check takes at least about so long; what it took longer, the proof may be older."""
 AGAIN_S: Final = 1.0
 """After a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
@@ -72,6 +68,8 @@ class Starts(Stops):
             return self._begin(words.MCR.request("SLOW", 1), now)
         if self.odometry.counted_s < self._rested_s:
             return NO_PACKETS  # how it rolled out is counted before the count begins anew
+        if self.imu.retries(now):
+            return self._check(now)
         start = self._next_start(now)
         if start is None:
             return self._job(now)
@@ -82,12 +80,10 @@ class Starts(Stops):
             return NO_PACKETS
         if packets := self._prepare_spin(start, now):
             return packets
-        if now < self._harmful_s + self._delay_s:
-            return NO_PACKETS
-        if start.word in NEEDS_IMU and now > self._proved_s + PROVED_S:
-            return self._check(now)
         if self.odometry.counted_s < self._harmful_s + self._delay_s:
             return NO_PACKETS  # a late copy of a move would have the port now
+        if start.word in NEEDS_IMU and not self.imu.fresh(now):
+            return self._check(now)
         return self._begin(start, now)
 
     def _next_start(self, now: float) -> Request | None:
@@ -136,25 +132,31 @@ class Starts(Stops):
         )
 
     def _check(self, now: float) -> Packets:
-        self._require(words.CHECK)
+        """As soon as its reply cannot be mistaken for a late one."""
+        word = self.imu.word
+        if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):
+            return NO_PACKETS
+        self._require(word)
         self.state = State.CHECKING
-        self.odometry.zeroed()
-        return self._ask(words.CHECK.request(0), now)
+        if word is words.CHECK:
+            self.odometry.zeroed()
+        return self._ask(self.imu.request, now)
 
-    def _checked(self, reply: Ok | Fail, took_s: float, now: float) -> None:
+    def _checked(self, answer: Answer, now: float) -> None:
         self.state = State.STILL
-        if isinstance(reply, Ok):
-            self.health.imu_dead = False
-            self._proved_s = now - max(0.0, took_s - CHECK_S)
-            if self._proved_s + PROVED_S <= now:
-                self._again_s = now
+        reply, was_dead = answer.reply, self.imu.dead
+        if self.imu.answered(answer.word, reply, answer.took_s, now):
+            if self.imu.dead and not was_dead:
+                self._notice(self.health.refusal, halt=True)
             return
-        self._again_s = now + AGAIN_S
-        if reply.reason == words.IMU_LOST:
-            self.health.imu_dead = True
-            self._notice(self.health.refusal, halt=True)
+        self._again_s = self.imu.again_s = now + AGAIN_S
+        reason = reply.reason if isinstance(reply, Fail) else ""
+        why = f"the check of the IMU failed: {reason or 'fail'}"
+        if reason == words.CONFLICT:
+            self.motion = Motion.UNKNOWN
+            self._halt(now, why)
         else:
-            self._notice(f"the check of the IMU failed: {reply.reason or 'fail'}", halt=True)
+            self._notice(why, halt=True)
 
     def _begin(self, start: Request, now: float) -> Packets:
         self._require(start.word)
@@ -162,7 +164,7 @@ class Starts(Stops):
         self.state, self.motion = State.STARTING, STARTS[start.word]
         self._start = start.word
         self._started_s = now
-        self._proved_s = -math.inf
+        self.imu.used()
         _, twist = self._wish(now)
         self.commanded = twist
         self._spin_radps = twist.yaw_rate_radps
@@ -216,7 +218,7 @@ class Starts(Stops):
         if request is None:
             self._move.given_up = True  # it is over: whoever pushes the robot away keeps it there
             return None
-        if request.word in NEEDS_IMU and now > self._proved_s + PROVED_S:
+        if request.word in NEEDS_IMU and not self.imu.fresh(now):
             return request
         self._move.said += 1
         return request
@@ -237,13 +239,13 @@ class Starts(Stops):
                 halt=True,
             )
             if reply.reason == words.IMU_LOST:
-                self.health.imu_dead = True
+                self.imu.lost()
 
     def _job(self, now: float) -> Packets:
         request = self.jobs.next(now, stands=self.proof.proved)
         if request is None:
             return NO_PACKETS
-        if request.word in NEEDS_IMU and now > self._proved_s + PROVED_S:
+        if request.word in NEEDS_IMU and not self.imu.fresh(now):
             return self._check(now)
         self.jobs.sent(request, now)
         if request.word in STARTS:

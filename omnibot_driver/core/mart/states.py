@@ -23,6 +23,7 @@ from omnibot_driver.core.mart.words import (
     MCL,
     MCR,
     MCSTAT,
+    RESET,
     RM,
     RMCS,
     RMRA,
@@ -80,7 +81,7 @@ QUICK: Final = frozenset({ENC, RMRA, VOLTS, MCSTAT, DOCKED, HELLO})
 MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
     State.UNKNOWN: frozenset({HELLO, SRM, SM}),
     State.STILL: QUICK
-    | {SFC, SRC, TD, CHECK, SSP, RM, B, R, L, TF, TB, MCR, MCL, SRM, SM, SL, SS}
+    | {SFC, SRC, TD, RESET, CHECK, SSP, RM, B, R, L, TF, TB, MCR, MCL, SRM, SM, SL, SS}
     | {SB, TIME, LOG, LAST_MOVE, LAST_TURN, EXIT},
     State.CHECKING: frozenset(),
     State.STARTING: frozenset({SRM, SM}),
@@ -92,7 +93,7 @@ MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
     State.STOPPING: frozenset({SRM, SM, SL, SS}),
     State.LOST: frozenset({HELLO, SRM, SM, SL, SS}),
 }
-"""RM, R, L, B, TF and TB besides only right after a CHECK."""
+"""All that start, besides only right after a proof of the IMU (RESET or CHECK)."""
 
 HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.NONE: (),
@@ -126,10 +127,12 @@ STARTS: Final[Mapping[Word, Motion]] = {
     MCR: Motion.TURN,
     MCL: Motion.TURN,
 }
-"""What a word begins. MCR and MCL alone may be said with a dead IMU: they find it out."""
+"""What a word begins."""
 
-NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB})
-"""With a dead IMU these start the motors and never answer, or start when it is back."""
+NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL})
+"""With a dead IMU these start the motors and never answer, or start when it is back. MCR and MCL
+find it out, but some servers turn the robot for half a second first.
+"""
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})
 """A copy of one of these that arrives late does something else than it was meant to do, once

@@ -164,6 +164,7 @@ class Stops(Ground):
         """The server has answered the stop."""
         stopping, self._stopping = self._stopping, None
         self._moved_by = None  # it was cut short
+        self.conversation.settle(now)
         assert stopping is not None
         result, motion = stopping.result, stopping.motion
         if motion is Motion.SPIN and isinstance(result, Ok) and result.form is Form.INTEGER:
@@ -219,7 +220,7 @@ class Stops(Ground):
         if reply.reason in words.OBSTACLES:
             self._block(motion, reply.reason)
         elif reply.reason == words.IMU_LOST:
-            self.health.imu_dead = True
+            self.imu.lost()
             self._notice(self.health.refusal, halt=True)
         else:
             self._notice(f"the controller reports: {reply.reason or 'fail'}", halt=True)

@@ -117,8 +117,11 @@ SFC = _word("SFC", Kind.QUERY, _INTEGER, 0.15)
 SRC = _word("SRC", Kind.QUERY, _INTEGER, 0.15)
 TD = _word("TD", Kind.QUERY, _INTEGER, 0.05, {"in progress"})
 
+NO_IMU: Final = "could not init"
+RESET = _word("RST IMU", Kind.CHECK, _OK, 0.3, {NO_IMU, CONFLICT, UNSUPPORTED}, least_s=0.09)
+"""Proves the IMU without a motion, and leaves it closed where that fails: it is repeated then."""
 CHECK = _word("MCR SLOW", Kind.CHECK, _OK, 0.8, MOVING, least_s=0.32)
-"""With 0 degrees. A reply to anything before it has come by ``least_s``."""
+"""With 0 degrees, where the server has no RST: some servers start the motors by it."""
 SSP = _word("SSP", Kind.SERVICE, _OK, 0.05, {"command missing parameter", UNSUPPORTED})
 
 RM = _word("RM", Kind.START, _OK, 1.2, STARTING | OBSTACLES | {"improper command format"})
@@ -148,7 +151,8 @@ LAST_TURN = _word("LAST TURN", Kind.SERVICE, {Form.FILE}, 2.0, {NO_FILE, ""})
 EXIT = _word("EXIT", Kind.SERVICE, {Form.FILE, Form.NOTHING}, 2.0)
 
 WORDS: Final = (
-    *(HELLO, ENC, RMRA, VOLTS, MCSTAT, DOCKED, SFC, SRC, TD, CHECK, SSP, RM, B, R, L, RMCS, CS),
+    *(HELLO, ENC, RMRA, VOLTS, MCSTAT, DOCKED, SFC, SRC, TD, RESET, CHECK, SSP),
+    *(RM, B, R, L, RMCS, CS),
     *(SRM, SM, SL, SS, TF, TB, MCR, MCL, SB, TIME, LOG, LAST_MOVE, LAST_TURN, EXIT),
 )
 """All that this driver ever says."""
@@ -170,7 +174,6 @@ NEVER_SAID: Final = {
     "SLPP": "undocumented; changes F and B",
     "REC START": "undocumented; records the IMU into a file",
     "REC STOP": "undocumented",
-    "RST IMU": "undocumented; MCR SLOW 0 proves the IMU as well",
     "RST MC": "undocumented",
     "SFR": "undocumented; ends the server where its number is missing",
     "SRR": "undocumented; the same",

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.core.mart import Fail, Form, Kind, MartDecoder, Ok, Other, parse, words
+from omnibot_driver.core.mart import Fail, Form, MartDecoder, Ok, Other, parse, words
 from omnibot_driver.core.mart.conversation import Conversation
 from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, MAY_SAY, Motion, State, may_say
 from omnibot_driver.core.mart.stopping import REPEAT_S, Stopping
@@ -91,9 +91,21 @@ def test_no_late_ok_proves_the_imu() -> None:
     talk.ask(words.CHECK.request(0), 1.0)
     assert talk.hear(parse(b"ok"), 1.3) is None
     assert talk.hear(parse(b"ok"), 1.5) is not None
-    assert all(
-        word.least_s > talk.delay_s for word in words.WORDS if word.kind in (Kind.CHECK, Kind.MOVE)
-    )
+    assert all(word.least_s > talk.delay_s for word in (words.CHECK, words.TF, words.TB, words.MCR))
+
+
+def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
+    """A copy of the last ``ok``, or the one that was given up, is 0.3 s late at most."""
+    talk = conversation()
+    talk.ask(words.CS.request(1, 1), 1.0)
+    assert talk.hear(parse(b"ok"), 1.1) is not None
+    assert talk.certain_from_s(words.RESET) == pytest.approx(1.1 + 0.3 - words.RESET.least_s)
+    assert talk.certain_from_s(words.CHECK) < 1.1
+    talk.ask(words.RM.request(30), 2.0)
+    talk.give_up(2.1)
+    assert talk.certain_from_s(words.RESET) > 2.7
+    talk.settle(2.2)
+    assert talk.certain_from_s(words.RESET) == pytest.approx(2.5 - words.RESET.least_s)
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:

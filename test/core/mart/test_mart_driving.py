@@ -54,13 +54,13 @@ def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
         bench.command(vx, yaw_rate, 2.0)
     bench.run(2.0)
     said = [data.split()[0] for data in bench.said() if not data.startswith((b"RMCS", b"CS"))]
-    said = said[said.index(b"MCR") :]
+    said = said[said.index(b"RST") :]
     said = [word for word, before in zip(said, [b"", *said], strict=False) if word != before]
     assert said == [
-        *(b"MCR", b"RM", b"SRM"),
-        *(b"MCR", b"B", b"SM"),
-        *(b"SSP", b"MCR", b"L", b"SM"),
-        *(b"MCR", b"RM", b"SRM"),
+        *(b"RST", b"RM", b"SRM"),
+        *(b"RST", b"B", b"SM"),
+        *(b"SSP", b"RST", b"L", b"SM"),
+        *(b"RST", b"RM", b"SRM"),
     ]
 
 
@@ -78,9 +78,9 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
         if port == 0 and data.split()[0] in (b"RM", b"B", b"L", b"R")
     ]
     assert len(starts) >= 4
-    checks = [at_s for at_s, _, data in bench.server.received if data == b"MCR SLOW 0"]
+    checks = [at_s for at_s, _, data in bench.server.received if data == b"RST IMU"]
     for at_s, _ in starts:
-        ended_s = max(check for check in checks if check < at_s) + 0.5
+        ended_s = max(check for check in checks if check < at_s) + 0.1
         assert at_s - ended_s < 0.2 + 0.05 + 0.05
 
 
@@ -346,4 +346,4 @@ def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops
             bench.robot.advance()
         assert bench.robot.stands, (wish, tenths, words)
         assert not bench.server.hung
-    assert len(seen) >= 2
+    assert len(seen) >= 2 or wish.startswith("goal")

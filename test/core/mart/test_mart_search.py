@@ -18,7 +18,7 @@ ON_THE_WIRE: Final = {
     "RM": b"RM 30",
     "TF": b"TF 200",
     "MCR": b"MCR 350",
-    "CHECK": b"MCR SLOW 0",
+    "CHECK": b"RST IMU",
     "B": b"B SLOW",
     "R": b"R SLOW",
     "L": b"L SLOW",
