@@ -34,7 +34,8 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
-ESTOP_REPEAT_S: Final = 0.5
+ESTOP_REPEAT_S: Final = 0.1
+"""While the e-stop is latched. A server that stands answers ``fail``, and does nothing."""
 
 
 class Ground:
@@ -84,7 +85,7 @@ class Ground:
         self._moved_last = False
         self._copies_stopped_s = -math.inf
         self._moved_by: Request | None = None
-        self._started_s = self._begun_s = self._harmful_s = -math.inf
+        self._started_s = self._begun_s = self._harmful_s = self._halted_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
         self._spin_radps = self._spin_seen_radps = 0.0
         self._spin_units = 0
@@ -155,6 +156,8 @@ class Ground:
             self._require(word)
             if word in HARMFUL_LATE:
                 self._harmful_s = now
+            if word in (words.SM, words.SRM):
+                self._halted_s = now
         return tuple((word.channel, word.request().data) for word in said)
 
     def _greet(self, now: float) -> Packets:

@@ -36,12 +36,14 @@ FRONT_IN, REAR_IN = 19, 15
 SEEN_FOR_S: Final = 2.0
 LOWEST_V, HIGHEST_V = 5.0, 40.0
 ENCODER_FAILS: Final = 3
+REFERENCE_FAILS: Final = 2
+"""RM may fail once after a stop that took long, and the robot stands."""
 
 
 class Health:
     """``imu``: what its checks have found; ``stranger``: what another server answers;
     ``heading_told``: motions besides RM in which RMRA was seen to change; ``reference_fails``: how
-    often RM was answered by a bare ``fail``.
+    often in a row RM was answered by a bare ``fail``.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -92,6 +94,11 @@ class Health:
         """ENC was answered."""
         self._encoder_fails = 0
 
+    def reference_moves(self) -> None:
+        """The robot moves after an RM that failed."""
+        if self.reference_fails:
+            self.reference_fails = REFERENCE_FAILS
+
     def volts_or(self, nominal: float) -> float:
         """The battery's."""
         return nominal if self.volts is None else self.volts
@@ -124,7 +131,7 @@ class Health:
                 "the IMU does not answer (MPU6050 connection lost): check its wiring, and restart"
                 " server and driver if it stays so"
             )
-        if self.reference_fails:
+        if self.reference_fails >= REFERENCE_FAILS:
             return "this server answers 'fail' to RM although the robot moves: update the server"
         return ""
 

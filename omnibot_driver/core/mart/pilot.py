@@ -10,6 +10,7 @@ import math
 from typing import Final
 
 from omnibot_driver.core.commands.actuator import Wanted
+from omnibot_driver.core.commands.orders import EmergencyStop
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
 from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S
@@ -56,11 +57,11 @@ class Pilot(Starts):
     def stop_words(self) -> tuple[Word, ...]:
         """What stops the present state, for whoever cannot hear the replies."""
         if self.state is State.LOST:
-            return (*HALTS[Motion.UNKNOWN], *LAST_HALTS[self.motion])
+            return LAST_HALTS[self.motion] or LAST_HALTS[Motion.UNKNOWN]
         if self.motion is Motion.NONE:
             return HALTS[Motion.UNKNOWN]
         if self._stopping is not None and self._stopping.last_port:
-            return (*HALTS[self.motion], *LAST_HALTS[self.motion])
+            return LAST_HALTS[self.motion]
         return HALTS[self.motion]
 
     def busy(self, now: float) -> bool:
@@ -101,6 +102,8 @@ class Pilot(Starts):
         if self.state is State.SERVING:
             return self.jobs.wake_at
         times = [max(self._polls.wake_at(self.state), now + 0.004)]
+        if self.state is State.STILL and isinstance(self._wanted, EmergencyStop):
+            times.append(max(now + 0.01, self._estop_said_s + ESTOP_REPEAT_S))
         if self.state is State.STILL and not stands(self._wanted):
             times.append(max(now + 0.01, self._again_s, self._harmful_s + self._delay_s))
         return min(times)
@@ -139,7 +142,8 @@ class Pilot(Starts):
         suspected = self._moved_last and self.odometry.counted_s < self._rested_s
         if self.state is not State.STILL or not suspected:
             return math.inf
-        return max(self._rested_s + COPY_S, self._copies_stopped_s + REPEAT_S)
+        apart_s = self._halted_s + self._delay_s
+        return max(self._rested_s + COPY_S, self._copies_stopped_s + REPEAT_S, apart_s)
 
     def hear(self, data: bytes, now: float) -> None:
         """A datagram of the command port."""
@@ -268,6 +272,7 @@ class Pilot(Starts):
             return
         if abs(count - before) <= STRAY_COUNTS or now - self._stray_s < STRAY_AGAIN_S:
             return
+        self.health.reference_moves()
         if self._negative_sweep and now - self._swept_s < 2.0:
             self._stray_s = now
             self._rescue = True

@@ -60,14 +60,14 @@ class Starts(Stops):
         return self._ask(words.CS.request(-right, -left), now)
 
     def _act_still(self, now: float) -> Packets:
-        if isinstance(self._wanted, EmergencyStop) and now - self._estop_said_s >= ESTOP_REPEAT_S:
-            self._estop_said_s = now
-            self.proof.stopped(now)
-            return self._send(HALTS[Motion.UNKNOWN], now)
         if self._rescue:
             return self._begin(words.MCR.request("SLOW", 1), now)
         if self.odometry.counted_s < self._rested_s:
             return NO_PACKETS  # how it rolled out is counted before the count begins anew
+        if isinstance(self._wanted, EmergencyStop) and now - self._estop_said_s >= ESTOP_REPEAT_S:
+            self._estop_said_s = now
+            self.proof.stopped(now)
+            return self._send(HALTS[Motion.UNKNOWN], now)
         if self.imu.retries(now):
             return self._check(now)
         start = self._next_start(now)
@@ -82,6 +82,8 @@ class Starts(Stops):
             return packets
         if self.odometry.counted_s < self._harmful_s + self._delay_s:
             return NO_PACKETS  # a late copy of a move would have the port now
+        if now < self._halted_s + self._delay_s:
+            return NO_PACKETS  # a late copy of a stop would end what begins
         if start.word in NEEDS_IMU and not self.imu.fresh(now):
             return self._check(now)
         return self._begin(start, now)
@@ -189,6 +191,8 @@ class Starts(Stops):
         if isinstance(reply, Fail):
             self._start_failed(reply, now)
             return
+        if self.motion is Motion.REFERENCE:
+            self.health.reference_fails = 0
         self.state = WHILE[self.motion]
         self._begun_s = now
         self.odometry.heading_changed_s = now

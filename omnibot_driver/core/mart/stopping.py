@@ -5,7 +5,8 @@
 The right word goes out at once, over whatever else was asked, and again until it is answered. A
 start may still be on its way, and be overtaken. So a reply counts only where one of those that came
 must answer a stop that was sent when no copy of the start could come any more. The stop port comes
-last. Knows words, replies and times; not why it is stopped.
+last, alone: right behind SM or SRM it would race with them, and hang a port. Knows words, replies
+and times; not why it is stopped.
 """
 
 from typing import Final
@@ -53,6 +54,8 @@ class Stopping:
         self.wake_at = now
         self.last_port = 0
         """How often the stop port was used as the last resort."""
+        self._delay_s = delay_s
+        self._said_s = now
         self._sure_from_s = started_s + delay_s
         self._needed, self._owed = 1, owed
         self._heard = 0
@@ -67,16 +70,19 @@ class Stopping:
         """What to say now."""
         if now < self.wake_at:
             return ()
+        silent = self._rounds >= ROUNDS and now >= self._silent_from_s and not self._heard
+        if silent and now <= self._said_s + self._delay_s:
+            self.wake_at = self._said_s + self._delay_s + 0.01
+            return ()
         self.wake_at = now + REPEAT_S
+        if silent:
+            self.last_port += 1
+            return LAST_HALTS[self.motion]
         self._rounds += 1
+        self._said_s = now
         if now < self._sure_from_s:
             self._needed += 1
-        words = HALTS[self.motion]
-        silent = self._rounds > ROUNDS and now >= self._silent_from_s and not self._heard
-        if silent and self.last_port < STOP_PORT_TIMES:
-            self.last_port += 1
-            return (*words, *LAST_HALTS[self.motion])
-        return words
+        return HALTS[self.motion]
 
     def asks_name(self, now: float) -> bool:
         """Whether the server is asked for its name too: the reply to a move may have been lost,
