@@ -28,6 +28,8 @@ SLOWING_S: Final = 0.12
 ACCELERATION_MPS2, ACCELERATION_RADPS2 = 1.0, 3.0
 """Of a robot that is not heard."""
 DOUBT_M, DOUBT_RAD = 0.03, 0.1
+MOST_M, MOST_MPS = 0.3, 2.0
+"""No wheel goes farther between two counts: one of them is false."""
 WAY_STDDEV: Final = 0.004
 """m after 1 m, growing with its root."""
 WHEEL_HEADING: Final = 0.06
@@ -135,6 +137,9 @@ class MartOdometry:
         if self._zeroed and abs(count) <= abs(count - before):
             before = 0
         wheel_m = (count - before) * settings.metres_per_count
+        if abs(wheel_m) > MOST_M + MOST_MPS * seconds:
+            self._count, self.counted_s, self._zeroed = count, at_s, False
+            return DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
         speed_mps, rate_radps = self.speeds
         wheel_mps = speed_mps + rate_radps * settings.track_m / 2
         most_m = DOUBT_M + ACCELERATION_MPS2 * seconds * seconds / 2

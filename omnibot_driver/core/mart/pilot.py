@@ -14,7 +14,7 @@ from omnibot_driver.core.commands.orders import EmergencyStop
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
 from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S
-from omnibot_driver.core.mart.replies import Fail, Ok, Reply
+from omnibot_driver.core.mart.replies import Fail, Ok, Reply, signed
 from omnibot_driver.core.mart.starts import Starts
 from omnibot_driver.core.mart.states import (
     HALTS,
@@ -231,7 +231,7 @@ class Pilot(Starts):
                 self.health.encoder_failed()
             return
         if word is words.ENC:
-            self._counted(int(reply.number), at_s, now, doubtful=answer.doubtful)
+            self._counted(signed(int(reply.number)), at_s, now, doubtful=answer.doubtful)
         elif word is words.RMRA:
             self.odometry.turned(reply.number, at_s, doubtful=answer.doubtful)
             rolling = self.state in (State.REVERSING, State.TURNING)

@@ -91,3 +91,8 @@ def parse(data: bytes) -> Reply:
         if pattern.fullmatch(rest):
             return Ok(form, rest)
     return Other(data)
+
+
+def signed(count: int) -> int:
+    """Of 32 bits: some servers write a negative count without its sign."""
+    return (count + 2**31) % 2**32 - 2**31

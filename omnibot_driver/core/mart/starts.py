@@ -26,6 +26,8 @@ from omnibot_driver.core.mart.stops import Stops
 from omnibot_driver.core.mart.words import Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
+WAG_S, WAG_UNITS = 0.2, 2
+"""A heading that has not changed for so long is made to: the robot may just drive straight."""
 AGAIN_S: Final = 1.0
 """After a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
@@ -50,6 +52,8 @@ class Starts(Stops):
         _, twist = self._wish(now)
         change = self.loop.change(abs(twist.vx_mps), twist.yaw_rate_radps, now)
         self.commanded = twist
+        if change is None and self._heading_is_told and self._frozen_s > WAG_S:
+            change = (-WAG_UNITS, WAG_UNITS)  # one that lives shows it; the next change undoes it
         if change is None:
             return NO_PACKETS
         right, left = change

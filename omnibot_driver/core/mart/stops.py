@@ -103,12 +103,13 @@ class Stops(Ground):
         if self.state not in ROLLING:
             return ""
         odometry, rolling_s = self.odometry, now - self._begun_s
+        if self._heading_is_told and now - max(odometry.heading_s, self._begun_s) > BLIND_S:
+            return "the relative heading is not answered while the robot drives"
         if now - max(odometry.counted_s, self._begun_s) > BLIND_S:
             return "the encoder is not answered while the robot drives"
         if rolling_s > NO_START_S and abs(odometry.speeds[0]) + abs(odometry.speeds[1]) < 1e-3:
             return "the robot is driven and does not move"
-        frozen_s = now - max(odometry.heading_changed_s, self._begun_s)
-        if frozen_s > FROZEN_S and self._heading_is_told and self._angles_heard > FROZEN_S:
+        if self._heading_is_told and self._frozen_s > FROZEN_S:
             return "the relative heading does not change: the IMU is dead"
         return ""
 
@@ -117,9 +118,10 @@ class Stops(Ground):
         return self.state is State.DRIVING or self.motion in self.health.heading_told
 
     @property
-    def _angles_heard(self) -> float:
-        """For how long of this motion headings have come."""
-        return self.odometry.heading_s - self._begun_s
+    def _frozen_s(self) -> float:
+        """For how long of this motion the headings that came have been the same."""
+        odometry = self.odometry
+        return odometry.heading_s - max(odometry.heading_changed_s, self._begun_s)
 
     def _halt(self, now: float, why: str = "") -> None:
         """Stop what is, or may be, under way."""

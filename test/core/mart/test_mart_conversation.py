@@ -6,8 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver.core.mart import Fail, Form, MartDecoder, Ok, Other, parse, words
+from omnibot_driver.core.mart import Fail, Form, MartDecoder, MartSettings, Ok, Other, parse, words
 from omnibot_driver.core.mart.conversation import Conversation
+from omnibot_driver.core.mart.odometry import MartOdometry
+from omnibot_driver.core.mart.replies import signed
 from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, MAY_SAY, Motion, State, may_say
 from omnibot_driver.core.mart.stopping import REPEAT_S, Stopping
 
@@ -182,3 +184,17 @@ def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
     assert LAST_HALTS[Motion.REVERSE] == (words.SL,)
     assert stop.failed
     assert not stop.hear(parse(b"ok"), 17.0)
+
+
+def test_a_count_below_zero_may_come_without_its_sign() -> None:
+    """A server of 64 bits writes the 32 of the count."""
+    assert [signed(n) for n in (0, 5, -5, 4294967295, 4294966872)] == [0, 5, -5, -1, -424]
+
+
+def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
+    """Neither there nor back."""
+    odometry = MartOdometry(MartSettings())
+    odometry.begin(Motion.REFERENCE, 0.0)
+    for count, at_s in ((0, 0.1), (50, 0.2), (4_000_000, 0.3), (100, 0.4), (150, 0.5)):
+        odometry.counted(count, at_s, doubtful=False)
+    assert odometry.pose.x_m == pytest.approx(100 * 0.0004)

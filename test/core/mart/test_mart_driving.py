@@ -47,6 +47,16 @@ def test_a_square_of_two_metres_ends_where_it_began(left: bool) -> None:
     assert bench.server.chassis.way_m > 7.5
 
 
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+def test_a_quiet_gyro_on_a_straight_way_is_no_dead_imu(firmware: Firmware) -> None:
+    """Nothing turns the robot but the driver, which does so to see it."""
+    bench = MartBench(firmware, gyro_noise_dps=0.0, gyro_bias_dps=0.0).ready()
+    bench.command(0.3, 0.0, 6.0)
+    assert bench.notices == []
+    assert bench.server.chassis.x_m > 1.4
+    assert abs(bench.server.chassis.y_m) < 0.03
+
+
 def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
     """Each after a check of the IMU, and with as few exchanges as that takes."""
     bench = MartBench().ready()
