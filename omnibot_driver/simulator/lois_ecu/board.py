@@ -20,6 +20,7 @@ from omnibot_driver.simulator.lois_ecu.records import HEADINGS, RPM, TORQUE, Rec
 from omnibot_driver.simulator.lois_ecu.sayings import Sayings
 from omnibot_driver.simulator.lois_ecu.sensors import Compass, sentence
 from omnibot_driver.simulator.lois_ecu.settings import LoisSettings
+from omnibot_driver.simulator.lois_ecu.terminal import COMPASS, GPS, Terminal
 from omnibot_driver.simulator.lois_ecu.tuning import CORRECTIONS, adjust, wheels_of
 from omnibot_driver.simulator.lois_ecu.uart import Uart
 from omnibot_driver.simulator.lois_ecu.vehicle import TrueState, Vehicle
@@ -31,6 +32,7 @@ BOOT_S = 2.0
 PERIODS_MS = {0x0D: 1200, 0x0E: 1000, 0x0F: 0xFFFF, 0x10: 400, 0x12: 400, 0x20: 400}
 ONCE, NEVER = 0xFFFE, 0xFFFF
 GPS_SENTENCE_S = 1.0
+BALL_S = 6.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,13 +67,14 @@ class SimulatedLois:
         self._uart = Uart(loses=settings.quirks.deaf_while_sending)
         self.led = self.pressed = False
         self.balls = 0
+        self._ball_at_s = -BALL_S
         self._steps = 0
         self._random = Random(f"lois {settings.seed}")
         self._vehicle = Vehicle(settings, CORRECTIONS, self._random)
         self.motors = self._vehicle.motors
         self._boot()
         if settings.running:
-            self._boots_until_s = 0.0
+            self._boots_until_s = self._compass_at_s = 0.0
 
     def reboot(self) -> None:
         """A power cycle; the robot stays where it is."""
@@ -96,8 +99,10 @@ class SimulatedLois:
         self._timers = {code: _Timer(period) for code, period in PERIODS_MS.items()}
         self._scan: list[int] = []
         self._control_late = False
-        self._control_at_s = self._compass_at_s = self._gps_at_s = self.now_s
-        self.terminal_mode = 0
+        self._control_at_s = self._gps_at_s = self.now_s
+        self._compass_at_s = self._boots_until_s
+        self._terminal = Terminal(quirks)
+        self._button_pressed = False
         self._button_news: bool | None = None
         self._records = Recorder(quirks, self.wheels)
 
@@ -122,6 +127,11 @@ class SimulatedLois:
         return self._uart.lost_bytes
 
     @property
+    def terminal_mode(self) -> int:
+        """0 or 4: it speaks for itself."""
+        return self._terminal.mode
+
+    @property
     def driven(self) -> bool:
         """Whether the motors have power."""
         return any(self._applied_duty)
@@ -134,7 +144,13 @@ class SimulatedLois:
     def press(self, pressed: bool) -> None:
         """The emergency stop button."""
         self.pressed = pressed
-        self._button_news = pressed
+        self._button_pressed = True
+        if not (self._uart.deaf and self.settings.quirks.button_waits_while_sending):
+            self._serve_button()
+
+    def _serve_button(self) -> None:
+        self._button_pressed = False
+        self._button_news = self.pressed
         self._applied_duty = (0, 0)
         for channel in self.wheels:
             channel.release()
@@ -198,6 +214,8 @@ class SimulatedLois:
         if self._uart.deaf:
             self._pending[index] = (is_long, direction)
             return
+        if self.settings.quirks.deaf_while_counting:
+            self._uart.miss()
         self.wheels[index].edge(at_s, is_long, direction)
         if isinstance(self.odometry, FirmwareOdometry):
             self.odometry.tick(at_s, self.wheels[0].rpm, self.wheels[1].rpm)
@@ -226,17 +244,21 @@ class SimulatedLois:
         if self.now_s >= self._compass_at_s + self.settings.compass_period_s:
             self._compass_at_s += self.settings.compass_period_s
             self._compass_reads()
-        if self.terminal_mode == 1 and self.now_s >= self._gps_at_s + GPS_SENTENCE_S:
+        if self.now_s >= self._gps_at_s + GPS_SENTENCE_S:
             self._gps_at_s = self.now_s
             fix = self._sayings.fix(self.now_s)
             clock = "".join(f"{number:02d}" for number in fix.time)
-            self._uart.say(sentence(f"GPRMC,{clock}.00,A"), deaf=False)
+            self._pass_on(self._terminal.sensor(GPS, sentence(f"GPRMC,{clock}.00,A")))
+        self._pass_on(self._terminal.mixed())
 
     def _compass_reads(self) -> None:
         heading = self._compass.read(self.truth.yaw_rad)
-        if self.terminal_mode == 2:
-            self._uart.say(sentence(f"HEHDT,{heading % 360}.0,T"), deaf=False)
+        self._pass_on(self._terminal.sensor(COMPASS, sentence(f"HCHDT,{heading % 360}.0,T")))
         self._say_record(self._records.heading(heading))
+
+    def _pass_on(self, data: bytes) -> None:
+        if data:
+            self._uart.say(data, deaf=False)
 
     def _catch_up(self) -> None:
         """What waited while interrupts were off."""
@@ -244,25 +266,34 @@ class SimulatedLois:
         for index, (is_long, direction) in pending.items():
             self._edge(index, self.now_s, is_long, direction)
         self._uart.hear_kept()
+        if self.settings.quirks.clock_stops_while_sending:
+            self._clock_ms += 1
+        if self._button_pressed:
+            self._serve_button()
 
     # The main loop
 
     def _main_loop(self) -> None:
-        if not self._scan:
-            while self._uart.input and not self._uart.sending:
-                found = self._reader.take(self._uart.input.popleft())
-                if found is not None:
-                    self._obey(*found)
-            self._say_record(self._records.of_wheels())
-            self._scan = list(self._timers)
-        while self._scan and not self._uart.sending:
-            self._periodic(self._scan.pop(0))
-        if not self._scan and not self._uart.sending and self._button_news is not None:
-            pressed, self._button_news = self._button_news, None
-            self._say(wire.line(0x05, int(pressed)), deaf=False, button=True)
+        """What is left of a scan, then a whole one: both take less than a millisecond."""
+        for _ in range(2):
+            if not self._scan:
+                self._read_input()
+                self._say_record(self._records.of_wheels())
+                self._scan = list(self._timers)
+            while self._scan and not self._uart.sending:
+                self._periodic(self._scan.pop(0))
+            if not self._scan and not self._uart.sending and self._button_news is not None:
+                pressed, self._button_news = self._button_news, None
+                self._say(wire.line(0x05, int(pressed)), deaf=False, button=True)
+
+    def _read_input(self) -> None:
+        while self._uart.input and not self._uart.sending:
+            found = self._reader.take(self._uart.input.popleft())
+            if found is not None:
+                self._obey(*found)
 
     def _say(self, data: bytes, *, deaf: bool = True, button: bool = False) -> None:
-        if self.terminal_mode in (1, 2, 3) and not (
+        if self._terminal.on and not (
             button and not self.settings.quirks.button_is_lost_in_terminal_mode
         ):
             return
@@ -306,15 +337,15 @@ class SimulatedLois:
             left.command_rpm(signed[0])
             right.command_rpm(signed[1])
         elif command == 0x03:
-            self.led = low != 0
+            self.led = low & 0xFF != 0
         elif command in (RPM, TORQUE, HEADINGS):
             self._records.start(command, payload)
         elif command in self._timers:
             if command != 0x20 or not quirks.odometry_period_is_fixed:
                 self._timers[command] = _Timer(low, self._clock_ms)
         elif command == 0x11:
-            self.terminal_mode = low & 0xFF
-            self._reader.checks = self.terminal_mode != 4
+            self._terminal.mode = low & 0xFF
+            self._reader.checks = self._terminal.mode != 4
             if quirks.terminal_mode_zeroes_correction:
                 left.short_correction = wire.number_of(payload)
         elif command == 0x18:
@@ -323,6 +354,9 @@ class SimulatedLois:
             if not quirks.reset_clears_ticks_only:
                 self.odometry.clear()
         elif command == 0x19:
-            self.balls += 1
+            still = self.now_s < self._ball_at_s + BALL_S and quirks.one_ball_in_six_seconds
+            if not still:
+                self.balls += 1
+                self._ball_at_s = self.now_s
         else:
             adjust(self.wheels, command, wire.number_of(payload), quirks)

@@ -11,6 +11,7 @@ from omnibot_driver.simulator.lois_ecu.motors import Gains, SpeedController
 from omnibot_driver.simulator.lois_ecu.settings import Quirks
 
 TIMER_US = 100
+SLOW_TIMER_US = 7251 / 72
 TIMER_COUNTS = 0x10000
 SHORTEST_US = 5000
 LIMIT_RPM = 50
@@ -29,6 +30,7 @@ class WheelChannel:
         self, quirks: Quirks, steps: int, corrections: tuple[float, float], gains: Gains
     ) -> None:
         self._quirks, self._steps = quirks, steps
+        self._timer_us = SLOW_TIMER_US if quirks.slow_timer else TIMER_US
         self.short_correction, self.long_correction = corrections
         self.controller = SpeedController(gains)
         self.ticks = 0
@@ -43,6 +45,7 @@ class WheelChannel:
         """Since the odometry took them; signed as the wheel turns."""
         self.record: list[int] = []
         self.record_left = 0
+        self._records_torque = False
 
     # What the encoder tells
 
@@ -58,7 +61,7 @@ class WheelChannel:
         ):
             self._target -= 1
         self.turned_ticks += direction
-        count = int(at_s * 1e6) // TIMER_US % TIMER_COUNTS
+        count = int(at_s * 1e6 / self._timer_us) % TIMER_COUNTS
         passed_us = (count - self._count) % TIMER_COUNTS * TIMER_US
         self._count, self._ticked_s = count, at_s
         passed_us = int(passed_us * (self.long_correction if is_long else self.short_correction))
@@ -69,7 +72,8 @@ class WheelChannel:
             sign = self._target if quirks.sign_of_command else direction
             self.exact_rpm = copysign(exact, sign)
             self.rpm = int(copysign(int(exact), sign))
-        if self.record_left and passed_us > SHORTEST_US and len(self.record) < RECORD_DEPTH:
+        records = self.record_left and not self._records_torque
+        if records and passed_us > SHORTEST_US and len(self.record) < RECORD_DEPTH:
             unit_us = 100 if quirks.records_in_100_us else 0.1
             self._sample(min(int(passed_us / unit_us), 0xFFFF))
 
@@ -80,15 +84,16 @@ class WheelChannel:
 
     # Records
 
-    def start_record(self, samples: int) -> None:
+    def start_record(self, samples: int, *, torque: bool) -> None:
         """Forget what was recorded."""
         if not self._quirks.large_records_never_end:
             samples = min(samples, RECORD_DEPTH)
         self.record, self.record_left = [], samples
+        self._records_torque = torque
 
     def torque(self) -> None:
         """One reading of the current."""
-        if self.record_left and len(self.record) < RECORD_DEPTH:
+        if self.record_left and self._records_torque and len(self.record) < RECORD_DEPTH:
             self._sample(200 + 25 * abs(self.duty_percent))
 
     def _sample(self, value: int) -> None:

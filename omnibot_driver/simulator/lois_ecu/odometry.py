@@ -11,6 +11,7 @@ from omnibot_driver.simulator.lois_ecu.settings import LoisSettings
 
 TIMER_COUNTS = 0x10000
 COUNT_S = 1e-4
+SLOW_COUNT_S = 7251 / 72e6
 
 
 class DocumentedOdometry:
@@ -47,19 +48,27 @@ class FirmwareOdometry(DocumentedOdometry):
     """From the integer speeds that were measured last, at each tick of either wheel.
 
     ``stands``: at equal speeds the position does not move. ``divides``: the velocity is the way
-    over the time since the last tick, which may be none.
+    over the time since the last tick, which may be none. ``slow``: a count takes 0.7 % too long.
     """
 
     def __init__(
-        self, steps: int, radius_m: float, track_m: float, *, stands: bool, divides: bool
+        self,
+        steps: int,
+        radius_m: float,
+        track_m: float,
+        *,
+        stands: bool,
+        divides: bool,
+        slow: bool,
     ) -> None:
         super().__init__(steps, radius_m, track_m)
         self._stands, self._divides = stands, divides
+        self._timer_s = SLOW_COUNT_S if slow else COUNT_S
         self._count: int | None = None
 
     def tick(self, at_s: float, left_rpm: int, right_rpm: int) -> None:
         """One edge of either wheel, served at this time."""
-        count = int(at_s * 1e4) % TIMER_COUNTS
+        count = int(at_s / self._timer_s) % TIMER_COUNTS
         before, self._count = self._count, count
         if before is None:
             return
@@ -86,7 +95,7 @@ def odometry_of(settings: LoisSettings) -> DocumentedOdometry:
     quirks = settings.quirks
     stands, divides = quirks.odometry_stands_at_equal_speeds, quirks.velocity_may_be_nan
     if stands or divides or quirks.keeps_speed_of_stalled_wheel:
-        return FirmwareOdometry(*geometry, stands=stands, divides=divides)
+        return FirmwareOdometry(*geometry, stands=stands, divides=divides, slow=quirks.slow_timer)
     return DocumentedOdometry(*geometry)
 
 

@@ -29,7 +29,7 @@ class Recorder:
             self._headings, self._wanted = [], payload
             return
         for channel, samples in zip(self._wheels, (payload >> 16, payload & 0xFFFF), strict=True):
-            channel.start_record(samples)
+            channel.start_record(samples, torque=number == TORQUE)
 
     def control(self) -> None:
         """A step of the controllers: a sample of torque."""
@@ -39,7 +39,7 @@ class Recorder:
 
     def heading(self, heading: int) -> bytes:
         """A sample of the compass; the record, where it is complete."""
-        if self.number != HEADINGS or not self._wanted:
+        if self.number != HEADINGS:
             return b""
         full = len(self._headings) >= min(self._wanted, 2 * RECORD_DEPTH)
         if not full:

@@ -27,10 +27,14 @@ class Quirks:
     clock_in_ms: the time of 0x12 is in ms.
     clock_stops_while_sending: and does not run while a group is sent.
     deaf_while_sending: characters that come meanwhile are lost, but for the first.
+    deaf_while_counting: the same for 0.2 ms with each tick.
+    button_waits_while_sending: a press takes the power away when the group, or record, has gone.
     odometry_period_is_fixed: writing 0x20's period does nothing.
     terminal_mode_zeroes_correction: every write of 0x11 overwrites the left short correction.
     button_is_lost_in_terminal_mode: a press is not told.
+    terminal_mixes_sensors: each mode passes on both sensors, character by character.
     reset_clears_ticks_only: odometry and set-points stay.
+    one_ball_in_six_seconds: 0x19 is ignored while a ball is on its way.
     gps_is_ignored: position, time and date are zeros.
     headings_average_over_north: the mean of 359, 1 and 1 is 120.
     records_in_100_us: not in 100 ns.
@@ -39,7 +43,8 @@ class Quirks:
     large_records_never_end: more than 1024 samples do not fit.
     lenient_hex: a payload that is no number is obeyed if its checksum is right.
     limits_rpm: beyond 50 RPM it drives 50.
-    fast_control: each 91 ms instead of 200 ms.
+    fast_control: each 91 ms instead of 200 ms, with the same coefficients.
+    slow_timer: one count of 100 us takes 100.7 us, so each speed is told 0.7 % too high.
     slow_boot: silent and deaf for two seconds; what comes meanwhile is read then.
     """
 
@@ -56,10 +61,14 @@ class Quirks:
     clock_in_ms: bool = False
     clock_stops_while_sending: bool = False
     deaf_while_sending: bool = False
+    deaf_while_counting: bool = False
+    button_waits_while_sending: bool = False
     odometry_period_is_fixed: bool = False
     terminal_mode_zeroes_correction: bool = False
     button_is_lost_in_terminal_mode: bool = False
+    terminal_mixes_sensors: bool = False
     reset_clears_ticks_only: bool = False
+    one_ball_in_six_seconds: bool = False
     gps_is_ignored: bool = False
     headings_average_over_north: bool = False
     records_in_100_us: bool = False
@@ -69,6 +78,7 @@ class Quirks:
     lenient_hex: bool = False
     limits_rpm: bool = False
     fast_control: bool = False
+    slow_timer: bool = False
     slow_boot: bool = False
 
 

@@ -32,6 +32,7 @@ class Uart:
         self._sending: deque[tuple[bytearray, bool]] = deque()
         self._out_credit = 0.0
         self._kept: int | None = None
+        self._misses = False
 
     @property
     def sending(self) -> bool:
@@ -52,18 +53,27 @@ class Uart:
         """After what is to be sent already."""
         self._sending.append((bytearray(data), deaf))
 
+    def miss(self) -> None:
+        """The processor serves something else for 0.2 ms of this step: a character is lost."""
+        self._misses = True
+
     def listen(self) -> None:
         """One step."""
+        came = 0
         self._in_credit = min(self._in_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
         while self._inbound and self._in_credit >= 1.0:
             self._in_credit -= 1.0
             byte = self._inbound.popleft()
-            if not (self.deaf and self._loses):
+            came += 1
+            if self._misses and came == 2:
+                self.lost_bytes += 1
+            elif not (self.deaf and self._loses):
                 self._hear(byte)
             elif self._kept is None:
                 self._kept = byte
             else:
                 self.lost_bytes += 1
+        self._misses = False
 
     def send(self, sent: bytearray) -> bool:
         """One step; whether interrupts are on again, so that ``hear_kept`` is to follow."""

@@ -6,11 +6,13 @@ A line is ``:``, two digits of command, eight of payload, two of checksum (XOR o
 line feed. Knows no meaning of a command.
 """
 
+import re
 import struct
 from collections.abc import Iterator
 from string import hexdigits
 
 LINE_CHARACTERS = 14
+LEADING_HEX = re.compile(r"[ \t\n\v\f\r]*([-+]?)(?:0[xX](?=[0-9a-fA-F]))?([0-9a-fA-F]+)")
 CHECKED_CHARACTERS = 11
 
 
@@ -54,8 +56,8 @@ def sequence(command: int, payloads: list[int]) -> bytes:
 class LineReader:
     """What the board understands, character by character.
 
-    ``checks``: whether lines have a checksum. ``lenient``: digits that are none end their field
-    early, as C's strtol has it, instead of making the line wrong.
+    ``checks``: whether lines have a checksum. ``lenient``: fields are read as C's strtol does, with
+    space, sign and prefix, up to what is no digit, instead of making the line wrong.
     """
 
     def __init__(self, *, lenient: bool) -> None:
@@ -66,8 +68,6 @@ class LineReader:
     def take(self, character: int) -> tuple[int, int] | None:
         """Command and payload of the line that this character completes."""
         letter = chr(character)
-        if letter == "\r":
-            return None
         length = LINE_CHARACTERS if self.checks else LINE_CHARACTERS - 2
         if letter == ":" or len(self._buffer) >= length:
             self._buffer.clear()
@@ -79,6 +79,7 @@ class LineReader:
         if not self._lenient and not all(set(field) <= set(hexdigits) for field in fields):
             return None
         command, high, low, sent = map(_leading_hex, fields)
+        high, low = high & 0xFFFF, low & 0xFFFF
         if self.checks and sent != _sum_of(text[:CHECKED_CHARACTERS]):
             return None
         return command, high * 0x10000 + low
@@ -92,9 +93,5 @@ class LineReader:
 
 
 def _leading_hex(field: str) -> int:
-    digits = ""
-    for character in field:
-        if character not in hexdigits:
-            break
-        digits += character
-    return int(digits or "0", 16)
+    found = LEADING_HEX.match(field)
+    return int(found[1] + found[2], 16) if found else 0

@@ -181,7 +181,7 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
     assert stood[-1]
     assert bench.written[begun][1].startswith(b":01000000003b\n")
     bench.run(2.0)
-    assert told(bench, TerminalLine)[-1].text.startswith("$HEHDT")
+    assert told(bench, TerminalLine)[-1].text.startswith("$HCHDT")
     assert bench.robot.stands
     bench.drive(0.0)
 

@@ -6,12 +6,14 @@ import math
 from collections.abc import Callable
 from dataclasses import fields, replace
 from itertools import pairwise
+from statistics import median
 
 import pytest
 from lois_rig import Rig, odometry_in, ticks_in
 
 from omnibot_driver.core.lois_ecu import (
     PERIOD_OFF,
+    DistributeBall,
     EStopButton,
     GpsPosition,
     Heading,
@@ -55,12 +57,7 @@ def ticks_of_forward_targets(quirks: Quirks) -> bool:
 def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
     """Less than three quarters of a straight drive are in 0x20, once both wheels turn alike."""
     rig = Rig(quirks).booted()
-    for setting, number in zip(
-        (Setting.RIGHT_KP, Setting.RIGHT_TN, Setting.RIGHT_TD),
-        (0.4412, 0.2865, 0.6495),
-        strict=True,
-    ):
-        rig.say(WriteSetting(setting, number))
+    rig.say(WriteSetting(Setting.RIGHT_KP, 0.4412), WriteSetting(Setting.RIGHT_TN, 0.2865))
     rig.drive(STRAIGHT, STRAIGHT, 10.0)
     last, truth = odometry_in(rig.run(1.0))[-1], rig.board.truth
     return math.hypot(last.x_m, last.y_m) < 0.75 * math.hypot(truth.x_m, truth.y_m)
@@ -173,6 +170,32 @@ def deaf_while_sending(quirks: Quirks) -> bool:
     return obeyed < 295
 
 
+def deaf_while_counting(quirks: Quirks) -> bool:
+    """At full speed more than a tenth of single lines are lost."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetDuty(100, 100))
+    rig.run(1.0)
+    before = len(rig.board.commands)
+    for number in range(300):
+        rig.board.receive(encode_command(SetDuty(100, 90 + number % 10)))
+        rig.run(0.05 + number % 7 / 100)
+    return len(rig.board.commands) - before < 270
+
+
+def button_waits_while_sending(quirks: Quirks) -> bool:
+    """A record of 100 samples takes 0.12 s."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetDuty(50, 50), RecordTorque(100, 100))
+    while not any(start in rig.board.step() for start in (b":0405", b":1705")):
+        pass
+    rig.board.press(True)
+    rig.board.step()
+    rig.board.step()
+    return rig.board.driven
+
+
 def odometry_period_is_fixed(quirks: Quirks) -> bool:
     """0x20 cannot be turned off."""
     rig = Rig(quirks)
@@ -199,6 +222,38 @@ def button_is_lost_in_terminal_mode(quirks: Quirks) -> bool:
     heard = rig.run(1.0)
     rig.say(SetTerminalMode(TerminalMode.HOST))
     return EStopButton(True) not in heard + rig.run(1.0)
+
+
+def terminal_mixes_sensors(quirks: Quirks) -> bool:
+    """The compass speaks in the GPS's mode."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetTerminalMode(TerminalMode.GPS))
+    return b"$HCHDT" in b"".join(rig.board.step() for _ in range(100))
+
+
+def one_ball_in_six_seconds(quirks: Quirks) -> bool:
+    """The second one is ignored, the one after that is not."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(DistributeBall(), DistributeBall())
+    rig.run(6.0)
+    rig.say(DistributeBall())
+    return rig.board.balls == 2
+
+
+def slow_timer(quirks: Quirks) -> bool:
+    """It measures 0.7 % more than there is."""
+    rig = Rig(quirks).booted()
+    rig.drive(30, 30, 0.5)
+    rig.say(SetDuty(50, 50))
+    rig.run(2.0)
+    parts = []
+    for _ in range(500):
+        rig.board.step()
+        parts.append(rig.board.wheels[0].exact_rpm / rig.board.motors[0].rpm)
+    near = [part for part in parts if abs(part - 1) < 0.03]  # no edge that was served late
+    return sum(near) / len(near) > 1.0035
 
 
 def reset_clears_ticks_only(quirks: Quirks) -> bool:
@@ -290,7 +345,11 @@ def limits_rpm(quirks: Quirks) -> bool:
     """At 50."""
     rig = Rig(quirks).booted()
     rig.drive(58, 58, 30.0)
-    return rig.board.motors[1].rpm < 53
+    speeds = []
+    for _ in range(300):
+        rig.board.step()
+        speeds.append(rig.board.motors[0].rpm)
+    return median(speeds) < 55
 
 
 def fast_control(quirks: Quirks) -> bool:
