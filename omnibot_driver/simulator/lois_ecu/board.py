@@ -195,14 +195,14 @@ class SimulatedLois:
             self._steps += 1
             for edge in self._vehicle.advance(self._applied_duty, self.now_s, STEP_S):
                 self._edge(edge.index, edge.at_s, edge.is_long, edge.direction)
-            self._uart.listen()
+            self._terminal.heard(self._uart.listen())
             if self.now_s < self._boots_until_s:
                 self._clock_ms += 1
                 continue
             self._interrupts()
             if self._uart.send(sent):
                 self._catch_up()
-            if not self._uart.sending:
+            if not self._uart.sending and not self._terminal.busy:
                 self._main_loop()
         return bytes(sent)
 
@@ -265,7 +265,7 @@ class SimulatedLois:
         pending, self._pending = self._pending, {}
         for index, (is_long, direction) in pending.items():
             self._edge(index, self.now_s, is_long, direction)
-        self._uart.hear_kept()
+        self._terminal.heard(self._uart.hear_kept())
         if self.settings.quirks.clock_stops_while_sending:
             self._clock_ms += 1
         if self._button_pressed:

@@ -34,6 +34,8 @@ class Quirks:
     button_is_lost_in_terminal_mode: a press is not told.
     terminal_mixes_sensors: each mode passes on both sensors, character by character.
     reset_clears_ticks_only: odometry and set-points stay.
+    terminal_passes_input_on: what the host says goes to the sensor at its baud rate (9600, 4800),
+        and the board reads no further before it has gone.
     one_ball_in_six_seconds: 0x19 is ignored while a ball is on its way.
     gps_is_ignored: position, time and date are zeros.
     headings_average_over_north: the mean of 359, 1 and 1 is 120.
@@ -68,6 +70,7 @@ class Quirks:
     button_is_lost_in_terminal_mode: bool = False
     terminal_mixes_sensors: bool = False
     reset_clears_ticks_only: bool = False
+    terminal_passes_input_on: bool = False
     one_ball_in_six_seconds: bool = False
     gps_is_ignored: bool = False
     headings_average_over_north: bool = False

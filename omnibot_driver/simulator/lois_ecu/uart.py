@@ -57,9 +57,9 @@ class Uart:
         """The processor serves something else for 0.2 ms of this step: a character is lost."""
         self._misses = True
 
-    def listen(self) -> None:
-        """One step."""
-        came = 0
+    def listen(self) -> int:
+        """One step; how many characters were heard."""
+        came = heard = 0
         self._in_credit = min(self._in_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
         while self._inbound and self._in_credit >= 1.0:
             self._in_credit -= 1.0
@@ -69,11 +69,13 @@ class Uart:
                 self.lost_bytes += 1
             elif not (self.deaf and self._loses):
                 self._hear(byte)
+                heard += 1
             elif self._kept is None:
                 self._kept = byte
             else:
                 self.lost_bytes += 1
         self._misses = False
+        return heard
 
     def send(self, sent: bytearray) -> bool:
         """One step; whether interrupts are on again, so that ``hear_kept`` is to follow."""
@@ -90,11 +92,13 @@ class Uart:
                     return True
         return False
 
-    def hear_kept(self) -> None:
-        """The character that the hardware has kept."""
-        if self._kept is not None:
-            self._hear(self._kept)
-            self._kept = None
+    def hear_kept(self) -> int:
+        """The character that the hardware has kept; how many were heard, 0 or 1."""
+        if self._kept is None:
+            return 0
+        self._hear(self._kept)
+        self._kept = None
+        return 1
 
     def _hear(self, byte: int) -> None:
         if len(self.input) < INPUT_DEPTH:

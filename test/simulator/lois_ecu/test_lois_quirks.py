@@ -232,6 +232,17 @@ def terminal_mixes_sensors(quirks: Quirks) -> bool:
     return b"$HCHDT" in b"".join(rig.board.step() for _ in range(100))
 
 
+def terminal_passes_input_on(quirks: Quirks) -> bool:
+    """The compass takes 34 lines a second; the board cannot obey more."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetTerminalMode(TerminalMode.COMPASS))
+    for _ in range(100):
+        rig.board.receive(encode_command(SetDuty(0, 0)))
+        rig.run(0.02)
+    return len(rig.board.commands) < 20
+
+
 def one_ball_in_six_seconds(quirks: Quirks) -> bool:
     """The second one is ignored, the one after that is not."""
     rig = Rig(quirks)
