@@ -8,6 +8,7 @@ from random import Random
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.lois_ecu import Setting
 from omnibot_driver.core.lois_ecu.board import LoisEcu
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import LoisReading
@@ -15,6 +16,20 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import QUIRKS, Firmware, LoisSettings, SimulatedLois
 
 STOP = (0.0, 0.0)
+HOST_GAINS = LoisEcuSettings(
+    low_pass=0.1,
+    written={
+        Setting.LEFT_FEED_FORWARD: 2.0,
+        Setting.LEFT_KP: 0.629402,
+        Setting.LEFT_TN: 0.301907,
+        Setting.LEFT_TD: 0.611789,
+        Setting.RIGHT_FEED_FORWARD: 2.0,
+        Setting.RIGHT_KP: 0.470583,
+        Setting.RIGHT_TN: 0.232542,
+        Setting.RIGHT_TD: 0.60868,
+    },
+)
+"""With those that the board boots with, the public firmware's right wheel swings and stands."""
 REPEAT_S = 0.05
 
 Program = list[tuple[float, tuple[float, float]]]
@@ -112,14 +127,17 @@ def wrong(firmware: Firmware, seed: int) -> LoisSettings:
 
 
 class Rig:
-    """A board that is driven; ``estimates`` are all that came, each with the truth beside it."""
+    """A board that is driven, by default with the gains of its own host.
+
+    ``estimates`` are all that came, each with the truth beside it.
+    """
 
     def __init__(
         self, settings: LoisSettings, ours: LoisEcuSettings | None = None, *, loss: float = 0.0
     ) -> None:
         self._loss, self._random = loss, Random(f"line {settings.seed}")
         self.board = SimulatedLois(settings)
-        self.driver = LoisEcu(LoisEcuSettings() if ours is None else ours)
+        self.driver = LoisEcu(HOST_GAINS if ours is None else ours)
         self.estimates: list[tuple[FusedOdometry, Pose]] = []
         self.readings: list[LoisReading] = []
         self.way_m = self.turned_rad = 0.0
