@@ -15,6 +15,7 @@ from omnibot_driver.boards.lois_ecu_parameters import (
     WRITTEN,
     require_checksum_in_terminal_mode,
     require_possible_periods,
+    require_slow_commands_in_terminal_mode,
 )
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.lois_ecu import PERIOD_OFF, TerminalMode
@@ -43,7 +44,11 @@ PARAMETERS: Final = table(
         "twist_linear_stddev",
         "twist_angular_stddev",
     ),
-    checks=(require_possible_periods, require_checksum_in_terminal_mode),
+    checks=(
+        require_possible_periods,
+        require_checksum_in_terminal_mode,
+        require_slow_commands_in_terminal_mode,
+    ),
 )
 
 

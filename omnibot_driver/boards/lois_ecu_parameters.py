@@ -15,6 +15,8 @@ from omnibot_driver.parameters import Parameter
 
 SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
+MOST_TERMINAL_RATE_HZ: Final = 25.0
+"""Lines of 14 characters; the compass takes 34 of them in a second."""
 
 WHEELS: Final = (
     Parameter(
@@ -230,6 +232,16 @@ def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
         raise ParameterError(
             "parameter 'terminal_mode' must be host while 'checksum' is false: in a terminal mode"
             " the board expects checksums, and would not hear a stop"
+        )
+
+
+def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
+    """Stop goes out at ``command_rate``, and the board passes it on to a sensor of 4800 baud."""
+    if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
+        raise ParameterError(
+            f"parameter 'command_rate' must be at most {MOST_TERMINAL_RATE_HZ:g} Hz in a"
+            f" terminal_mode, not {values['command_rate']:g}: the board would fall behind, and"
+            " hear a stop late or never"
         )
 
 

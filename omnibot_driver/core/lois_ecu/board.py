@@ -228,8 +228,12 @@ class LoisEcu:
         return self._lines(outbound.STOP)
 
     def emergency_stop(self) -> bytes:
-        """RPM 0/0, which alternates with Stop; the board has no latch of its own."""
-        return self._lines(outbound.EMERGENCY_STOP)
+        """RPM 0/0, which alternates with Stop; the board has no latch of its own.
+
+        Nothing in a terminal mode, where Stop alone goes out: the public firmware passes all that
+        it hears on to the sensor, and reads no faster than 480 characters a second.
+        """
+        return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
         """By the drive mode; Stop when it rounds to nothing."""

@@ -271,6 +271,20 @@ def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
     assert not [notice for notice in bench.notices if "checksums" in notice]
 
 
+def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
+    """The public firmware reads no faster than the compass, 4800 baud: Stop alone goes out."""
+    bench = Bench("firmware")
+    configure(bench, COMPASS)
+    bench.run_until(lambda: bench.board.terminal_mode == 2)
+    bench.estop(True)
+    bench.run(3.0)
+    obeyed = len(bench.board.commands)
+    bench.run(1.0)
+    assert len(bench.board.commands) - obeyed > 10
+    configure(bench, LoisEcuSettings())
+    bench.run_until(lambda: bench.board.terminal_mode == 0)
+
+
 def test_a_terminal_mode_ends_a_record() -> None:
     """The board would send it into silence."""
     bench = Bench("firmware")
