@@ -285,6 +285,20 @@ def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass()
     bench.run_until(lambda: bench.board.terminal_mode == 0)
 
 
+def test_a_long_record_is_not_taken_for_damage() -> None:
+    """Its lines are right, although none of them is a report."""
+    bench = Bench("firmware")
+    board = bench.session.board
+    assert isinstance(board, LoisEcuBoard)
+    board.record(RecordKind.TORQUE, 60)
+    advice: set[str | None] = set()
+    while not told(bench, RecordReading):
+        bench.run(0.01)
+        advice.add(board.advice)
+        assert not told(bench, RecordFailed)
+    assert advice == {None}
+
+
 def test_a_terminal_mode_ends_a_record() -> None:
     """The board would send it into silence."""
     bench = Bench("firmware")
