@@ -124,8 +124,10 @@ class SafetyStops:
         if not self._liveness.fell_silent(now):
             return
         self.react(self._measurement.release(), now)
-        self._reporter.silent(
-            self._liveness.silence_s, bytes_came=self._liveness.came_at > self._liveness.heard_at
+        liveness = self._liveness
+        self._reporter.silent(  # a board that lost power leaves a piece of a frame
+            liveness.silence_s,
+            bytes_came=liveness.came_at - liveness.heard_at > liveness.silence_s / 2,
         )
         if self._board.mode is not Mode.UNKNOWN:
             self._board.silence()

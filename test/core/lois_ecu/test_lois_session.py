@@ -299,6 +299,19 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
     assert advice == {None}
 
 
+def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
+    """The piece that is left is no sign of a wrong baud rate."""
+    bench = Bench("firmware")
+    while not bench.board._sending:
+        bench.run(0.01)
+    bench.lois.advance = lambda: []  # type: ignore[method-assign]
+    bench.session.receive(b":1200", bench.now)
+    bench.run(2.0)
+    said = " ".join(str(event) for event in bench.events)
+    assert "nothing comes from the board" in said
+    assert "makes sense" not in said
+
+
 def test_a_terminal_mode_ends_a_record() -> None:
     """The board would send it into silence."""
     bench = Bench("firmware")
