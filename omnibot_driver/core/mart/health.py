@@ -36,24 +36,27 @@ FRONT_IN, REAR_IN = 19, 15
 SEEN_FOR_S: Final = 2.0
 LOWEST_V, HIGHEST_V = 5.0, 40.0
 ENCODER_FAILS: Final = 3
+HEADING_CHANGES: Final = 3
 REFERENCE_FAILS: Final = 2
 """RM may fail once after a stop that took long, and the robot stands."""
 
 
 class Health:
     """``imu``: what its checks have found; ``stranger``: what another server answers;
-    ``heading_told``: motions besides RM in which RMRA was seen to change; ``reference_fails``: how
+    ``heading_told``: motions besides RM in which RMRA was seen to change, and ``heading_changes``
+    how often in the present one; ``reference_fails``: how
     often in a row RM was answered by a bare ``fail``.
     """
 
     def __init__(self, imu: ImuProof) -> None:
         self._imu = imu
-        self.heading_told: set[Motion] = set()
         self.reference_fails = 0
         self.connect()
 
     def connect(self) -> None:
         """Nothing was measured."""
+        self.heading_told: set[Motion] = set()
+        self.heading_changes = 0
         self.stranger = ""
         self.status: int | None = None
         self.volts: float | None = None
@@ -93,6 +96,12 @@ class Health:
     def encoder_answers(self) -> None:
         """ENC was answered."""
         self._encoder_fails = 0
+
+    def heading_changed(self, motion: Motion) -> None:
+        """RMRA has, within this motion: one change may come of a late reply."""
+        self.heading_changes += 1
+        if self.heading_changes >= HEADING_CHANGES:
+            self.heading_told.add(motion)
 
     def reference_moves(self) -> None:
         """The robot moves after an RM that failed."""

@@ -167,7 +167,8 @@ class MartOdometry:
         if self._on_the_spot:
             if self._spin_is_told:
                 return 0.0  # how it rolled out is in what was told
-            turn_rad = 2 * wheel_m / self.settings.track_m
+            ratio = -1.0 if self.left_over_right is None else self.left_over_right
+            turn_rad = wheel_m * (1.0 - ratio) / self.settings.track_m
             told = abs(told_rad - turn_rad) < TOLD_RAD + TOLD_PART * abs(turn_rad)
             if self.motion is Motion.TURN and told:
                 turn_rad = told_rad

@@ -23,7 +23,7 @@ from omnibot_driver.core.mart.states import (
     State,
 )
 from omnibot_driver.core.mart.stopping import REPEAT_S
-from omnibot_driver.core.mart.stops import FROZEN_S, LOST_REPEAT_S, stands
+from omnibot_driver.core.mart.stops import LOST_REPEAT_S, stands
 from omnibot_driver.core.mart.words import Form, Kind, Word
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
@@ -234,9 +234,9 @@ class Pilot(Starts):
             self._counted(signed(int(reply.number)), at_s, now, doubtful=answer.doubtful)
         elif word is words.RMRA:
             self.odometry.turned(reply.number, at_s, doubtful=answer.doubtful)
-            rolling = self.state in (State.REVERSING, State.TURNING)
-            if rolling and self.odometry.heading_changed_s > self._begun_s:
-                self.health.heading_told.add(self.motion)
+            changed = self.odometry.heading_changed_s == at_s and not answer.doubtful
+            if changed and self.state in (State.REVERSING, State.TURNING):
+                self.health.heading_changed(self.motion)
         else:
             self.readings += self.health.measured(word, reply, now)
             self.loop.volts = self.health.volts_or(self._settings.nominal_volts)
@@ -259,11 +259,9 @@ class Pilot(Starts):
             self._spin_seen_radps = rate
         else:
             self._fresh = True
-            self.loop.measured(speed, rate, reading.dyaw_rad, now)
-        if self.state is State.REVERSING and Motion.REVERSE not in self.health.heading_told:
-            right, left = self.loop.units
-            if now - self._begun_s > FROZEN_S and right:
-                self.odometry.left_over_right = left / right
+            blind = self.odometry.left_over_right is not None
+            self.loop.measured(speed, rate, reading.dyaw_rad, now, right_only=blind)
+            self._predict_turn()
 
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
         """A robot that stands is counted: a late copy of a start, another client, or a push."""

@@ -93,17 +93,33 @@ class SpeedLoop:
                 side.gain *= 1.0 + LEARNED * (ratio - 1.0)
 
     @property
-    def units(self) -> tuple[int, int]:
-        """Right and left, along the motion."""
-        return self._right.units, self._left.units
+    def left_over_right(self) -> float:
+        """Of the wheels' speeds, by the units and the learned gains of both motors."""
+        right = self._right.units * self._right.gain
+        return self._left.units * self._left.gain / right if right else 1.0
+
+    @property
+    def balance(self) -> float:
+        """The left motor's gain over the right one's."""
+        return self._left.gain / self._right.gain
 
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
         """Speeds of right and left in m/s. None goes back: the inner one stands at most."""
         half = rate_radps * self.settings.track_m / 2
         return max(0.0, speed_mps + half), max(0.0, speed_mps - half)
 
-    def measured(self, speed_mps: float, rate_radps: float, turned_rad: float, now: float) -> None:
-        """What the robot does, and how far it has turned since the last call."""
+    def measured(
+        self,
+        speed_mps: float,
+        rate_radps: float,
+        turned_rad: float,
+        now: float,
+        *,
+        right_only: bool = False,
+    ) -> None:
+        """What the robot does, and how far it has turned since the last call. ``right_only``: the
+        right wheel alone was measured; the left motor is taken to have changed as the right one.
+        """
         seconds = min(max(0.0, now - self._measured_s), LONGEST_STEP_S)
         self._measured_s = now
         if now - self._rate_changed_s > HOLD_AFTER_S:
@@ -118,8 +134,12 @@ class SpeedLoop:
                 side.window_units_s += side.units * seconds
                 side.window_m += rim_mps * seconds
         if now - self._window_from_s >= LEARN_S:
-            for side in (self._right, self._left):
-                side.learn(self._per_unit_mps)
+            before = self._right.gain
+            self._right.learn(self._per_unit_mps)
+            if right_only:
+                self._left.gain *= self._right.gain / before
+            else:
+                self._left.learn(self._per_unit_mps)
             self._clear(now)
 
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:

@@ -189,7 +189,18 @@ class Starts(Stops):
             self.loop.begin(SLOW_UNITS, True, now)
         elif self._spin_is_fixed:
             self._spin_units = SLOW_UNITS
+        self._predict_turn()
         return self.conversation.ask(start, now, takes_s=_longest_s(start))
+
+    def _predict_turn(self) -> None:
+        """Where RMRA does not tell how the robot turns, the motors' units and gains have to."""
+        told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
+        if self.motion is Motion.REVERSE and not told:
+            self.odometry.left_over_right = self.loop.left_over_right
+        elif self.motion in (Motion.SPIN, Motion.TURN):
+            self.odometry.left_over_right = -self.loop.balance
+        else:
+            self.odometry.left_over_right = None
 
     def _started(self, reply: Ok | Fail, now: float) -> None:
         if isinstance(reply, Fail):
@@ -197,6 +208,7 @@ class Starts(Stops):
             return
         if self.motion is Motion.REFERENCE:
             self.health.reference_fails = 0
+        self.health.heading_changes = 0
         self.state = WHILE[self.motion]
         self._begun_s = now
         self.odometry.heading_changed_s = now

@@ -14,6 +14,7 @@ from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Stop
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.ground import STANDING, Ground
+from omnibot_driver.core.mart.odometry import SLOWING_S
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.speed_loop import turn_is_on_the_spot
 from omnibot_driver.core.mart.states import (
@@ -170,7 +171,7 @@ class Stops(Ground):
         assert stopping is not None
         result, motion = stopping.result, stopping.motion
         if motion is Motion.SPIN and isinstance(result, Ok) and result.form is Form.INTEGER:
-            self._spin_over(result.number, now)
+            self._spin_over(result.number, stopping.began_s, now)
         if motion is Motion.STRAIGHT:
             self.odometry.finish_straight()
         if isinstance(result, Fail):
@@ -181,14 +182,18 @@ class Stops(Ground):
             self.greeted = True
         self._rest(now)
 
-    def _spin_over(self, degrees: float, now: float) -> None:
-        spun_rad = self.odometry.spun_rad
+    def _spin_over(self, degrees: float, stopped_s: float, now: float) -> None:
+        odometry = self.odometry
+        uncounted_s = max(0.0, stopped_s - odometry.counted_s) + SLOWING_S
+        rolled_rad = self._spin_seen_radps * uncounted_s
+        spun_rad = odometry.spun_rad
         if abs(math.radians(degrees) - spun_rad) > 0.3 + 0.4 * abs(spun_rad):
             return
         self.odometry.spin_told(degrees)
         seconds = now - self._begun_s
         if seconds > 1.0 and self._spin_units and abs(spun_rad) > 0.3:
-            steady_radps = self._spin_seen_radps * abs(math.radians(degrees) / spun_rad)
+            whole_rad = abs(spun_rad + rolled_rad)
+            steady_radps = self._spin_seen_radps * abs(math.radians(degrees)) / whole_rad
             self.loop.spun(self._spin_units, steady_radps)
 
     def _lose(self, now: float) -> None:
