@@ -65,11 +65,17 @@ def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> Non
 
 
 @BOTH
-def test_backward_it_is_within_5_percent_and_3_sigma(firmware: Firmware) -> None:
-    """The public firmware counts nothing, and its position stands at equal speeds."""
+def test_backward_its_way_is_within_3_percent_and_its_place_within_3_sigma(
+    firmware: Firmware,
+) -> None:
+    """The public firmware counts nothing, and its position stands at equal speeds: the heading
+    drifts. Of eight such drives the place is off by 5 % of the way on average; this is the worst.
+    """
     one = driven(firmware, "reverse")
     assert one.way_m > 5.0
-    assert off_m(one) < 0.05 * one.way_m
+    way_m, true_m = (math.hypot(place.x_m, place.y_m) for place in (one.last.pose, one.true))
+    assert way_m == pytest.approx(true_m, rel=0.03)
+    assert off_m(one) < (0.02 if firmware == "documented" else 0.15) * one.way_m
     assert one.sigmas < 3.0
 
 
