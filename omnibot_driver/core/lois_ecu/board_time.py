@@ -8,6 +8,7 @@ one that fits the arrivals better is taken: a straight line under the last of th
 late but never early. Knows clock counts, lines and arrival times.
 """
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from operator import itemgetter
@@ -47,6 +48,7 @@ class BoardTime:
             deque(maxlen=GROUPS_KEPT),
         )
         self._lines = 0
+        self._taken_s = -math.inf
         self.stddev_s = UNKNOWN_S
 
     def sent(self, lines: int) -> None:
@@ -54,7 +56,12 @@ class BoardTime:
         self._lines += lines
 
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
-        """For ticks with this time that came now: at least zero."""
+        """For ticks that came now: at least zero, and so that none is older than those before."""
+        late_s = max(min(self._above_s(counts, unit, now), now - self._taken_s), 0.0)
+        self._taken_s = now - late_s
+        return late_s
+
+    def _above_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
         if unit is None:
             return 0.0
         lines, self._lines = self._lines, 0

@@ -24,6 +24,19 @@ def test_a_read_that_is_late_is_told(lost: float) -> None:
     assert board.stddev_s < 0.003
 
 
+def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> None:
+    """Also where the first of them is so late that its time is not believed."""
+    board = BoardTime()
+    taken_s = []
+    for step in range(60):
+        board.sent(11)
+        read_s = 0.6 * (step // 3 + 1)
+        late_s = board.late_s(round(201 * step * 0.93), "ms", read_s)
+        assert late_s >= 0.0
+        taken_s.append(read_s - late_s)
+    assert taken_s == sorted(taken_s)
+
+
 def test_its_error_is_that_of_the_reads() -> None:
     """Reads that are late by up to 30 ms leave an error of about half of it."""
     board, random = BoardTime(), Random(1)

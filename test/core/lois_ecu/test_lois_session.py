@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from any_board import TICK_S, AnyBench, LoisRobot
+from lois_drives import HOST_GAINS
 
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
@@ -346,7 +347,7 @@ def test_every_setting_arrives_however_many_there_are(count: int) -> None:
 @FIRMWARE
 def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> None:
     """They have one arrival time; the robot is driven on, and odometry goes on."""
-    bench = Bench(firmware)
+    bench = Bench(firmware, HOST_GAINS)
     for _ in range(8):
         late: list[bytes] = []
         for step in range(60):
