@@ -303,7 +303,7 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
     """The piece that is left is no sign of a wrong baud rate."""
     bench = Bench("firmware")
-    while not bench.board._sending:
+    while not bench.board._uart.sending:
         bench.run(0.01)
     bench.lois.advance = lambda: []  # type: ignore[method-assign]
     bench.session.receive(b":1200", bench.now)
