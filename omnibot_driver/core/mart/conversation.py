@@ -72,7 +72,9 @@ class Answer:
 
 
 class Conversation:
-    """``delay_s``: how long a datagram may be on its way. ``discarded``: late replies so far."""
+    """``delay_s``: how long a datagram may be on its way. ``discarded``: late replies so far;
+    ``trip_s``: what a query takes, on average.
+    """
 
     def __init__(self, delay_s: float) -> None:
         self.delay_s = delay_s
@@ -84,7 +86,8 @@ class Conversation:
         self.pending: Pending | None = None
         self._owed_until_s: dict[Form, float] = {}
         self._copies_until_s: dict[Form, float] = {}
-        self._trip_s = 0.0
+        self._answers: dict[Word, tuple[str, float]] = {}
+        self.trip_s = 0.0
 
     def may_ask(self, word: Word, now: float) -> bool:
         """Whether nothing is asked, and no late reply can be taken for its own."""
@@ -137,7 +140,7 @@ class Conversation:
         if self.pending is None or now < self.pending.until_s:
             return None
         if self.pending.word.kind is Kind.QUERY:
-            self._trip_s = min(self.delay_s, LOSS * self._trip_s + LOSS_S)
+            self.trip_s = min(self.delay_s, LOSS * self.trip_s + LOSS_S)
         return self.give_up(now)
 
     def hear(self, reply: Reply, now: float) -> Answer | None:
@@ -153,14 +156,25 @@ class Conversation:
         self.pending = None
         took_s = now - pending.sent_s
         if pending.word.kind is Kind.QUERY:
-            self._trip_s += SMOOTHING * (took_s - self._trip_s)
-        return Answer(pending.request, reply, took_s, self._owed(pending.word, now))
+            self.trip_s += SMOOTHING * (took_s - self.trip_s)
+        doubtful = self._owed(pending.word, now) or self._is_copy(pending.word, reply, now)
+        return Answer(pending.request, reply, took_s, doubtful)
+
+    def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
+        """Whether another command was answered alike just now; its reply may have come twice."""
+        if not isinstance(reply, Ok):
+            return False
+        self._answers[word] = reply.text, now + self.delay_s
+        return any(
+            other is not word and text == reply.text and until_s > now
+            for other, (text, until_s) in self._answers.items()
+        )
 
     def _patience_s(self, word: Word) -> float:
         """Queries are short of patience: what drives is not to be blind for long."""
         longest_s = 2 * self.delay_s
         if word.kind in (Kind.QUERY, Kind.CHANGE):
-            longest_s = min(longest_s, max(QUICKEST_S, 4 * self._trip_s))
+            longest_s = min(longest_s, max(QUICKEST_S, 3 * self.trip_s))
         return word.takes_s + longest_s
 
 

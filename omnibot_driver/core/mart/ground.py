@@ -137,6 +137,7 @@ class Ground:
         self._rescue = False
         self.state, self.motion = State.STILL, Motion.NONE
         self._start = None
+        self.odometry.stands = True
         self.commanded = STANDING
         self._fresh = False
         self._polls.press(words.RMRA)
@@ -144,6 +145,13 @@ class Ground:
         self._rested_s = now
         self._counted_at_rest = 0
         self._next_s = -math.inf
+
+    @property
+    def _heading_first(self) -> bool:
+        """After RM the last heading comes before the last count, which ends the motion."""
+        odometry = self.odometry
+        by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE
+        return by_reference and odometry.heading_s < self._rested_s
 
     def _require(self, word: Word) -> None:
         """Whatever is sent is in the table; anything else is a defect, and is not sent."""

@@ -27,7 +27,8 @@ SLOWING_S: Final = 0.12
 """Time constant of a robot that is being stopped."""
 ACCELERATION_MPS2, ACCELERATION_RADPS2 = 1.0, 3.0
 """Of a robot that is not heard."""
-DOUBT_M, DOUBT_RAD = 0.03, 0.1
+DOUBT_M, DOUBT_MPS, DOUBT_RAD = 0.03, 0.3, 0.1
+"""A late count of this motion does no harm, since the next one makes it good."""
 MOST_M, MOST_MPS = 0.3, 2.0
 """No wheel goes farther between two counts: one of them is false."""
 WAY_STDDEV: Final = 0.004
@@ -45,7 +46,7 @@ SPEED_VARIANCES: Final = (0.02**2, 0.03**2)
 
 
 class MartOdometry:
-    """``pose``: at the last count. ``counted_s``: when that was. ``settings`` may be replaced."""
+    """``pose``: at the last count. ``counted_s``: when that was. ``stands``: it was stopped."""
 
     def __init__(self, settings: MartSettings) -> None:
         self.settings = settings
@@ -61,7 +62,7 @@ class MartOdometry:
 
     def connect(self) -> None:
         """Nothing was counted."""
-        self.motion = Motion.NONE
+        self.motion, self.stands = Motion.NONE, True
         self.counted_s = self._heading_s = -math.inf
         self._count: int | None = None
         self._zeroed = self._begins = False
@@ -98,7 +99,7 @@ class MartOdometry:
 
     def begin(self, motion: Motion, now: float) -> None:
         """A motion has begun, and the count with it."""
-        self.motion = motion
+        self.motion, self.stands = motion, False
         self.left_over_right = None
         self._count, self._zeroed, self._begins = 0, True, True
         if motion is Motion.REFERENCE:
@@ -142,7 +143,7 @@ class MartOdometry:
             return DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
         speed_mps, rate_radps = self.speeds
         wheel_mps = speed_mps + rate_radps * settings.track_m / 2
-        most_m = DOUBT_M + ACCELERATION_MPS2 * seconds * seconds / 2
+        most_m = DOUBT_M + DOUBT_MPS * seconds
         if doubtful and not self._begins and abs(wheel_m - wheel_mps * seconds) > most_m:
             return None
         self._begins = False
@@ -158,7 +159,7 @@ class MartOdometry:
 
     def _turn_rad(self, wheel_m: float, at_s: float) -> float:
         """Since the last count."""
-        ahead_s = min(max(0.0, at_s - self._heading_s), 0.2)
+        ahead_s = 0.0 if self.stands else min(max(0.0, at_s - self._heading_s), 0.2)
         turned_rad = self._turned_rad + self._rate_radps * ahead_s
         before_rad, self._turned_by_now_rad = self._turned_by_now_rad, turned_rad
         told_rad = turned_rad - before_rad
@@ -231,15 +232,14 @@ class MartOdometry:
 
     @property
     def speeds(self) -> tuple[float, float]:
-        """m/s and rad/s over the last ``WINDOW_S`` of counts; zero where there are none."""
+        """m/s and rad/s over the last ``WINDOW_S``, and over two counts at least; else zero."""
         if len(self._track) < 2:
             return 0.0, 0.0
         newest_s, way_m, yaw_rad = self._track[-1]
-        for at_s, then_m, then_rad in self._track:
-            if at_s >= newest_s - WINDOW_S and newest_s > at_s:
-                seconds = newest_s - at_s
-                return (way_m - then_m) / seconds, (yaw_rad - then_rad) / seconds
-        return 0.0, 0.0
+        from_s = min(newest_s - WINDOW_S, self._track[-2][0])
+        at_s, then_m, then_rad = next(each for each in self._track if each[0] >= from_s)
+        seconds = max(newest_s - at_s, 1e-3)
+        return (way_m - then_m) / seconds, (yaw_rad - then_rad) / seconds
 
     def forget_speeds(self) -> None:
         """What is counted next is another motion."""

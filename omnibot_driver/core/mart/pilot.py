@@ -248,7 +248,7 @@ class Pilot(Starts):
             return
         self.health.encoder_answers()
         self.readings.append(reading)
-        speed, rate = self.odometry.speeds
+        _speed, rate = self.odometry.speeds
         if self.state is State.STILL:
             if self._moved_by is not None and self.odometry.motion is not Motion.NONE:
                 self._surplus.learn(self._moved_by, self.odometry.moved_m, self.odometry.spun_rad)
@@ -259,9 +259,7 @@ class Pilot(Starts):
             self._spin_seen_radps = rate
         else:
             self._fresh = True
-            blind = self.odometry.left_over_right is not None
-            self.loop.measured(speed, rate, reading.dyaw_rad, now, right_only=blind)
-            self._predict_turn()
+            self._learn(reading.dyaw_rad, now)
 
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
         """A robot that stands is counted: a late copy of a start, another client, or a push."""
@@ -290,6 +288,8 @@ class Pilot(Starts):
 
     def _poll(self, now: float) -> Packets:
         for word in self._polls.due(self.state, now):
+            if word is words.ENC and self._heading_first:
+                continue
             if self.conversation.may_ask(word, now):
                 self._require(word)
                 self._polls.asked(word, now)

@@ -2,7 +2,7 @@
 
 """What is asked when, while nothing else is: each query at its own pace, by the state of motion.
 
-Encoder and heading come first and one after the other; a sonar takes 55 ms, so it is asked only
+Encoder and heading come first, and take turns; a sonar takes 55 ms, so it is asked only
 while the robot stands. Knows queries and states; time is an argument.
 """
 
@@ -45,8 +45,12 @@ class Polls:
         self._asked_s.clear()
 
     def due(self, state: State, now: float) -> list[Word]:
-        """The queries whose time has come, the most pressing first."""
-        return [word for word in PERIODS.get(state, {}) if now >= self._at(word, state)]
+        """The queries whose time has come, first the one that is late by most of its periods: where
+        an exchange takes longer than a period, each has its turn.
+        """
+        periods = PERIODS.get(state, {})
+        late = [word for word in periods if now >= self._at(word, state)]
+        return sorted(late, key=lambda word: self._at(word, state) + periods[word])
 
     def asked(self, word: Word, now: float) -> None:
         """It was sent."""

@@ -22,6 +22,8 @@ SETTLE_S, LEARN_S = 0.45, 0.35
 LARGE_UNITS: Final = 3
 LEARNED: Final = 0.7
 """Part of what a window shows that is taken over at once."""
+LEARN_TRIPS, LESS_PER_S = 4, 10.0
+"""Where exchanges take long the window is longer, and less is taken over."""
 LOWEST_GAIN, HIGHEST_GAIN = 0.4, 2.5
 SLOWEST_MPS: Final = 0.03
 """Of a wheel whose gain can be learned."""
@@ -41,12 +43,12 @@ class _Side:
     window_units_s: float = 0.0
     window_m: float = 0.0
 
-    def learn(self, per_unit_mps: float) -> None:
-        """From the window that is over."""
+    def learn(self, per_unit_mps: float, part: float) -> None:
+        """From the window that is over, by this part."""
         nominal_m = self.window_units_s * per_unit_mps
         if nominal_m > 0.0 and self.window_m > 0.0:
             seen = min(HIGHEST_GAIN, max(LOWEST_GAIN, self.window_m / nominal_m))
-            self.gain += LEARNED * (seen - self.gain)
+            self.gain += part * (seen - self.gain)
 
     def wanted_units(self, speed_mps: float, per_unit_mps: float) -> int:
         """For this speed, by the gain."""
@@ -54,11 +56,14 @@ class _Side:
 
 
 class SpeedLoop:
-    """``settings`` may be replaced; ``volts`` is the battery's, as last told."""
+    """``settings`` may be replaced; ``volts`` is the battery's, as last told; ``trip_s``: what an
+    exchange takes, by which the times of measurements are uncertain.
+    """
 
     def __init__(self, settings: MartSettings) -> None:
         self.settings = settings
         self.volts = settings.nominal_volts
+        self.trip_s = 0.0
         self._right, self._left = _Side(), _Side()
         self.begin(0, False, 0.0)
 
@@ -133,13 +138,14 @@ class SpeedLoop:
             if rim_mps > SLOWEST_MPS:
                 side.window_units_s += side.units * seconds
                 side.window_m += rim_mps * seconds
-        if now - self._window_from_s >= LEARN_S:
+        if now - self._window_from_s >= LEARN_S + LEARN_TRIPS * self.trip_s:
             before = self._right.gain
-            self._right.learn(self._per_unit_mps)
+            part = LEARNED / (1.0 + LESS_PER_S * self.trip_s)
+            self._right.learn(self._per_unit_mps, part)
             if right_only:
                 self._left.gain *= self._right.gain / before
             else:
-                self._left.learn(self._per_unit_mps)
+                self._left.learn(self._per_unit_mps, part)
             self._clear(now)
 
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:

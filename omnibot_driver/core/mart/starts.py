@@ -192,6 +192,14 @@ class Starts(Stops):
         self._predict_turn()
         return self.conversation.ask(start, now, takes_s=_longest_s(start))
 
+    def _learn(self, turned_rad: float, now: float) -> None:
+        """What the motors make of their units."""
+        speed, rate = self.odometry.speeds
+        blind = self.odometry.left_over_right is not None
+        self.loop.trip_s = self.conversation.trip_s
+        self.loop.measured(speed, rate, turned_rad, now, right_only=blind)
+        self._predict_turn()
+
     def _predict_turn(self) -> None:
         """Where RMRA does not tell how the robot turns, the motors' units and gains have to."""
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told

@@ -26,8 +26,8 @@ from omnibot_driver.core.mart.stopping import ANSWERS, Stopping
 from omnibot_driver.core.mart.words import Form
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
-BLIND_S: Final = 0.8
-"""A robot that drives and is not counted for so long is stopped."""
+BLIND_S, TRIPS = 0.8, 3
+"""A robot that drives and is not counted for so long, and for so many exchanges, is stopped."""
 FROZEN_S: Final = 0.5
 """A heading that does not change at all while the robot drives so long comes of no living IMU."""
 NO_START_S: Final = 1.5
@@ -103,12 +103,16 @@ class Stops(Ground):
             return "wanted"
         if self.state not in ROLLING:
             return ""
-        odometry, rolling_s = self.odometry, now - self._begun_s
-        if self._heading_is_told and now - max(odometry.heading_s, self._begun_s) > BLIND_S:
+        odometry = self.odometry
+        blind_s = BLIND_S + TRIPS * self.conversation.trip_s
+        if self._heading_is_told and now - max(odometry.heading_s, self._begun_s) > blind_s:
             return "the relative heading is not answered while the robot drives"
-        if now - max(odometry.counted_s, self._begun_s) > BLIND_S:
+        if now - max(odometry.counted_s, self._begun_s) > blind_s:
             return "the encoder is not answered while the robot drives"
-        if rolling_s > NO_START_S and abs(odometry.speeds[0]) + abs(odometry.speeds[1]) < 1e-3:
+        if (
+            odometry.counted_s - self._begun_s > NO_START_S
+            and abs(odometry.speeds[0]) + abs(odometry.speeds[1]) < 1e-3
+        ):
             return "the robot is driven and does not move"
         if self._heading_is_told and self._frozen_s > FROZEN_S:
             return "the relative heading does not change: the IMU is dead"
@@ -187,7 +191,9 @@ class Stops(Ground):
         uncounted_s = max(0.0, stopped_s - odometry.counted_s) + SLOWING_S
         rolled_rad = self._spin_seen_radps * uncounted_s
         spun_rad = odometry.spun_rad
-        if abs(math.radians(degrees) - spun_rad) > 0.3 + 0.4 * abs(spun_rad):
+        unseen_s = max(0.0, stopped_s - max(odometry.counted_s, self._started_s))
+        expected_rad = spun_rad + self._spin_radps * unseen_s
+        if abs(math.radians(degrees) - expected_rad) > 0.3 + 0.4 * abs(expected_rad):
             return
         self.odometry.spin_told(degrees)
         seconds = now - self._begun_s
