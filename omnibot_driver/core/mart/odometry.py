@@ -29,6 +29,7 @@ ACCELERATION_MPS2, ACCELERATION_RADPS2 = 1.0, 3.0
 """Of a robot that is not heard."""
 DOUBT_M, DOUBT_MPS, DOUBT_RAD = 0.03, 0.3, 0.1
 """A late count of this motion does no harm, since the next one makes it good."""
+LEAST_S: Final = 0.05
 MOST_M, MOST_MPS = 0.3, 2.0
 """No wheel goes farther between two counts: one of them is false."""
 WAY_STDDEV: Final = 0.004
@@ -151,7 +152,7 @@ class MartOdometry:
         turn_rad = self._turn_rad(wheel_m, at_s)
         way_m = 0.0 if self._on_the_spot else wheel_m - turn_rad * settings.track_m / 2
         self._move(way_m, turn_rad, seconds)
-        return DisplacementReading(way_m, 0.0, turn_rad, "body", seconds, 0)
+        return DisplacementReading(way_m, 0.0, turn_rad, "body", max(seconds, LEAST_S), 0)
 
     @property
     def _on_the_spot(self) -> bool:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from mart_bench import MartBench
 
 from omnibot_driver.simulator.common.network import NetworkFaults
+from omnibot_driver.simulator.mart import Firmware
 
 NETWORKS = {
     "good": NetworkFaults(),
@@ -27,6 +28,7 @@ NETWORKS = {
 }
 TWISTS = [(0.3, 0.0), (0.2, 0.3), (0.3, -0.4), (0.0, 0.5), (0.0, -0.5), (-0.2, 0.0), (-0.2, 0.2)]
 WISHES = 12
+FIRMWARES: tuple[Firmware, ...] = ("documented", "firmware", "source")
 
 
 class Outcome(NamedTuple):
@@ -40,7 +42,7 @@ class Outcome(NamedTuple):
 def drive(faults: NetworkFaults, seed: int) -> Outcome:
     """Motions, goals, e-stops and stalls of the driver, then its end."""
     random = Random(seed)
-    bench = MartBench(faults=faults, seed=seed).ready()
+    bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
     longest_s = 0.0
     for _ in range(WISHES):
         if random.random() < 0.3:

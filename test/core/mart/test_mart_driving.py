@@ -299,6 +299,22 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     assert not bench.robot.stands
 
 
+@pytest.mark.parametrize("motion", [(0.3, 0.0), (-0.2, 0.0), (0.0, 0.5)])
+def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
+    motion: tuple[float, float],
+) -> None:
+    """Right behind SM or SRM it would race with them, and hang a port."""
+    bench = MartBench("firmware").ready()
+    bench.command(*motion, 2.5)
+    bench.server.imu.alive = False
+    bench.command(*motion, 6.0)
+    received = bench.server.received
+    first_s = min(at_s for at_s, port, _ in received if port == 1)
+    stops = [at_s for at_s, _, data in received if data in (b"SM", b"SRM") and at_s <= first_s]
+    assert first_s - max(stops) > 0.3
+    assert {port for _, port, _ in received} == {0, 1}
+
+
 def test_an_obstacle_ends_the_way_forward_and_leaves_the_others() -> None:
     """The controller stops by itself, and says nothing until it is asked."""
     bench = MartBench(front_m=1.4).ready()
