@@ -29,7 +29,9 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 BLIND_S, TRIPS = 0.8, 3
 """A robot that drives and is not counted for so long, and for so many exchanges, is stopped."""
 FROZEN_S: Final = 0.5
-"""A heading that does not change at all while the robot drives so long comes of no living IMU."""
+"""A heading that does not change at all while the robot drives so long, and two exchanges more,
+comes of no living IMU.
+"""
 NO_START_S: Final = 1.5
 """A wheel that is driven turns by then."""
 SPIN_RATIO: Final = 0.35
@@ -114,7 +116,8 @@ class Stops(Ground):
             and abs(odometry.speeds[0]) + abs(odometry.speeds[1]) < 1e-3
         ):
             return "the robot is driven and does not move"
-        if self._heading_is_told and self._frozen_s > FROZEN_S:
+        longest_s = FROZEN_S + 2 * self.conversation.trip_s
+        if self._heading_is_told and self._frozen_s > longest_s:
             return "the relative heading does not change: the IMU is dead"
         return ""
 
