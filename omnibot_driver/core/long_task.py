@@ -14,24 +14,21 @@ from omnibot_driver.core.requests import RequestDone
 
 
 class LongTask:
-    """``answers``: those that were not taken yet."""
+    """``answers``: those that were not taken yet; ``wake_at``: when ``tick`` has something to do,
+    infinity while none is under way.
+    """
 
     def __init__(self) -> None:
         self.answers: list[RequestDone] = []
         self._name = ""
         self._token: object = None
-        self._begun_at = self._ends_at = math.inf
+        self._begun_at = self.wake_at = math.inf
         self._driven = False
 
     @property
     def active(self) -> bool:
         """Whether one is under way."""
-        return self._ends_at < math.inf
-
-    @property
-    def wake_at(self) -> float:
-        """When ``tick`` has something to do."""
-        return self._ends_at
+        return self.wake_at < math.inf
 
     def begin(self, name: str, token: object, limit_s: float, now: float) -> None:
         """From now on. ``name`` reads well after "a". Raises RequestRefused while another is."""
@@ -40,7 +37,7 @@ class LongTask:
                 f"a {self._name} is under way; wait for its answer, then call again"
             )
         self._name, self._token, self._driven = name, token, False
-        self._begun_at, self._ends_at = now, now + limit_s
+        self._begun_at, self.wake_at = now, now + limit_s
 
     def is_current(self, token: object) -> bool:
         """Whether the one with this token is under way."""
@@ -50,7 +47,7 @@ class LongTask:
         """It is done, or failed; nothing where it has ended before."""
         if self.is_current(token):
             self.answers.append(RequestDone(token, success, message))
-            self._token, self._begun_at, self._ends_at = None, math.inf, math.inf
+            self._token, self._begun_at, self.wake_at = None, math.inf, math.inf
 
     def give_up(self, reason: str) -> None:
         """Nothing comes of it; nothing where none is under way."""
@@ -65,13 +62,13 @@ class LongTask:
 
     def tick(self, now: float) -> None:
         """Time passed."""
-        if now >= self._ends_at:
-            limit_s = self._ends_at - self._begun_at
+        if now >= self.wake_at:
+            limit_s = self.wake_at - self._begun_at
             self.give_up(f"the board did not complete it within {limit_s:g} s")
 
     def progress(self, now: float) -> str:
         """What is done, and since when; empty while nothing is."""
         if not self.active:
             return ""
-        limit_s = self._ends_at - self._begun_at
+        limit_s = self.wake_at - self._begun_at
         return f"{self._name}: {now - self._begun_at:.0f} s of at most {limit_s:.0f} s"

@@ -360,7 +360,7 @@ class Session:
             packets += due
         if now >= self._board.wake_at:
             packets += self._board.due(now)
-        if self._task.active:
+        if self._task.wake_at < math.inf:
             current = self._commands.current
             self._task.watch(driven=current is not None and not current.is_zero)
         if self._commands.unconfirmed:

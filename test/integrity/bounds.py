@@ -34,7 +34,7 @@ class Bound:
 
     def share(self, chunker: str) -> float:
         """To be delivered. Where both ends are late, a few wait in vain for what is due."""
-        return min(self.delivered, 0.9999) if chunker in BUSY_LOOPS else self.delivered
+        return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 
     def holds(self, chunker: str, score: Score) -> bool:
         """Whether this score reaches the bound."""

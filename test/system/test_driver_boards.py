@@ -141,7 +141,7 @@ def test_what_means_nothing_to_the_board_is_refused(
 @pytest.mark.parametrize(
     ("board", "message"),
     [
-        ("mart", "cannot start: the board mart is not built yet; this driver has omnibot"),
+        ("fejemis", "cannot start: the board fejemis is not built yet; this driver has omnibot"),
         ("martha", "cannot start: parameter 'board' must be one of omnibot"),
     ],
 )

@@ -147,8 +147,8 @@ def test_whoever_has_gains_as_parameters_can_do_it() -> None:
     """By what the driver offers, whatever its board is called."""
     values = PARAMETERS.check_all({})
     require_able("step", values)
-    with pytest.raises(ToolError, match="wheels around its centre"):
-        require_able("geometry", values)
+    with pytest.raises(ToolError, match="the OmniBot.s wheels"):
+        require_able("commission", values)
 
 
 def test_a_robot_is_calibrated_from_its_records(
