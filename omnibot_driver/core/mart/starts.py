@@ -153,6 +153,7 @@ class Starts(Stops):
         reply, was_dead = answer.reply, self.imu.dead
         if self.imu.answered(answer.word, reply, answer.took_s, now):
             if self.imu.dead and not was_dead:
+                self.jobs.cancel(self.health.refusal)
                 self._notice(self.health.refusal, halt=True)
             return
         self._again_s = self.imu.again_s = now + AGAIN_S
@@ -272,6 +273,9 @@ class Starts(Stops):
     def _job(self, now: float) -> Packets:
         request = self.jobs.next(now, stands=self.proof.proved)
         if request is None:
+            return NO_PACKETS
+        if request.word in NEEDS_IMU and self.imu.dead:
+            self.jobs.cancel(self.health.refusal)
             return NO_PACKETS
         if request.word in NEEDS_IMU and not self.imu.fresh(now):
             return self._check(now)

@@ -93,7 +93,7 @@ MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
     State.STOPPING: frozenset({SRM, SM, SL, SS}),
     State.LOST: frozenset({HELLO, SRM, SM, SL, SS}),
 }
-"""All that start, besides only right after a proof of the IMU (RESET or CHECK)."""
+"""All that start, and SB, besides only right after a proof of the IMU (RESET or CHECK)."""
 
 HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.NONE: (),
@@ -129,8 +129,8 @@ STARTS: Final[Mapping[Word, Motion]] = {
 }
 """What a word begins."""
 
-NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL})
-"""With a dead IMU these start the motors and never answer, or start when it is back. MCR and MCL
+NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
+"""With a dead IMU these start the motors and never answer, or go on when it is back. MCR and MCL
 find it out, but some servers turn the robot for half a second first.
 """
 

@@ -7,12 +7,25 @@ from mart_bench import MartBench
 
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart.jobs import Job
+from omnibot_driver.simulator.mart import Firmware
 
 
 def test_the_gyro_is_calibrated_at_rest() -> None:
     """SB, and its reply."""
     done = MartBench().ready().job(Job.BIAS)
     assert (done.token, done.success) == ("token", True)
+
+
+@pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
+def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
+    """SB would never answer, and nothing else would either."""
+    bench = MartBench(firmware).ready()
+    bench.server.imu.alive = False
+    done = bench.job(Job.BIAS)
+    assert not done.success
+    assert "IMU" in done.message
+    assert b"SB" not in bench.said()
+    assert not bench.server.blocked
 
 
 def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
