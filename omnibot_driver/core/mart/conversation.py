@@ -19,6 +19,7 @@ from omnibot_driver.core.mart.words import (
     ENC,
     KNOWN_FAILS,
     MCSTAT,
+    NO_IMU,
     RMRA,
     UNSUPPORTED,
     Form,
@@ -36,8 +37,8 @@ LOSS, LOSS_S = 1.5, 0.02
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Asked at once, whatever reply may still come."""
 
-AT_ONCE: Final = frozenset({CONFLICT, UNSUPPORTED})
-"""A check that is refused is answered before its least time."""
+AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
+"""A check that is refused, or finds no IMU, may be answered before its least time."""
 
 
 @dataclass(frozen=True, slots=True)

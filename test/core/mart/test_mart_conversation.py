@@ -198,3 +198,11 @@ def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
     for count, at_s in ((0, 0.1), (50, 0.2), (4_000_000, 0.3), (100, 0.4), (150, 0.5)):
         odometry.counted(count, at_s, doubtful=False)
     assert odometry.pose.x_m == pytest.approx(100 * 0.0004)
+
+
+@pytest.mark.parametrize("reason", ["could not init", "command not supported"])
+def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
+    """An IMU that does not answer on its bus takes no time."""
+    talk = conversation()
+    talk.ask(words.RESET.request(), 1.0)
+    assert talk.hear(parse(f"fail {reason}".encode()), 1.001) is not None
