@@ -147,7 +147,7 @@ def test_whoever_has_gains_as_parameters_can_do_it() -> None:
     """By what the driver offers, whatever its board is called."""
     values = PARAMETERS.check_all({})
     require_able("step", values)
-    with pytest.raises(ToolError, match="the OmniBot.s wheels"):
+    with pytest.raises(ToolError, match="the OmniBot's wheels"):
         require_able("commission", values)
 
 
