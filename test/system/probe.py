@@ -103,6 +103,10 @@ class Probe:
         assert held.wait(PATIENCE_S), "the graph does not come to look like that"
         self.remove(timer)
 
+    def wait_for_node(self, name: str, namespace: str) -> None:
+        """Its topics may be heard before the node itself is discovered."""
+        self.wait_for_graph(lambda: (name, namespace) in self.node.get_node_names_and_namespaces())
+
     def remove(self, entity: Any) -> None:
         """A publisher, client or timer; by the executor, which must not wait for one that goes."""
         destroy = getattr(self.node, f"destroy_{type(entity).__name__.lower()}")

@@ -52,16 +52,17 @@ def test_what_a_board_lacks_is_not_advertised(
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
     home, node = f"/{driver.namespace}", probe.node
-    assert names(node.get_publisher_names_and_types_by_node(NODE, home), home) == {
-        "odom", "joint_states", "/diagnostics", "heard",
-        f"{NODE}/state", f"{NODE}/estop_active",
-    }  # fmt: skip
-    assert names(node.get_subscriber_names_and_types_by_node(NODE, home), home) == {
-        "cmd_vel", "estop",
-    }  # fmt: skip
-    assert names(node.get_service_names_and_types_by_node(NODE, home), home) == {
-        f"{NODE}/start", f"{NODE}/estop", f"{NODE}/reset_odometry", f"{NODE}/ask",
-    }  # fmt: skip
+    probe.wait_for_node(NODE, home)
+    told = {"odom", "joint_states", "/diagnostics", "heard", f"{NODE}/state"}
+    taken = {"cmd_vel", "estop"}
+    served = {f"{NODE}/{service}" for service in ("start", "estop", "reset_odometry", "ask")}
+    for found, all_of_them in (
+        (node.get_publisher_names_and_types_by_node, told | {f"{NODE}/estop_active"}),
+        (node.get_subscriber_names_and_types_by_node, taken),
+        (node.get_service_names_and_types_by_node, served),
+    ):
+        probe.wait_for_graph(lambda: names(found(NODE, home), home) >= all_of_them)  # noqa: B023
+        assert names(found(NODE, home), home) == all_of_them
     declared = set(probe.call(ListParameters, "list_parameters").result.names)
     assert set(PARAMETERS.by_name) <= declared
     assert not {name for name in declared if "imu" in name or "gyro" in name or "accel_" in name}

@@ -282,11 +282,16 @@ def test_it_runs_inside_the_driver_too(firmware: str, start_driver: Start, probe
     driver = start_driver(f"sim://?firmware={firmware}", board="lois_ecu")
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
-    publishers = probe.node.get_publisher_names_and_types_by_node(NODE, f"/{driver.namespace}")
-    topics = {name.removeprefix(f"/{driver.namespace}/") for name, _ in publishers}
-    assert {"odom", "joint_states"} <= topics
-    assert {"fix", "time_reference", "imu/heading", "estop_button"} <= topics
-    assert "imu/data_raw" not in topics
+    home = f"/{driver.namespace}"
+    probe.wait_for_node(NODE, home)
+
+    def topics() -> set[str]:
+        found = probe.node.get_publisher_names_and_types_by_node(NODE, home)
+        return {name.removeprefix(f"{home}/") for name, _ in found}
+
+    probe.wait_for_graph(lambda: topics() >= {"odom", "joint_states", "fix", "time_reference"})
+    probe.wait_for_graph(lambda: topics() >= {"imu/heading", "estop_button"})
+    assert "imu/data_raw" not in topics()
     assert driver.end(signal.SIGINT) == 0
 
 
