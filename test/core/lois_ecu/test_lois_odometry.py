@@ -27,6 +27,8 @@ from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import Firmware, LoisSettings
 
+pytestmark = pytest.mark.slow
+
 BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 
@@ -44,7 +46,6 @@ def driven(firmware: Firmware, name: str) -> Drive:
     return drive(nominal(firmware, 1), CLASSES[name])
 
 
-@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("name", ["straight", "curve"])
 def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware, name: str) -> None:
@@ -55,7 +56,6 @@ def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware,
     assert abs(one.error.yaw_rad) < math.radians(3.0)
 
 
-@pytest.mark.slow
 @BOTH
 def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> None:
     """One wheel turns backward: the public firmware counts nothing of it."""
@@ -79,7 +79,6 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_3_sigma(
     assert one.sigmas < 3.0
 
 
-@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("name", ["curve", "in place", "reverse", "jerky"])
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
@@ -105,7 +104,6 @@ def test_hard_steering_to_both_sides_is_followed() -> None:
     assert abs(one.error.yaw_rad) < math.radians(5.0)
 
 
-@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("name", ["curve", "in place"])
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(

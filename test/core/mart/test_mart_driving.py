@@ -14,6 +14,8 @@ from omnibot_driver.core.mart.readings import BatteryReading, DockedReading, Son
 from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware, Kind
 
+pytestmark = pytest.mark.slow
+
 FIRMWARES: Final[tuple[Firmware, ...]] = ("documented", "firmware", "source")
 STEPS = [(0.3, 0.0), (0.15, 0.0), (0.3, 0.3), (0.3, -0.3), (-0.2, 0.0), (-0.2, 0.2), (0.0, 0.5)]
 

@@ -12,6 +12,8 @@ from mart_model import Server
 from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.simulator.mart import FIRMWARE, Kind, MartServer, MartSettings
 
+pytestmark = pytest.mark.slow
+
 SETTLES_S: Final = 0.9
 """Longer than any answer but those of controlled moves, which are chosen to last."""
 ON_THE_WIRE: Final = {
