@@ -390,5 +390,5 @@ class Session:
         if reason := self._interlocks.why_not_drive(motion, now):
             raise CommandRefused(f"motion command refused: {reason}")
         self._commands.command(motion, now, expires_at=expires_at)
-        if not motion.is_zero:
+        if not motion.is_zero and self._calibration.wake_at < math.inf:
             self._calibration.give_up("a motion command came in; stop the sender, then call again")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How fast is allowed, and what fits a word on the wire; every limit keeps the direction.
+"""How fast is allowed; every limit keeps the direction.
 
 Pure arithmetic on finite numbers; ``require_finite`` is where others are turned away.
 """
@@ -8,12 +8,9 @@ Pure arithmetic on finite numbers; ``require_finite`` is where others are turned
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
-
-MAX_WORD: Final = 32767
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,11 +103,6 @@ def slow(values: Sequence[float], limit: float) -> tuple[float, ...]:
     """The values scaled together until the largest magnitude is at most ``limit``."""
     largest = max(map(abs, values))
     return tuple(values) if largest <= limit else _scale(values, limit / largest)
-
-
-def to_nearest(count: float) -> int:
-    """The nearest whole count; halves away from zero, so that both signs are alike."""
-    return int(count + 0.5) if count > 0.0 else int(count - 0.5)
 
 
 def _step(now: Sequence[float], wanted: Sequence[float], longest: float) -> tuple[float, ...]:

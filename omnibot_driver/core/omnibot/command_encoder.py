@@ -10,7 +10,7 @@ to have the unit of those that are sent, mm and mrad; nobody has verified it.
 from collections.abc import Sequence
 from typing import Final
 
-from omnibot_driver.core.commands.limits import MAX_WORD, slow, to_nearest
+from omnibot_driver.core.commands.limits import slow
 from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Order, TurnWheels
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.omni import OmniKinematics
@@ -18,9 +18,11 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.omnibot import frames
 from omnibot_driver.core.omnibot.outbound import (
+    MAX_WORD,
     ZEROS_BEFORE_MOTION,
     begins_with_a_letter,
     harmless,
+    nearest,
     transmission,
 )
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
@@ -110,7 +112,7 @@ class CommandEncoder:
                 f" {MAX_WORD / position:.2f} m and {MAX_WORD / heading:.2f} rad can be said:"
                 " ~/reset begins a new frame where the robot stands"
             )
-        if any(begins_with_a_letter(to_nearest(count)) for count in counts):
+        if any(map(begins_with_a_letter, nearest(*counts))):
             raise CommandRefused(
                 f"cmd_pose refused: in the board's own frame it is x {pose.x_m:.2f} m,"
                 f" y {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad, and a damaged line could turn"

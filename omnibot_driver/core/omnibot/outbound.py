@@ -33,7 +33,6 @@ import re
 import struct
 from typing import Final
 
-from omnibot_driver.core.commands.limits import MAX_WORD, to_nearest
 from omnibot_driver.core.omnibot.frames import (
     COMMAND_HEADER,
     FORCE_START,
@@ -41,6 +40,8 @@ from omnibot_driver.core.omnibot.frames import (
     TOGGLE_PAUSE,
     Words,
 )
+
+MAX_WORD: Final = 32767
 
 ZEROS: Final = bytes(8)
 """Seven end any frame that was begun; one may be lost. Three wake a board that has booted."""
@@ -61,12 +62,21 @@ def transmission(*parts: bytes) -> bytes:
 def harmless(counts: tuple[float, float, float]) -> Words:
     """The nearest words, within ``MAX_WORD``, whose bytes are no letter and make no header."""
     a, b, c = counts
-    words = to_nearest(a), to_nearest(b), to_nearest(c)
+    words = nearest(a, b, c)
     if not _HARMFUL(_WORDS(*words)):
         return words
-    last = _nearest(c, 0)
-    middle = _nearest(b, last >> 8 & 0xFF)
-    return _nearest(a, middle >> 8 & 0xFF), middle, last
+    last = _harmless_word(c, words[2], 0)
+    middle = _harmless_word(b, words[1], last >> 8 & 0xFF)
+    return _harmless_word(a, words[0], middle >> 8 & 0xFF), middle, last
+
+
+def nearest(a: float, b: float, c: float) -> Words:
+    """The nearest whole counts; halves away from zero, so that both signs are alike."""
+    return (
+        int(a + 0.5 if a > 0.0 else a - 0.5),
+        int(b + 0.5 if b > 0.0 else b - 0.5),
+        int(c + 0.5 if c > 0.0 else c - 0.5),
+    )
 
 
 def begins_with_a_letter(word: int) -> bool:
@@ -74,9 +84,8 @@ def begins_with_a_letter(word: int) -> bool:
     return word >> 8 & 0xFF in _LETTERS
 
 
-def _nearest(count: float, follows: int) -> int:
-    """``follows``: the byte behind the word."""
-    word = to_nearest(count)
+def _harmless_word(count: float, word: int, follows: int) -> int:
+    """``word``: the nearest to the count; ``follows``: the byte behind it."""
     reach = 0
     while True:
         near = [

@@ -10,13 +10,11 @@ from hypothesis import strategies as st
 from strategies import any_twists, finite
 
 from omnibot_driver.core.commands.limits import (
-    MAX_WORD,
     SpeedLimits,
     require_finite,
     require_timely,
     shorten,
     slow,
-    to_nearest,
 )
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -35,11 +33,6 @@ def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
     return all(
         math.isclose(x, y, rel_tol=1e-9, abs_tol=1e-9) for x, y in zip(unit_a, unit_b, strict=True)
     )
-
-
-def words_of(counts: list[float]) -> tuple[int, ...]:
-    """As a board is told them."""
-    return tuple(map(to_nearest, slow(counts, MAX_WORD)))
 
 
 @given(vectors, limits)
@@ -129,41 +122,6 @@ def test_a_limit_of_zero_lets_nothing_through() -> None:
     none = SpeedLimits(linear_mps=0.0, angular_radps=0.0, wheel_radps=0.0)
     assert none.twist(BodyTwist(1.0, -1.0, 1.0)) == BodyTwist(0.0, 0.0, 0.0)
     assert none.wheels((1.0, -2.0, 3.0)) == (0.0, 0.0, 0.0)
-
-
-@given(st.lists(st.floats(-32767, 32767), min_size=3, max_size=3))
-@example([0.5, -0.5, 1.5])
-@example([0.49999999999999994, 2.5, -2.4999])
-def test_words_are_the_nearest_integers(counts: list[float]) -> None:
-    """Never cut off towards zero."""
-    for word, count in zip(words_of(counts), counts, strict=True):
-        assert isinstance(word, int)
-        assert abs(word - count) <= 0.5
-
-
-@given(st.lists(st.floats(-32767, 32767), min_size=3, max_size=3))
-def test_rounding_is_the_same_to_both_sides(counts: list[float]) -> None:
-    """A robot does not drift backwards."""
-    mirrored = words_of([-count for count in counts])
-    assert mirrored == tuple(-word for word in words_of(counts))
-
-
-def test_halves_are_rounded_away_from_zero() -> None:
-    """The even ones, too: 0.15 m/s are 10.5 LSB, and 11 on the wire."""
-    assert words_of([0.5, -0.5, 10.5]) == (1, -1, 11)
-
-
-@given(st.lists(finite, min_size=3, max_size=3))
-@example([1e308, -1e308, 5e307])
-@example([32768.0, 100.0, 0.0])
-def test_words_fit_16_bits_and_keep_the_direction(counts: list[float]) -> None:
-    """What is too large is scaled down as a whole, to half a count."""
-    words = words_of(counts)
-    assert all(-32768 <= word <= 32767 for word in words)
-    largest = max(map(abs, counts))
-    if largest > 32767:
-        for word, count in zip(words, counts, strict=True):
-            assert word == pytest.approx(count / largest * 32767, abs=0.500001)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])

@@ -6,24 +6,31 @@ import re
 
 import pytest
 from frame_strategies import words
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from session_bench import bare
 
+from omnibot_driver.core.commands.limits import slow
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.omnibot.command_encoder import CommandEncoder
-from omnibot_driver.core.omnibot.outbound import harmless
+from omnibot_driver.core.omnibot.outbound import MAX_WORD, harmless, nearest
 from omnibot_driver.core.packets import joined
 
 COUNTS = st.floats(-32767.0, 32767.0)
 LETTERS = b"SPR"
+finite = st.floats(allow_nan=False, allow_infinity=False)
 
 
 def payload(a: int, b: int, c: int) -> bytes:
     return b"".join((word & 0xFFFF).to_bytes(2, "big") for word in (a, b, c))
+
+
+def words_of(counts: list[float]) -> tuple[int, ...]:
+    """As they fit the wire."""
+    return nearest(*slow(counts, MAX_WORD))
 
 
 @given(st.tuples(COUNTS, COUNTS, COUNTS))
@@ -95,3 +102,38 @@ def test_a_goal_whose_low_byte_is_a_letter_is_moved_by_a_millimetre() -> None:
     """0.083 m is 53 hex."""
     encoder = CommandEncoder(OmniBotSettings())
     assert bare(encoder.drive_to(Pose(0.083, 0.0, 0.0)))[3:5] == bytes.fromhex("00 54")
+
+
+@given(st.lists(st.floats(-32767, 32767), min_size=3, max_size=3))
+@example([0.5, -0.5, 1.5])
+@example([0.49999999999999994, 2.5, -2.4999])
+def test_words_are_the_nearest_integers(counts: list[float]) -> None:
+    """Never cut off towards zero."""
+    for word, count in zip(words_of(counts), counts, strict=True):
+        assert isinstance(word, int)
+        assert abs(word - count) <= 0.5
+
+
+@given(st.lists(st.floats(-32767, 32767), min_size=3, max_size=3))
+def test_rounding_is_the_same_to_both_sides(counts: list[float]) -> None:
+    """A robot does not drift backwards."""
+    mirrored = words_of([-count for count in counts])
+    assert mirrored == tuple(-word for word in words_of(counts))
+
+
+def test_halves_are_rounded_away_from_zero() -> None:
+    """The even ones, too: 0.15 m/s are 10.5 LSB, and 11 on the wire."""
+    assert words_of([0.5, -0.5, 10.5]) == (1, -1, 11)
+
+
+@given(st.lists(finite, min_size=3, max_size=3))
+@example([1e308, -1e308, 5e307])
+@example([32768.0, 100.0, 0.0])
+def test_words_fit_16_bits_and_keep_the_direction(counts: list[float]) -> None:
+    """What is too large is scaled down as a whole, to half a count."""
+    words = words_of(counts)
+    assert all(-32768 <= word <= 32767 for word in words)
+    largest = max(map(abs, counts))
+    if largest > 32767:
+        for word, count in zip(words, counts, strict=True):
+            assert word == pytest.approx(count / largest * 32767, abs=0.500001)
