@@ -229,7 +229,8 @@ def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.M
     """No thread misses a beat by the steady clock; the robot is stopped all the same."""
     suspended_s = 0.0
     monkeypatch.setattr(
-        "omnibot_driver.link.boot_time_s", lambda: stall_detector.boot_time_s() + suspended_s
+        "omnibot_driver.shared_session.boot_time_s",
+        lambda: stall_detector.boot_time_s() + suspended_s,
     )
     monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
     listener, ours = Listener(), session()

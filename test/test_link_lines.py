@@ -178,7 +178,7 @@ def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> No
         lines.connect()
         lines.link.start()
         lines.drive.read_until(STOPS)
-        keeper = lines.link._keeper
+        keeper = lines.link._shared.keeper
         assert keeper is not None
         assert keeper.last_words == (STOP, STOP)
         lines.say_that_it_stands()

@@ -48,7 +48,7 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
     link.close("stop")
     for number, (before, after) in enumerate(itertools.pairwise(times[:6])):
         assert after - before >= 0.02 * 1.5**number
-    monkeypatch.setattr("omnibot_driver.link.LONGEST_WAIT_S", 0.0)
+    monkeypatch.setattr("omnibot_driver.reader.LONGEST_WAIT_S", 0.0)
     listener = Listener()
     link = link_to("/no/such/port", listener, session())
     link.start()

@@ -1,0 +1,191 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The reader's work: open the port, wait for bytes, hand them to the session, deliver at once.
+
+No timer and no other thread stand between the wire and the listener. A port that is lost is opened
+again, with a guard beside it; whatever ends the reading, the robot is told to stand.
+"""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from functools import partial
+from typing import Final
+
+from omnibot_driver.core.errors import LinkError
+from omnibot_driver.core.events import Event, Notice
+from omnibot_driver.core.packets import Packet
+from omnibot_driver.keeper import WITHOUT_GUARD, Keeper
+from omnibot_driver.outbox import Delivery
+from omnibot_driver.shared_session import SharedSession
+from omnibot_driver.transports import LinesChanged, Transport
+
+COUNT_EVERY_S: Final = 1.0
+"""The kernel is asked what it lost."""
+BACK_OFF: Final = 1.5
+LONGEST_WAIT_S: Final = 2.0
+
+
+class Reader:
+    """``serve`` is a thread's work. ``opener`` and what follows it are the link's.
+
+    ``trouble`` is why the port, or one of its lines, is not open; ``opened`` and ``received_bytes``
+    count, ``overruns`` is what the kernel lost of this port, where it counts that.
+    """
+
+    def __init__(
+        self,
+        shared: SharedSession,
+        opener: Callable[[], Transport],
+        *,
+        guard: bool,
+        reconnect_interval_s: float,
+        deliver: Callable[[Sequence[Event]], None],
+        report: Callable[[str | None], None],
+        on_read: Callable[[Packet], None] | None,
+    ) -> None:
+        self._shared, self._open, self._has_guard = shared, opener, guard
+        self._session, self._outbox, self._lock = shared.session, shared.outbox, shared.lock
+        self._closing = shared.closing
+        self._deliver, self._report, self._on_read = deliver, report, on_read
+        self.reconnect_interval_s = self._wait_s = reconnect_interval_s
+        self.trouble = ""
+        self.opened = self.received_bytes = 0
+        self.overruns: int | None = None
+        self._count_at = -math.inf
+        self._unguarded_told = False
+
+    def serve(self) -> None:
+        """Until the link closes."""
+        # Once more when it ends: a robot that was lost while it drove is still to be stopped.
+        while not (leaving := self._closing.is_set()) or self.opened:
+            try:
+                with closing(self._open()) as port:
+                    comes_back = False
+                    try:
+                        self._attach(port)
+                        self._read(port)
+                    except LinkError:
+                        comes_back = True
+                        raise
+                    finally:
+                        self._detach(port, comes_back=comes_back)
+                return
+            except LinkError as error:
+                if leaving:
+                    return
+                self.trouble = str(error)
+                self._tell(partial(self._report, self.trouble))
+                self._closing.wait(self._wait_s)
+                longest_s = max(LONGEST_WAIT_S, self.reconnect_interval_s)
+                self._wait_s = min(BACK_OFF * self._wait_s, longest_s)
+
+    def _attach(self, port: Transport) -> None:
+        names = self._session.board.traits.channels
+        missing = {
+            f"the line '{names[number]}' is missing": why for number, why in port.missing.items()
+        }
+        self.trouble = "; ".join(f"{which}: {why}" for which, why in missing.items())
+        self._tell(partial(self._report, self.trouble or None))
+        keeper, notices = self._guarded(port)
+        with self._lock:
+            self._shared.port, self._shared.write_error, self._shared.keeper = port, None, keeper
+            self.opened += 1
+            self.overruns, self._count_at = None, -math.inf
+            self._session.opened(time.monotonic(), missing="; ".join(missing))
+            if notices:
+                self._outbox.put(partial(self._deliver, notices))
+            self._shared.settle()
+        self._outbox.deliver()
+
+    def _attach_anew(self, port: Transport) -> None:
+        """Its lines have changed: all begins again, on those that are there now."""
+        with self._lock:
+            self._shared.write(self._session.broken_off())
+            self._session.closed(now := time.monotonic())
+            self._session.opened(now, missing="the lines of the board are changing")
+            keeper = self._shared.keeper
+        try:
+            self._attach(port)
+        finally:
+            if keeper is not None:  # until now it was the one that guards
+                keeper.end(stopped=True)
+
+    def _guarded(self, port: Transport) -> tuple[Keeper | None, list[Notice]]:
+        if not self._has_guard or port.ends_with_us:
+            return None, []
+        if port.descriptors is not None:
+            return Keeper(port.descriptors, *self._session.board.last_words()), []
+        told, self._unguarded_told = self._unguarded_told, True
+        text = f"this kind of port cannot be shared with a guard process: {WITHOUT_GUARD}"
+        return None, [] if told else [Notice(text)]
+
+    def _read(self, port: Transport) -> None:
+        while not self._closing.is_set():
+            try:
+                packet = channel, data = port.read()
+            except LinesChanged:
+                self._attach_anew(port)
+                continue
+            if data and self._on_read is not None:
+                self._tell(partial(self._on_read, packet))
+            with self._lock:
+                if self._shared.write_error is not None:
+                    raise self._shared.write_error
+                if not data:
+                    continue
+                now = time.monotonic()
+                measured = self._session.hear(data, now, channel)
+                claimed = bool(measured) and self._outbox.claim()
+                if measured and not claimed:
+                    self._outbox.put(partial(self._deliver, measured))
+            if claimed:
+                try:
+                    self._deliver(measured)
+                finally:
+                    self._outbox.release()
+            elif measured:
+                self._outbox.deliver()
+            with self._lock:
+                self._wait_s = self.reconnect_interval_s
+                self.received_bytes += len(data)
+                self._count(port, now)
+                stopped = self._shared.heed_stall()
+                if self._session.process(now) or stopped:
+                    self._shared.settle()
+                else:
+                    self._shared.tell_guard()
+            self._outbox.deliver()
+
+    def _count(self, port: Transport, now: float) -> None:
+        """With the lock held: what the kernel lost, now and then."""
+        if now < self._count_at:
+            return
+        self._count_at = now + COUNT_EVERY_S
+        self.overruns = port.overruns
+        if self.overruns:
+            self._session.overran(self.overruns)
+
+    def _detach(self, port: Transport, *, comes_back: bool) -> None:
+        """Whatever ended the reading, the robot is not left with a command to carry out."""
+        with self._lock:
+            if self._shared.write_error is None:
+                self._shared.write(
+                    self._session.shutdown_sequence(self._shared.on_exit, time.monotonic())
+                )
+            else:  # Stop, right behind whatever is out of the kernel's reach
+                port.write_if_room(self._session.broken_off())
+            lines = len(port.descriptors or ())  # of several, some may be there to be stopped
+            stopped = self._shared.stood if self._closing.is_set() else comes_back and lines < 2
+            keeper, self._shared.port, self._shared.keeper = self._shared.keeper, None, None
+            self._session.closed(time.monotonic())
+            self._shared.settle()
+        if keeper is not None:
+            keeper.end(stopped=stopped)
+        self._outbox.deliver()
+
+    def _tell(self, delivery: Delivery) -> None:
+        """The reader's own, of what happened without the lock."""
+        self._outbox.put(delivery)
+        self._outbox.deliver()

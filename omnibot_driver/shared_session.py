@@ -1,0 +1,188 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""One session and the port that is open, shared by threads: one lock, and one order for all.
+
+Each input ends with ``settle``: what is due is written, the guard knows what stops the board now,
+and what there is to tell has its place in the outbox. Starts no thread and opens no port.
+"""
+
+import math
+import threading
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Final, TypeVar
+
+from omnibot_driver.core.errors import CommandRefused, LinkError
+from omnibot_driver.core.events import Event, Notice
+from omnibot_driver.core.packets import Packet, Packets
+from omnibot_driver.core.requests import OnExit
+from omnibot_driver.core.session import Session
+from omnibot_driver.keeper import BEAT_S, Keeper
+from omnibot_driver.outbox import Outbox
+from omnibot_driver.stall_detector import StallDetector, boot_time_s
+from omnibot_driver.transports import Transport
+
+WAITED: Final = "motion command refused: it waited while the driver stood still; send it again"
+
+T = TypeVar("T")
+
+
+class SharedSession:
+    """All but ``call``, ``command`` and ``blocked`` is for whoever holds ``lock``.
+
+    ``changed`` is its condition.
+
+    ``port`` and ``keeper`` are those of the open port, if there is one; ``write_error`` is why it
+    takes nothing any more. ``deliver``, ``refused`` and ``on_write`` are the link's.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        deliver: Callable[[Sequence[Event]], None],
+        refused: Callable[[str], None],
+        on_write: Callable[[Packet], None] | None,
+    ) -> None:
+        self.session = session
+        self.lock = threading.Lock()
+        self.changed = threading.Condition(self.lock)
+        self.outbox = Outbox()
+        self.port: Transport | None = None
+        self.write_error: LinkError | None = None
+        self.keeper: Keeper | None = None
+        self.sent_bytes = 0
+        self.leaving = False
+        """The link is about to end..."""
+        self.on_exit: OnExit = "stop"
+        """... in this way..."""
+        self.stood = False
+        """... and the robot was seen to stand."""
+        self.closing = threading.Event()
+        """No thread is to go on."""
+        self._deliver, self._refused, self._on_write = deliver, refused, on_write
+        self._stall_detector = StallDetector()
+        self._pacing_until = self._beat_at = -math.inf
+
+    def call(self, action: Callable[[Session, float], T]) -> T:
+        """Do something with the session; what it has to say is on the wire before this returns.
+
+        What comes of it is delivered by another thread.
+        """
+        try:
+            with self.lock:
+                now = time.monotonic()
+                self.heed_stall()
+                try:
+                    return action(self.session, now)
+                finally:
+                    self.settle()
+        finally:
+            self.outbox.hand_over()
+
+    def command(
+        self, action: Callable[[Session, T, float], None], wish: T, sent_ns: Sequence[int]
+    ) -> None:
+        """``call``, with a wish that was sent at one of these times of day, as far as is known.
+
+        Raises CommandRefused for one that has been waiting while this process stood still. Every
+        refusal is delivered as well, in its place among the events.
+        """
+        try:
+            with self.lock:
+                now = time.monotonic()
+                try:
+                    boot_s = boot_time_s()
+                    outlived = self._stall_detector.outlived_by
+                    if not all(outlived(at_ns, boot_s) for at_ns in sent_ns):
+                        self._heed_stall(boot_s)
+                        raise CommandRefused(WAITED)
+                    action(self.session, wish, now)
+                except CommandRefused as error:
+                    if not self.outbox.full:
+                        self.outbox.put(partial(self._refused, str(error)))
+                    raise
+                finally:
+                    self.settle()
+        finally:
+            self.outbox.hand_over()
+
+    @property
+    def blocked(self) -> bool:
+        """What was said last was not taken, and the port is opened anew.
+
+        It may be gone by now: the reader is woken by what the caller finds here.
+        """
+        with self.lock:
+            return self.write_error is not None
+
+    def settle(self) -> None:
+        """Write what is due, wake the pacer if it sleeps for too long.
+
+        What there is to tell takes its place in the order.
+        """
+        packets = self.session.take_output(time.monotonic())
+        self.tell_guard()
+        if packets:
+            self.write(packets)
+        if self.session.wake_at < self._pacing_until or self.leaving:
+            self.changed.notify_all()
+        if events := self.session.take_events():
+            self.outbox.put(partial(self._deliver, events))
+
+    def write(self, packets: Packets) -> None:
+        """On an open port that takes them; where it does not, the reader opens it anew."""
+        if not packets or self.port is None or self.write_error is not None:
+            return
+        try:
+            self.port.write(packets)
+            self.sent_bytes += sum(len(data) for _, data in packets)
+        except LinkError as error:
+            self.write_error = error
+            self.port.interrupt()
+        else:
+            if self._on_write is not None:
+                for packet in packets:
+                    self.outbox.put(partial(self._on_write, packet))
+
+    def tell_guard(self) -> None:
+        """What stops the board now, where that has changed."""
+        if (keeper := self.keeper) is None:
+            return
+        if (words := self.session.board.last_words()) != keeper.last_words:
+            keeper.change(*words)
+
+    def pace(self) -> None:
+        """One pass of the pacer: do what is due, or sleep until something is."""
+        now = time.monotonic()
+        self._pacing_until = min(self.session.wake_at, self._beat_at)
+        if now < self._pacing_until:
+            self.changed.wait(self._pacing_until - now)
+            return
+        self._beat(now)
+        if now >= self.session.wake_at:
+            self.session.tick(now)
+            self.settle()
+
+    def heed_stall(self) -> bool:
+        """Whether this process stood still, and the robot is to be stopped."""
+        return self._heed_stall(boot_time_s())
+
+    def _heed_stall(self, boot_s: float) -> bool:
+        length_s = 0.0 if self.closing.is_set() else self._stall_detector.begun(boot_s)
+        if length_s:  # the caller may have read the steady clock before it stood still
+            self.session.stood_still(length_s, time.monotonic())
+        return length_s > 0.0
+
+    def _beat(self, now: float) -> None:
+        """The pacer, and so the watchdog, is alive."""
+        boot_s = boot_time_s()  # read once: it may stand still between two readings
+        self._heed_stall(boot_s)
+        self._stall_detector.passed(boot_s, time.time_ns())
+        if now < self._beat_at:
+            return
+        self._beat_at = now + BEAT_S
+        if self.keeper is None:
+            return
+        if trouble := self.keeper.beat(now, latched=self.session.estop_active):
+            self.outbox.put(partial(self._deliver, [Notice(trouble)]))
