@@ -55,11 +55,11 @@ docs: $(VENV)/.docs  ## write what is generated, and build the documents as a si
 pictures: $(VENV)/.test  ## make the pictures of README and documents anew (5 minutes)
 	@$(PY) test/pictures
 
-integrity: $(VENV)/.test  ## measure damaged lines of BOARD, both ways (15 minutes), into docs/integrity.md
+integrity: $(VENV)/.test  ## measure damaged lines of BOARD, both ways (15 minutes), into docs/internals/integrity.md
 	$(PY) test/integrity/report.py --board $(BOARD) || inbound=$$?; \
 	  $(PY) test/integrity/outbound.py --board $(BOARD) && exit $${inbound:-0}
 
-bench: $(VENV)/.test  ## measure BOARD against a floor (11 minutes), into docs/performance.md
+bench: $(VENV)/.test  ## measure BOARD against a floor (11 minutes), into docs/internals/performance.md
 	$(PY) test/bench/report.py --board $(BOARD)
 
 faults: $(VENV)/.test  ## break everything around BOARD, with the real node (15 minutes), into docs/safety.md

@@ -33,7 +33,9 @@ setup(
             for folder in (
                 "config",
                 "docs/boards",
+                "docs/internals",
                 "docs/pictures",
+                "docs/tools",
                 "launch",
                 "rviz",
                 "systemd",

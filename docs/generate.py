@@ -106,12 +106,12 @@ def _yaml(value: Value) -> str:
 
 
 def architecture() -> str:
-    """docs/architecture.md with its mode table as it is in the code."""
+    """docs/internals/architecture.md with its mode table as it is in the code."""
     lines = ["| | " + " | ".join(mode.value for mode in Mode) + " |", "|---|---|---|---|---|"]
     for happening, after in TRANSITIONS.items():
         cells = [after[mode].value if mode in after else "refused" for mode in Mode]
         lines.append(f"| {happening.value} | " + " | ".join(cells) + " |")
-    text = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/internals/architecture.md").read_text(encoding="utf-8")
     before, begin, rest = text.partition("<!-- modes: begin -->\n")
     _, end, after_table = rest.partition("<!-- modes: end -->")
     return before + begin + "\n".join(lines) + "\n" + end + after_table
@@ -120,7 +120,7 @@ def architecture() -> str:
 GENERATED: Final[dict[str, Callable[[], str]]] = {
     **{f"config/{board}.yaml": partial(parameter_file, board) for board in boards.PROFILES},
     "config/driver.yaml": partial(parameter_file, "omnibot"),  # for one release
-    "docs/architecture.md": architecture,
+    "docs/internals/architecture.md": architecture,
     "docs/parameters.md": parameters_page,
     "docs/pictures/modes.svg": mode_diagram.svg,
 }

@@ -3,7 +3,7 @@
 """How much Python is called for each tick of the nominal stream: a guard that counts, not times.
 
 A bound is a little above what was counted when it was set. Whoever makes the path longer raises it,
-and says in docs/performance.md what for.
+and says in docs/internals/performance.md what for.
 """
 
 import gc

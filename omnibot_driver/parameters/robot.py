@@ -87,7 +87,7 @@ ROBOT: Final = (
         "",
         "",
         "YAML file that calibrations write; what they found replaces what is given here"
-        " (docs/calibrate.md).",
+        " (docs/tools/calibrate.md).",
         fixed=True,
     ),
 )

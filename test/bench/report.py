@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The performance report: ``make bench`` prints it and writes it into docs/performance.md.
+"""The performance report: ``make bench`` writes it into docs/internals/performance.md.
 
 Every figure is measured beside its floor on the same machine in the same minutes. ``--quick`` makes
 everything short, to see whether it runs. Ends with 1 when a goal is missed.
@@ -21,7 +21,7 @@ import core
 import system
 from ratios import Figure, table
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "performance.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "performance.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 OTHERS = {"lois_ecu": "lois_ecu_bench"}
 """By the name of the board: the module that measures it."""

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The outbound report: ``make integrity`` prints it and writes it into docs/integrity.md.
+"""The outbound report: ``make integrity`` writes it into docs/internals/integrity.md.
 
 Every scene is played by the real session and goes over a damaged line to every receiver; the fault
 stays on until the verdict. ``--share`` of the trials for a shorter run, which writes nothing;
@@ -21,7 +21,7 @@ from outbound_line import LOSSES, OTHERS
 from outbound_runs import RECEIVERS, SCRIPTS, Scores, over, run
 from outbound_scenes import DRIVES, SCENES
 
-DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "integrity.md"
+DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "internals" / "integrity.md"
 WITH_SUMS: Final = ("lois_ecu",)
 """Boards that drop what was damaged on the way to them."""
 BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"

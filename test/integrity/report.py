@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The integrity report: ``make integrity`` prints it and writes it into docs/integrity.md.
+"""The integrity report: ``make integrity`` writes it into docs/internals/integrity.md.
 
 Arguments: ``--seconds`` of each stream, how many ``--seeds`` and the ``--first`` of them; the costs
 were tuned on seeds from 1000 on. The codecs of other boards have modules of their own. Ends with 1
@@ -20,7 +20,7 @@ from carriage import FAULTS
 from judge import Score
 from truth import SCENARIOS, WITH_TEXTS
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "integrity.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "integrity.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 
 OTHERS = {"lois_ecu": "lois_ecu_report"}

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 TROUBLESHOOTING = ROOT / "docs/troubleshooting.md"
 COMMISSIONING = ROOT / "docs/commissioning.md"
 DIAGNOSTICS = ROOT / "docs/diagnostics.md"
-TOUR = ROOT / "docs/tour.md"
+TOUR = ROOT / "docs/tools/tour.md"
 GAP = "…"
 SENSES = {"clockwise": -1, "counter-clockwise": 1, "still": 0}
 

@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = "omnibot_driver"
 DEADLINE_S = 60.0
 FOR_USERS = (
-    *("package.xml", "LICENSE", "*.md", "CHANGELOG.rst", "docs/*.md", "docs/pictures/*"),
+    *("package.xml", "LICENSE", "*.md", "CHANGELOG.rst", "docs/**/*.md", "docs/pictures/*"),
     *("config/*", "launch/*", "rviz/*", "systemd/*", "udev/*", "urdf/*"),
 )
 SHARED_FILES = [

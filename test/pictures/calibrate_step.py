@@ -2,7 +2,7 @@
 
 """The pictures of ``calibrate step`` and ``calibrate commission``, on robots with planted errors.
 
-What was planted is in docs/calibrate.md, beside what is found here.
+What was planted is in docs/tools/calibrate.md, beside what is found here.
 """
 
 import math

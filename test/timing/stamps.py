@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The timing report: prints the worst figures of each cell and writes them into docs/time.md.
+"""The timing report: writes the worst figures of each cell into docs/internals/time.md.
 
 Arguments: ``--seconds`` of each stream and ``--seeds``; ``--readers``: the busy readers alone. The
 seeds share out the skews.
@@ -15,7 +15,7 @@ from pathlib import Path
 
 from stamping import BUSY, EVENTS_S, LINES, SETTLED_S, spread, stamp
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "time.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "time.md"
 MARKS = "<!-- {}: begin -->", "<!-- {}: end -->"
 
 SKEWS = (-1e-4, -5e-5, 0.0, 5e-5, 1e-4)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""docs/report.md names what the report judges, and the limits that it judges by."""
+"""docs/tools/report.md names what the report judges, and the limits that it judges by."""
 
 import ast
 import re
@@ -12,7 +12,7 @@ from omnibot_driver.core.imu.scale import ACCEL_TOLERANCE
 from omnibot_driver.tools.report import events, following, log, rhythm, sensing, travel
 
 ROOT = Path(__file__).parents[2]
-DOCUMENT = (ROOT / "docs/report.md").read_text()
+DOCUMENT = (ROOT / "docs/tools/report.md").read_text()
 ROWS = dict(re.findall(r"^\| (\S+) \| [^|]+ \| ([^|]+) \|$", DOCUMENT, re.MULTILINE))
 
 

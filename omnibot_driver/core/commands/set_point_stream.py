@@ -21,7 +21,7 @@ PACE_S: Final = 0.01
 """Frames closer together than this would only fill a board's buffer."""
 MOTION_PACE_S: Final = 0.018
 """Between two set-points. More of them would raise the share of time that a lost byte can take
-(docs/integrity.md); commands at 50 Hz are not slowed."""
+(docs/internals/integrity.md); commands at 50 Hz are not slowed."""
 STOP_RATE_HZ: Final = 20.0
 """Stop and the emergency stop are repeated at least so often."""
 

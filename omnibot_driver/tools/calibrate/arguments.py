@@ -51,7 +51,7 @@ def command_line() -> argparse.ArgumentParser:
     parser.epilog = (
         "WHAT --help lists the options. ROS's own arguments follow --ros-args. Ends with 0, with 1"
         " and a sentence when nothing was found, with 2 on wrong usage, with 130 when interrupted."
-        " See docs/calibrate.md."
+        " See docs/tools/calibrate.md."
     )
     subparsers = parser.add_subparsers(dest="subcommand", required=True, metavar="WHAT")
     for name, (summary, add_arguments) in SUBCOMMANDS.items():

@@ -111,7 +111,7 @@ def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
     raise ToolError(
         f"the odometry makes no sense: after a turn of {math.degrees(turned_rad):.0f}° the same"
         f" command leads {math.degrees(change_rad):.0f}° elsewhere; see /diagnostics, and"
-        " docs/protocol.md"
+        " docs/internals/omnibot_protocol.md"
     )
 
 

@@ -16,7 +16,7 @@ from omnibot_driver.tools.calibrate.wheel_loop import TICK_S, Array, Gains, Moto
 
 DELTA_TICKS: Final = 4
 SPAN_S: Final = DELTA_TICKS * TICK_S
-"""Manual, "25Hz Encoder data"; docs/protocol.md."""
+"""Manual, "25Hz Encoder data"; docs/internals/omnibot_protocol.md."""
 
 Turned = Callable[[Array, Array], Array]
 """Parameters without the gain, and times in s, to the angle turned after a unit step, in s."""

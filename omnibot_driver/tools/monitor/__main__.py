@@ -46,7 +46,7 @@ def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
         prog="monitor",
         description="A running driver on one screen, with an e-stop under the space bar.",
         epilog="ROS's own arguments follow --ros-args. Ends with 0, with 1 and a sentence when"
-        " something is missing or wrong, with 2 on wrong usage. See docs/monitor.md.",
+        " something is missing or wrong, with 2 on wrong usage. See docs/tools/monitor.md.",
     )
     parser.add_argument(
         "--namespace", default="", metavar="NAME", help="the driver's, such as /robot1"

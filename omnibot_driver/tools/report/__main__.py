@@ -27,7 +27,7 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
         prog="report",
         description="What a drive was like: a page with pictures, and a verdict in words.",
         epilog="Ends with 0, with 3 where the report says that something is wrong, with 1 where"
-        " there is nothing to report on, with 2 on wrong usage. See docs/report.md.",
+        " there is nothing to report on, with 2 on wrong usage. See docs/tools/report.md.",
     )
     parser.add_argument("bag", nargs="?", type=Path, help="folder of a rosbag2, or a file of it")
     parser.add_argument(

@@ -204,7 +204,7 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         Level.WARN if uneven else Level.GOOD,
         "Timing",
         f"The steps between stamps of {stream.name} vary by {1e3 * jitter_s:.3f} ms rms.",
-        "They should be sampling times: see docs/time.md, and Time in /diagnostics."
+        "They should be sampling times: see docs/internals/time.md, and Time in /diagnostics."
         if uneven
         else "",
     )

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The examples in docs/protocol.md against the codec: a document that is wrong must not pass.
+"""The examples in docs/internals/omnibot_protocol.md, checked against the codec.
 
 An example is a line of a code block: bytes, ``->``, a word and its numbers, perhaps a remark.
 """
@@ -30,7 +30,9 @@ from omnibot_driver.core.omnibot import (
 from omnibot_driver.core.omnibot.command_encoder import CommandEncoder
 from omnibot_driver.core.packets import joined
 
-DOCUMENT = (Path(__file__).parents[3] / "docs" / "protocol.md").read_text(encoding="utf-8")
+DOCUMENT = (Path(__file__).parents[3] / "docs" / "internals" / "omnibot_protocol.md").read_text(
+    encoding="utf-8"
+)
 
 EXAMPLE = re.compile(r"((?:[0-9A-F]{2} )+) *-> (\S+)((?: -?[\d.]+)*)\s*(?:# (.*))?")
 BOARD = OmniBot(OmniBotSettings())
