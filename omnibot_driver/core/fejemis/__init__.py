@@ -1,0 +1,26 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The Fejemis sweeping robot: two Teensys, lines of text. Bytes and times, nothing else."""
+
+from omnibot_driver.core.fejemis.readings import (
+    BatteryReading,
+    Job,
+    JobDone,
+    MagneticReading,
+    OrientedImuReading,
+    RangeReading,
+    SteeringReading,
+)
+from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
+
+__all__ = [
+    "BatteryReading",
+    "FejemisSettings",
+    "Job",
+    "JobDone",
+    "MagneticReading",
+    "OrientedImuReading",
+    "RangeReading",
+    "SteeringReading",
+    "Written",
+]

@@ -1,0 +1,59 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a user has to say of a Fejemis robot, because its two boards do not."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Literal
+
+LineSums = Literal["auto", "on", "off"]
+AccelerationUnit = Literal["m/s^2", "g"]
+
+
+class Written(Enum):
+    """What a user may write to a board's configuration: its command, and how many numbers."""
+
+    WHEELS = "confw", 5
+    """Radius of the left and right wheel in m, gear, encoder ticks a revolution, track in m."""
+    STEERING = "confs", 2
+    """Track and distance of the steered wheel from the axle, in m; on both boards."""
+    FRONT_WHEEL = "fwoffset", 2
+    """Offset in degrees, and 1 where the angle is inverted."""
+    INFRARED = "irc", 4
+    """Raw values at 13 cm and 50 cm, of sensor 1, then 2."""
+    MAGNETOMETER = "magcal", 12
+    """Three offsets, then a matrix of nine by rows."""
+    ACCELEROMETER = "acccal", 6
+    """Three offsets, then three scales."""
+    STEERING_GAINS = "cssteer", 0
+    """As in the firmware's ucontrolbase.cpp; any count of numbers."""
+
+    command: str
+    count: int
+
+    def __init__(self, command: str, count: int) -> None:
+        self.command, self.count = command, count
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FejemisSettings:
+    """``track_m``, ``wheelbase_m``: what the driver computes with until the boards have told
+    theirs. ``written``: what the user wants on the boards; anything else is only read.
+
+    ``line_sums``: whether lines carry a sum; ``auto`` learns it from the heartbeats.
+    ``allow_reverse``: whether a negative speed is passed on, see docs/boards/fejemis.md.
+    ``command_timeout_s``: the longest time that is sent with a voltage of the lift.
+    ``power_off_delay_s``: between the request and the end of power. ``low_cell_v``: a battery with
+    less for each cell is reported as low.
+    """
+
+    track_m: float = 0.4
+    wheelbase_m: float = 0.5
+    line_sums: LineSums = "auto"
+    allow_reverse: bool = False
+    acceleration_unit: AccelerationUnit = "m/s^2"
+    command_timeout_s: float = 0.5
+    power_off_delay_s: float = 10.0
+    low_cell_v: float = 3.5
+    written: Mapping[Written, tuple[float, ...]] = field(default_factory=dict)

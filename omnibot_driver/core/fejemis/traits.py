@@ -1,0 +1,35 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a Fejemis has and can do, and what to check when a robot with one does not obey."""
+
+from typing import Final
+
+from omnibot_driver.core.commands.set_points import Authority
+from omnibot_driver.core.motion_monitor.monitor import Fault
+from omnibot_driver.core.requests import Request
+from omnibot_driver.core.traits import Traits
+
+DRIVE: Final = 0
+FRONT: Final = 1
+"""Channels, as they are configured; the heartbeats tell which board is on which."""
+
+TRAITS: Final = Traits(
+    channels=("drive", "front"),
+    imu_period_s=0.01,
+    authorities=frozenset({Authority.BASE}),
+    requests=frozenset({Request.START, Request.PAUSE}),
+    wheels=("left", "right"),
+    unheard_s=0.5,
+    silence_s=1.5,
+    baudrate=False,
+    slack_mps=0.03,
+    slack_radps=0.15,
+    advice={
+        Fault.WRONG_WAY: "check the wiring of the wheels and the encoders",
+        Fault.WRONG_TURN: "check `front_wheel_inverted`, `front_wheel_offset` and the wiring",
+        Fault.TOO_FAST: "check wheel radius, gear and encoder ticks on the drive board",
+        Fault.TURNS_TOO_FAST: "check the steering geometry on both boards",
+        Fault.BEYOND_LIMITS: "check wheel radius, gear and encoder ticks on the drive board",
+        Fault.BLOCKED: "check motor power, whether the wheels are blocked, and the front wheel",
+    },
+)
