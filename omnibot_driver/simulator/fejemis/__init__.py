@@ -1,0 +1,25 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The two Teensys of the Fejemis sweeping robot in software, from their manual and public hosts.
+
+Shares no code with the driver: a misread manual must not cancel out. ``SimulatedFejemis`` is pure.
+"""
+
+from omnibot_driver.simulator.fejemis.board import CHANNELS, SimulatedFejemis
+from omnibot_driver.simulator.fejemis.options import add_options, from_arguments
+from omnibot_driver.simulator.fejemis.settings import Fault, FejemisSettings, Firmware
+from omnibot_driver.simulator.fejemis.teensy import Obeyed
+
+TITLE = "Fejemis"
+
+__all__ = [
+    "CHANNELS",
+    "TITLE",
+    "Fault",
+    "FejemisSettings",
+    "Firmware",
+    "Obeyed",
+    "SimulatedFejemis",
+    "add_options",
+    "from_arguments",
+]

@@ -1,0 +1,46 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What each Teensy keeps in its configuration memory, as values, with the factory's settings."""
+
+from dataclasses import dataclass
+
+Vector = tuple[float, float, float]
+
+IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+STEERING = (1, 43.0, 0, 0, 0, 1, 1, 0.16, 0.048, 0, 0, 0, 0, 0, 0, 1, 1000.0)
+"""use, Kp, useI, taui, ilimit, 1, useLeadf, tz, tp, useLeadb, tz, tp, usePre, tz, tp, useULim,
+Ulim: the manual's P-Lead controller, with tp = alpha * tau_d."""
+
+WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveConfig:
+    """wheel_base_m is of odometry; confs_m are B and F of the turning control."""
+
+    number: int
+    name: str = "drive"
+    radii_m: tuple[float, float]
+    gear: float
+    ticks: float
+    wheel_base_m: float
+    confs_m: tuple[float, float]
+    gyro_offset_dps: Vector = (0.0, 0.0, 0.0)
+    accel_offset_mps2: Vector = (0.0, 0.0, 0.0)
+    accel_scale: Vector = (1.0, 1.0, 1.0)
+    mag_offset_ut: Vector = (0.0, 0.0, 0.0)
+    mag_matrix: tuple[float, ...] = IDENTITY
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrontConfig:
+    """ir: A1, B1, A2, B2, the readings at 13 and 50 cm; steering: as ``cpsteer`` has it."""
+
+    number: int
+    name: str = "front"
+    confs_m: tuple[float, float]
+    angle_offset_deg: float = 0.0
+    angle_inverted: bool = False
+    ir: tuple[float, float, float, float] = (46000.0, 14000.0, 46000.0, 14000.0)
+    steering: tuple[float, ...] = STEERING

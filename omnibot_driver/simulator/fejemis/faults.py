@@ -1,0 +1,63 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What can befall one of the two Teensys, by name, at any time.
+
+Knows what each name means. Must not know when it happens.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from omnibot_driver.simulator.fejemis.drive import DriveTeensy
+from omnibot_driver.simulator.fejemis.front import HEALTHY, FrontTeensy
+
+Half = DriveTeensy | FrontTeensy
+
+
+def _set(**values: Any) -> Callable[[Half], None]:
+    def befall(half: Half) -> None:
+        for name, value in values.items():
+            setattr(half, name, value)
+
+    return befall
+
+
+def _diagnosis(bits: int) -> Callable[[Half], None]:
+    return _set(diagnosis=HEALTHY ^ bits)
+
+
+FAULTS: dict[str, Callable[[Half], None]] = {
+    "silent": _set(silent=True),
+    "hung": _set(hung=True),
+    "unplugged": _set(unplugged=True),
+    "well": _set(silent=False, hung=False, unplugged=False),
+    "restart": lambda half: half.reboot(),
+    "sums-begin": _set(sums=True),
+    "sums-end": _set(sums=False),
+}
+"""Of either half. silent: sends nothing, and obeys; hung: neither; unplugged: nothing passes its
+cable; well: none of these."""
+
+SENSOR_FAULTS: dict[str, Callable[[Half], None]] = {
+    "sensor-well": _set(diagnosis=HEALTHY, error_flags=0, frozen=False, absent=False),
+    "sensor-frozen": _set(frozen=True),
+    "sensor-absent": _set(absent=True),
+    "sensor-error": _set(error_flags=0x1),
+    "hall-broken": _diagnosis(1 << 10),
+    "agc-unsettled": _diagnosis(1 << 9),
+    "offset-unfinished": _diagnosis(1 << 8),
+    "sine-unfinished": _diagnosis(1 << 7),
+    "cosine-unfinished": _diagnosis(1 << 6),
+    "magnet-weak": _diagnosis(1 << 5),
+    "agc-high": _diagnosis(1 << 4),
+    "agc-low": _diagnosis(1 << 3),
+    "cordic-overflow": _diagnosis(1 << 2),
+    "loops-unfinished": _diagnosis(1 << 1),
+    "supply-5v": _diagnosis(1 << 0),
+}
+"""Of the front half alone: its angle sensor."""
+
+
+def allowed(half: str) -> dict[str, Callable[[Half], None]]:
+    """By name, for ``drive`` or ``front``."""
+    return FAULTS | SENSOR_FAULTS if half == "front" else FAULTS

@@ -1,0 +1,135 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a user may choose about a simulated Fejemis, besides its seed and the faults of its lines.
+
+Knows words and their meaning. Must not know what runs the boards.
+"""
+
+import argparse
+from typing import get_args
+
+from omnibot_driver.simulator.fejemis.board import SimulatedFejemis
+from omnibot_driver.simulator.fejemis.faults import FAULTS, SENSOR_FAULTS, allowed
+from omnibot_driver.simulator.fejemis.settings import Fault, FejemisSettings, Firmware, Reverse
+
+_DEFAULT = FejemisSettings()
+_SWITCHES = (
+    ("timed-velocity", "vel has the time first"),
+    ("acceleration-in-g", "acc is in g instead of m/s²"),
+    ("tilt", "pose has a fifth number"),
+    ("start-resumes", "after start the last rc holds again"),
+    ("confirms", "a command behind ! is confirmed"),
+    ("single-precision", "times are float32"),
+)
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Let the parser know them all."""
+    parser.add_argument(
+        "--sums",
+        choices=("on", "off"),
+        default="on",
+        help="whether lines carry ;NN and are checked, as with the public hosts (on, the default),"
+        " or not, as in the manual (off)",
+    )
+    parser.add_argument(
+        "--reverse",
+        choices=get_args(Reverse),
+        default="mirrored",
+        help="what becomes of the front wheel's angle when driving backward (default mirrored)",
+    )
+    for name, effect in _SWITCHES:
+        parser.add_argument(f"--{name}", action="store_true", help=effect)
+    parser.add_argument(
+        "--swapped", action="store_true", help="the front Teensy is at the first port"
+    )
+    parser.add_argument(
+        "--ids",
+        type=_ids,
+        default=_DEFAULT.ids,
+        metavar="DRIVE,FRONT",
+        help="what the two call themselves in their heartbeats (default 90,91)",
+    )
+    parser.add_argument(
+        "--uptime",
+        type=float,
+        default=0.0,
+        metavar="SECONDS",
+        help="since when the boards run; without it they boot (default 0)",
+    )
+    parser.add_argument(
+        "--volts", type=float, default=_DEFAULT.volts, help="of the battery (default 24.9)"
+    )
+    parser.add_argument(
+        "--front-m",
+        type=float,
+        default=_DEFAULT.front_m,
+        metavar="M",
+        help="from the start to a wall in front (default none)",
+    )
+    parser.add_argument(
+        "--lose-inbound",
+        type=_chance,
+        default=0.0,
+        metavar="RATE",
+        help="chance that a byte to a board is lost (default 0)",
+    )
+    parser.add_argument(
+        "--fault",
+        type=_fault,
+        action="append",
+        default=[],
+        metavar="SECONDS:HALF:WHAT",
+        help="what befalls the drive or the front half, so long after the start; may be repeated."
+        f" Of either: {', '.join(FAULTS)}; of front: {', '.join(SENSOR_FAULTS)}",
+    )
+
+
+def from_arguments(arguments: argparse.Namespace) -> SimulatedFejemis:
+    """The pair that was chosen."""
+    names = [name.replace("-", "_") for name, _ in _SWITCHES]
+    return SimulatedFejemis(
+        FejemisSettings(
+            firmware=Firmware(
+                sums=arguments.sums == "on",
+                reverse=arguments.reverse,
+                **{name: getattr(arguments, name) for name in names},
+            ),
+            seed=arguments.seed,
+            swapped=arguments.swapped,
+            ids=arguments.ids,
+            uptime_s=arguments.uptime,
+            volts=arguments.volts,
+            front_m=arguments.front_m,
+            lose_inbound=arguments.lose_inbound,
+            faults=tuple(arguments.fault),
+        )
+    )
+
+
+def _fault(text: str) -> Fault:
+    at, half, what = (*text.split(":"), "", "")[:3]
+    try:
+        at_s = float(at)
+    except ValueError:
+        at_s = -1.0
+    if at_s < 0.0 or half not in ("drive", "front") or what not in allowed(half):
+        raise argparse.ArgumentTypeError(f"{text!r} is not like 5:front:silent")
+    return Fault(at_s=at_s, half=half, what=what)
+
+
+def _ids(text: str) -> tuple[int, int]:
+    drive, _, front = text.partition(",")
+    if not (drive.isdecimal() and front.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is not like 90,91")
+    return int(drive), int(front)
+
+
+def _chance(text: str) -> float:
+    try:
+        chance = float(text)
+    except ValueError:
+        chance = -1.0
+    if not 0.0 <= chance <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is no probability: give a number from 0 to 1")
+    return chance

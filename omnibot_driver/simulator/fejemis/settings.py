@@ -1,0 +1,96 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the simulated pair of Teensys and its robot are like: sizes, firmware, planted errors.
+
+``Firmware`` are the ways in which the manual, the public hosts and sibling firmware differ, one
+switch each, and what the manual does not say.
+"""
+
+from dataclasses import dataclass, field
+from math import inf
+from typing import Literal
+
+Reverse = Literal["mirrored", "clamped"]
+WHEEL_BASE_M = 0.40
+"""From one driving wheel to the other: the manual's B."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Firmware:
+    """sums: lines carry ``;NN`` and are checked, as with the public hosts; without, as in the
+        manual, a line that begins with ``;`` is an unknown command.
+    reverse: what becomes of an angle beyond 90° for a negative speed. mirrored: the wheel takes the
+        angle of the same curve; clamped: it stays at 90°.
+    timed_velocity: ``vel`` has the time first. acceleration_in_g: ``acc`` is in g, not m/s².
+    tilt: ``pose`` has a fifth number. carriage_return: lines end ``\\r\\n``.
+    start_resumes: after ``start`` the last ``rc`` holds again, as if there had been no ``stop``.
+    confirms: a command behind ``!`` is confirmed, as in newer siblings.
+    shows_source: the heartbeat of drive has the source of the last ``rc``; otherwise 10 or -1 only.
+    single_precision: times are float32, so after an hour they have steps of 0.2 ms.
+    """
+
+    sums: bool = True
+    reverse: Reverse = "mirrored"
+    timed_velocity: bool = False
+    acceleration_in_g: bool = False
+    tilt: bool = False
+    carriage_return: bool = True
+    start_resumes: bool = False
+    confirms: bool = False
+    shows_source: bool = True
+    single_precision: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fault:
+    """``what`` befalls ``half`` at ``at_s`` since construction; see ``faults.FAULTS``."""
+
+    at_s: float
+    half: str
+    what: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FejemisSettings:
+    """The pair, its robot, and where it is.
+
+    wheel_radius_scale, track_scale: true over what the board is configured to. slip: standard
+    deviation in m of the way of a wheel after 1 m. motor_lag_s: of the speed of a driving wheel.
+    steer_base_m: from the axle to the steered wheel, the manual's S, F or f. servo_degps: of the
+    servo at its full velocity value 1000, so that the manual's controller crosses over at
+    12 rad/s; servo_lag_s: of that velocity. sensor_zero_deg: what the angle sensor is off by,
+    beside its configuration. gyro_bias_dps, accel_bias_mps2: what calibration is to find.
+    clock_ppm: of the two crystals. uptime_s: since when the boards run; their first boot is over.
+    swapped: drive is at the second port. ids: what they call themselves. lose_inbound:
+    chance for each byte to a board to be lost. front_m: from the start to a wall in front. faults:
+    in any order.
+    """
+
+    firmware: Firmware = field(default_factory=Firmware)
+    seed: int = 0
+    wheel_radius_m: float = 0.0775
+    wheel_radius_scale: tuple[float, float] = (1.0, 1.0)
+    track_scale: float = 1.0
+    slip: float = 0.0
+    motor_lag_s: float = 0.08
+    gear: float = 19.0
+    ticks: int = 68
+    steer_base_m: float = 0.42
+    servo_degps: float = 164.0
+    servo_lag_s: float = 0.039
+    sensor_zero_deg: float = 0.0
+    angle_noise_deg: float = 0.03
+    gyro_bias_dps: tuple[float, float, float] = (0.4, -0.3, 0.25)
+    gyro_noise_dps: float = 0.1
+    accel_bias_mps2: tuple[float, float, float] = (0.08, -0.05, 0.12)
+    accel_noise_mps2: float = 0.04
+    volts: float = 24.9
+    cells: int = 6
+    clock_ppm: tuple[float, float] = (20.0, -30.0)
+    boot_s: float = 0.4
+    uptime_s: float = 0.0
+    swapped: bool = False
+    ids: tuple[int, int] = (90, 91)
+    lose_inbound: float = 0.0
+    front_m: float = inf
+    faults: tuple[Fault, ...] = ()

@@ -1,0 +1,255 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What both Teensys share: lines in and out, clock, subscriptions, identity, configuration memory.
+
+A control cycle takes a millisecond of the Teensy's own crystal. Knows the manual's software
+structure. Must not know what either Teensy measures or moves.
+"""
+
+import struct
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Generic, TypeVar
+
+from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
+from omnibot_driver.simulator.fejemis import wire
+from omnibot_driver.simulator.fejemis.config import DriveConfig, FrontConfig
+from omnibot_driver.simulator.fejemis.settings import FejemisSettings
+
+C = TypeVar("C", DriveConfig, FrontConfig)
+
+STEP_S = 0.001
+HEARTBEAT_MS = 400
+LONGEST_NAME = 31
+
+
+@dataclass(frozen=True, slots=True)
+class Obeyed:
+    """A line that a Teensy executed at ``at_s`` since construction."""
+
+    at_s: float
+    text: str
+
+
+class Teensy(Generic[C]):
+    """One of the two. ``commands``: what it executed, newest last. ``received``: all its bytes.
+
+    What befalls it is set from outside, at any time. sums: whether its firmware has them. silent:
+    it sends nothing, and obeys. hung: neither sends nor obeys; whatever was driven goes on.
+    unplugged: its cable is out, and it goes on. powered: False once the power is cut.
+    """
+
+    version = 0
+    help_text = ""
+
+    def __init__(self, settings: FejemisSettings, place: int, config: C) -> None:
+        self.settings, self.firmware = settings, settings.firmware
+        self.sums = self.firmware.sums
+        self.silent = self.hung = self.unplugged = False
+        self.powered = True
+        self.commands: deque[Obeyed] = deque(maxlen=100_000)
+        self.received = bytearray()
+        self.unhandled = 0
+        """Lines that it did not know."""
+        self.inbound = FaultyLine(
+            LineFaults(lose=settings.lose_inbound), f"fejemis inbound {settings.seed} {place}"
+        )
+        self._rate = 1.0 + settings.clock_ppm[place] * 1e-6
+        self._factory: C = config
+        self.saved: C = config
+        """What is in the configuration memory."""
+        self._reader = wire.LineReader()
+        self._arrived: list[str] = []
+        self._out = bytearray()
+        self._told_s = 0.0
+        self._commands = dict(sorted(self.commands_table().items(), key=lambda row: -len(row[0])))
+        self._items = self.items()
+        self.config: C = config
+        self._restart(settings.uptime_s)
+
+    # What a kind of Teensy has
+
+    def items(self) -> dict[str, Callable[[], str]]:
+        """By the key of a subscription: what sends it."""
+        return {
+            "ver": lambda: f"ver {self.version} Fejemis {self.config.name} {self.version / 100}",
+            "id": lambda: f"id {self.config.name} {self.config.number}",
+        }
+
+    def commands_table(self) -> dict[str, Callable[[str], None]]:
+        """By its first word: what executes a command, given the rest of its line."""
+        return {
+            "sub": self._subscribe,
+            "leave": lambda _: self._leave(),
+            "help": lambda _: self._help(),
+            "setid": self._set_id,
+            "setname": self._set_name,
+            "eew": lambda _: self._save(),
+            "eer": lambda _: self._load(),
+        }
+
+    def boot(self) -> None:
+        """Power comes back to it."""
+
+    def cycle(self) -> None:
+        """One control cycle."""
+
+    # Time
+
+    @property
+    def clock_s(self) -> float:
+        """By its own crystal, since it booted."""
+        return self._clock_s
+
+    def clock_text(self, digits: int) -> str:
+        """As it is printed."""
+        time_s = self._clock_s
+        if self.firmware.single_precision:
+            (time_s,) = struct.unpack("f", struct.pack("f", time_s))
+        return f"{time_s:.{digits}f}"
+
+    def reboot(self) -> None:
+        """Its power goes and comes; what was not saved is lost."""
+        self._restart(0.0)
+
+    def _restart(self, uptime_s: float) -> None:
+        self.config = self.saved
+        self._reader.clear()
+        self._arrived.clear()
+        self._clock_s = uptime_s
+        self._cycles = round(uptime_s / STEP_S)
+        self._periods_ms: dict[str, int] = {"hbt": HEARTBEAT_MS}
+        self._due_ms: dict[str, float] = {"hbt": self._cycles + HEARTBEAT_MS}
+        self._next_ms = self._due_ms["hbt"]
+        self._booted = uptime_s > self.settings.boot_s
+        self.boot()
+
+    # Bytes
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes off the cable."""
+        if self.unplugged or not self.powered:
+            return
+        data = self.inbound.carry(data)
+        self.received += data
+        if not self.hung and self._booted:
+            self._arrived += self._reader.feed(data)
+
+    def step(self, now_s: float) -> bytes:
+        """Let a millisecond pass, which ends at ``now_s``; what left over the cable in it."""
+        if not self.powered:
+            return b""
+        self._told_s = now_s
+        self._clock_s += STEP_S * self._rate
+        if self._clock_s >= (self._cycles + 1) * STEP_S:
+            self._cycles += 1
+            self._next_cycle()
+        if not self._out:
+            return b""
+        data = bytes(self._out)
+        self._out.clear()
+        return b"" if self.unplugged or self.silent or self.hung else data
+
+    def say(self, text: str) -> None:
+        """Send a line."""
+        self._out += wire.line(text, sums=self.sums, carriage_return=self.firmware.carriage_return)
+
+    def _next_cycle(self) -> None:
+        if not self._booted:
+            if self._clock_s < self.settings.boot_s:
+                return
+            self._booted = True
+            self.say("# Starting main loop")
+        if self._arrived and not self.hung:
+            arrived, self._arrived = self._arrived, []
+            for text in arrived:
+                self._take(text)
+        self.cycle()
+        if self._cycles >= self._next_ms:
+            self._service_subscriptions()
+
+    def _service_subscriptions(self) -> None:
+        for key, due_ms in list(self._due_ms.items()):
+            if self._cycles >= due_ms:
+                self.say(self._items[key]())
+                self._due_ms[key] = due_ms + self._periods_ms[key]
+        self._next_ms = min(self._due_ms.values(), default=inf)
+
+    # Lines
+
+    def _take(self, text: str) -> None:
+        body = text
+        if self.sums:
+            check, body, should = wire.checked(text)
+            if check is wire.Check.WRONG:
+                self.say(f"# CRC failed ({should:02d} != {text[1:3]})")
+                return
+            if check is wire.Check.ABSENT:
+                self.say("# processing under protest - no CRC")
+        if self.firmware.confirms and body.startswith("!"):
+            self.say(f"confirm {body}")
+            body = body[1:]
+        self._execute(body)
+
+    def _execute(self, body: str) -> None:
+        word = body.split(" ", 1)[0]
+        if word.endswith("i") and word[:-1] in self._items:
+            self.commands.append(Obeyed(self._told_s, body))
+            self.say(self._items[word[:-1]]())
+            return
+        for name, execute in self._commands.items():  # as strncmp finds them, the longest first
+            if body.startswith(name):
+                self.commands.append(Obeyed(self._told_s, body))
+                execute(body[len(name) :])
+                return
+        if not body.startswith("#"):
+            self.unhandled += 1
+            self.say(f"# {self.clock_text(4)} unhandled: '{body}'")
+
+    def _subscribe(self, rest: str) -> None:
+        words = rest.split()
+        key = words[0] if words else ""
+        if key not in self._items:
+            self.unhandled += 1
+            self.say(f"# {self.clock_text(4)} unhandled: 'sub{rest}'")
+            return
+        period_ms = int(next(iter(wire.numbers(rest.partition(key)[2])), 0.0))
+        self._due_ms.pop(key, None)
+        if period_ms > 0:
+            self._periods_ms[key] = period_ms
+            self._due_ms[key] = self._cycles + period_ms
+        self._next_ms = min(self._due_ms.values(), default=inf)
+
+    @property
+    def subscriptions(self) -> dict[str, int]:
+        """Periods in ms, by key."""
+        return {key: self._periods_ms[key] for key in self._due_ms}
+
+    def _leave(self) -> None:
+        self._due_ms.clear()
+        self._next_ms = inf
+
+    def _help(self) -> None:
+        for text in self.help_text.splitlines():
+            self.say(text)
+
+    # Configuration
+
+    def _set_id(self, rest: str) -> None:
+        number = int(next(iter(wire.numbers(rest)), 0.0))
+        if number == 0:
+            self.config = self.saved = replace(self._factory, number=0)
+        else:
+            self.config = replace(self.config, number=number)
+
+    def _set_name(self, rest: str) -> None:
+        self.config = replace(self.config, name=rest.strip()[:LONGEST_NAME])
+
+    def _save(self) -> None:
+        if self.config.number > 0:
+            self.saved = self.config
+
+    def _load(self) -> None:
+        self.config = self.saved

@@ -1,0 +1,66 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Somebody who talks to a simulated Fejemis by typed lines, in simulated time."""
+
+from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
+
+DRIVE, FRONT = 0, 1
+
+
+class Rig:
+    """``lines``: all that came, with its time and its port, without ends.
+
+    relays: hands each angle of the front wheel on to drive, as the host is to do.
+    """
+
+    def __init__(self, *, firmware: Firmware | None = None, **settings: object) -> None:
+        sums = Firmware(sums=False) if firmware is None else firmware
+        self.board = SimulatedFejemis(
+            FejemisSettings(firmware=sums, **settings)  # type: ignore[arg-type]
+        )
+        self.lines: list[tuple[float, int, str]] = []
+        self.relays = False
+        self._held = [b"", b""]
+
+    @property
+    def now(self) -> float:
+        """Simulated."""
+        return self.board.now_s
+
+    def booted(self) -> "Rig":
+        """A second after power on."""
+        self.run(1.0)
+        self.lines.clear()
+        return self
+
+    def say(self, port: int, *texts: str) -> None:
+        """Lines as they are typed."""
+        for text in texts:
+            self.board.receive(text.encode("latin-1") + b"\n", self.now, port)
+
+    def run(self, seconds: float) -> list[tuple[int, str]]:
+        """What came meanwhile."""
+        before = len(self.lines)
+        for _ in range(round(seconds / self.board.tick_s)):
+            for port, data in self.board.advance():
+                *whole, self._held[port] = (self._held[port] + data).split(b"\n")
+                for line in whole:
+                    self._hear(port, line.decode("latin-1").rstrip("\r"))
+        return [(port, text) for _, port, text in self.lines[before:]]
+
+    def _hear(self, port: int, text: str) -> None:
+        self.lines.append((self.now, port, text))
+        if self.relays and text.startswith("fwl "):
+            self.say(DRIVE, f"fwl {text.split()[1]}")
+
+    def ask(self, port: int, text: str) -> list[str]:
+        """What this port says within 10 ms of it."""
+        self.say(port, text)
+        return [text for number, text in self.run(0.01) if number == port]
+
+    def drive(self, text: str, seconds: float) -> None:
+        """The same ``rc`` to both, with the angle relayed."""
+        self.relays = True
+        self.say(FRONT, "sub fwl 15", text)
+        self.say(DRIVE, text)
+        self.run(seconds)
