@@ -31,6 +31,8 @@ class DriveTeensy(Teensy[DriveConfig]):
 
     version = 110
     help_text = DRIVE_HELP
+    pose: tuple[float, float, float]
+    _last: tuple[int, int]
 
     def __init__(self, settings: FejemisSettings, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
@@ -57,11 +59,13 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.speeds_mps = (0.0, 0.0)
         self.vehicle.wanted_radps = (0.0, 0.0)
         self.vehicle.powered = self._booted
-        self._ticks_at_boot = self._raw_ticks()
-        self._last = (0, 0)
-        self.pose = (0.0, 0.0, 0.0)
+        self._reset_pose()
         self._sonar_m = self._sonar()
         self.imu.boot(self.config)
+
+    def started(self) -> None:
+        """What the wheels did meanwhile is not counted."""
+        self._reset_pose()
 
     # Each cycle
 

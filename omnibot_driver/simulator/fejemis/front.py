@@ -79,10 +79,10 @@ class FrontTeensy(Teensy[FrontConfig]):
         self._steer()
 
     def _measure(self) -> float:
-        if self.frozen:
-            return self._measured_deg
         if self.absent:
             return 0.0
+        if self.frozen:
+            return self._measured_deg
         true_deg = self.vehicle.servo.angle_deg
         seen_deg = true_deg + self.settings.sensor_zero_deg - self.config.angle_offset_deg
         return -seen_deg if self.config.angle_inverted else seen_deg

@@ -93,6 +93,9 @@ class Teensy(Generic[C]):
     def boot(self) -> None:
         """Power comes back to it."""
 
+    def started(self) -> None:
+        """The boot is over."""
+
     def cycle(self) -> None:
         """One control cycle."""
 
@@ -161,6 +164,7 @@ class Teensy(Generic[C]):
             if self._clock_s < self.settings.boot_s:
                 return
             self._booted = True
+            self.started()
             self.say("# Starting main loop")
         if self._arrived and not self.hung:
             arrived, self._arrived = self._arrived, []

@@ -2,9 +2,12 @@
 
 """Somebody who talks to a simulated Fejemis by typed lines, in simulated time."""
 
+import re
+
 from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
 
 DRIVE, FRONT = 0, 1
+BEAT = re.compile(r"(;\d\d)?hbt ")
 
 
 class Rig:
@@ -54,9 +57,10 @@ class Rig:
             self.say(DRIVE, f"fwl {text.split()[1]}")
 
     def ask(self, port: int, text: str) -> list[str]:
-        """What this port says within 10 ms of it."""
+        """What this port says within 10 ms of it, besides a heartbeat that nobody asked for."""
         self.say(port, text)
-        return [text for number, text in self.run(0.01) if number == port]
+        said = [answer for number, answer in self.run(0.01) if number == port]
+        return said if text == "hbti" else [answer for answer in said if not BEAT.match(answer)]
 
     def drive(self, text: str, seconds: float) -> None:
         """The same ``rc`` to both, with the angle relayed."""

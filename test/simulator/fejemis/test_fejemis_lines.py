@@ -1,0 +1,239 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Lines of the simulated Teensys: sums, comments, subscriptions, and each quirk of the hosts."""
+
+from itertools import pairwise
+
+import pytest
+from fejemis_rig import DRIVE, FRONT, Rig
+
+from omnibot_driver.simulator.fejemis import Firmware, wire
+
+SUMS = Firmware(sums=True)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        ";19rc 1 0.5 65",
+        ";69sub hbt 400",
+        ";34sub fwl 15",
+        ";50sub gyro 10",
+        ";31leave",
+        ";06hbt 44.97199 90 110 24.95 10 0",
+    ],
+)
+def test_sums_are_those_of_the_public_hosts(line: str) -> None:
+    """Typed from them."""
+    assert wire.checked(line)[0] is wire.Check.GOOD
+    assert wire.line(line[3:], sums=True, carriage_return=False) == line.encode() + b"\n"
+
+
+def test_heartbeats_come_unasked_every_400_ms_with_ids_90_and_91() -> None:
+    """As the manual shows them."""
+    rig = Rig()
+    rig.run(2.5)
+    beats = [(at, text) for at, port, text in rig.lines if text.startswith("hbt") and port == DRIVE]
+    assert [text.split()[2:] for _, text in beats] == [["90", "110", "24.90", "10", "0"]] * 6
+    assert {round(b - a, 3) for (a, _), (b, _) in pairwise(beats)} == {0.4}
+    assert len(beats[0][1].split()[1].partition(".")[2]) == 5
+    (front, *_) = [text for _, port, text in rig.lines if port == FRONT and "hbt" in text]
+    assert front.split()[2:] == ["91", "100", "0.00", "1", "0.011"]
+    assert len(front.split()[1].partition(".")[2]) == 4
+
+
+def test_a_wrong_sum_is_a_comment_and_nothing_else() -> None:
+    """The line is dropped."""
+    rig = Rig(firmware=SUMS).booted()
+    (answer,) = rig.ask(DRIVE, ";20rc 2 0.5 0")
+    assert "# CRC failed" in answer
+    rig.run(0.5)
+    assert rig.board.standing
+
+
+def test_a_line_without_a_sum_is_executed_under_protest() -> None:
+    """Firmware with sums says so."""
+    rig = Rig(firmware=SUMS).booted()
+    (answer,) = rig.ask(DRIVE, "rc 2 0.5 0")
+    assert answer.endswith("# processing under protest - no CRC")
+    rig.run(0.5)
+    assert not rig.board.standing
+
+
+def test_firmware_without_sums_does_not_know_them() -> None:
+    """To it the line is an unknown command, and its own lines have none."""
+    rig = Rig().booted()
+    (answer,) = rig.ask(DRIVE, ";19rc 1 0.5 65")
+    assert answer.startswith("# 1.0")
+    assert answer.endswith("unhandled: ';19rc 1 0.5 65'")
+    assert rig.board.standing
+
+
+def test_an_unknown_command_is_a_comment() -> None:
+    """With the Teensy's time."""
+    rig = Rig(firmware=SUMS).booted()
+    (answer,) = rig.ask(FRONT, ";35fly")
+    assert wire.checked(answer)[0] is wire.Check.GOOD
+    assert answer.endswith("unhandled: 'fly'")
+
+
+@pytest.mark.parametrize("text", ["stop", "start"])
+def test_the_front_half_does_not_know_stop_and_start(text: str) -> None:
+    """They are drive's alone."""
+    rig = Rig().booted()
+    assert rig.ask(FRONT, text)[0].endswith(f"unhandled: '{text}'")
+    assert rig.ask(DRIVE, text) == []
+
+
+def test_an_upside_down_command_is_confirmed_by_newer_firmware_only() -> None:
+    """Others do not know it."""
+    newer = Rig(firmware=Firmware(sums=False, confirms=True)).booted()
+    assert newer.ask(DRIVE, "!stop") == ["confirm !stop"]
+    assert newer.board.drive.source == -1
+    older = Rig().booted()
+    assert "unhandled" in older.ask(DRIVE, "!stop")[0]
+    assert older.board.drive.source == 10
+
+
+def test_a_subscription_comes_in_its_period_until_it_is_set_to_zero() -> None:
+    """It is not acknowledged."""
+    rig = Rig().booted()
+    assert rig.ask(FRONT, "sub fwl 15") == []
+    assert sum("fwl" in text for _, text in rig.run(1.5)) == 100
+    rig.say(FRONT, "sub fwl 0")
+    rig.run(0.01)
+    assert not any("fwl" in text for _, text in rig.run(0.5))
+
+
+def test_leave_ends_all_of_them_the_heartbeat_too() -> None:
+    """Until it is subscribed again."""
+    rig = Rig().booted()
+    rig.say(DRIVE, "sub pose 20", "sub gyro 10", "leave")
+    rig.run(0.01)
+    assert {port for port, _ in rig.run(1.0)} == {FRONT}
+    rig.say(DRIVE, "sub hbt 100")
+    assert sum(port == DRIVE for port, _ in rig.run(1.05)) == 10
+
+
+KEYS = {
+    DRIVE: "ver adc int bat time amp cvdrive cpdrive confs hbt id gyro gyroo acc acco mag magw mago"
+    " imupose enc pose vel conf tofd tof1 sr04",
+    FRONT: "hbt id mot adc int bat time cur ir svp svjt fwl fwo cvsteer cpsteer confs",
+}
+
+
+@pytest.mark.parametrize(
+    ("port", "key"), [(port, key) for port, keys in KEYS.items() for key in keys.split()]
+)
+def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key: str) -> None:
+    """By the key that its help has; the infrared sensors answer by another."""
+    rig = Rig().booted()
+    rig.say(port, "leave")
+    rig.run(0.01)
+    once = rig.ask(port, f"{key}i")[0]
+    assert once.split()[0] == ("irc" if key == "ir" else key)
+    rig.say(port, f"sub {key} 100")
+    assert len([number for number, _ in rig.run(1.05) if number == port]) >= 10
+
+
+def test_help_is_a_flood_of_text_that_is_no_comment() -> None:
+    """As the manual prints it, for each half."""
+    rig = Rig().booted()
+    drive, front = rig.ask(DRIVE, "help"), rig.ask(FRONT, "help")
+    assert len(drive) > 55
+    assert any("stop    Stop. No control allowed" in line for line in drive)
+    assert any("brush 0/1" in line for line in front)
+    assert not [line for line in drive + front if line.startswith("#")]
+
+
+def test_a_line_of_more_than_200_characters_is_cut() -> None:
+    """What follows begins a line of its own: here a command."""
+    rig = Rig().booted()
+    rig.say(DRIVE, "x" * 200 + "stop")
+    rig.run(0.01)
+    assert rig.board.drive.source == -1
+
+
+@pytest.mark.parametrize(
+    ("line", "v", "turn_dps"),
+    [
+        ("rc 2 0.250 11.459", 0.25, 11.459),
+        ("rc  0.250 1.459", 1.459, 0.0),  # the source is lost, and a digit
+        ("rc 2 0.25", 0.25, 0.0),
+        ("rc", 0.0, 0.0),
+        ("rc2 .5 -3e1", 0.5, -30.0),
+    ],
+)
+def test_numbers_are_read_one_after_the_other(line: str, v: float, turn_dps: float) -> None:
+    """What is missing is zero."""
+    rig = Rig().booted()
+    rig.say(DRIVE, line)
+    rig.run(0.01)
+    assert rig.board.drive.reference[0] == v
+    assert rig.board.drive.turn_dps == pytest.approx(turn_dps)
+
+
+def test_lines_end_with_or_without_a_carriage_return() -> None:
+    """Both ways; the manual shows neither."""
+    rig = Rig().booted()
+    rig.board.receive(b"stop\r\n", 0.0, DRIVE)
+    rig.run(0.01)
+    assert rig.board.drive.source == -1
+    for carriage_return, end in ((True, b"0\r\n"), (False, b"0\n")):
+        board = Rig(firmware=Firmware(sums=False, carriage_return=carriage_return)).board
+        sent = b"".join(data for _ in range(600) for port, data in board.advance() if port == DRIVE)
+        assert sent.endswith(end)
+
+
+def test_variants_of_messages() -> None:
+    """A time before the wheels' speeds, a tilt behind the pose, acceleration in g."""
+    usual = Rig(accel_noise_mps2=0.0, accel_bias_mps2=(0.0, 0.0, 0.0)).booted()
+    assert len(usual.ask(DRIVE, "veli")[0].split()) == 3
+    assert len(usual.ask(DRIVE, "posei")[0].split()) == 5
+    assert usual.ask(DRIVE, "acci")[0].split()[3] == "9.8066"
+    firmware = Firmware(sums=False, timed_velocity=True, tilt=True, acceleration_in_g=True)
+    other = Rig(firmware=firmware, accel_noise_mps2=0.0, accel_bias_mps2=(0.0, 0.0, 0.0)).booted()
+    assert len(other.ask(DRIVE, "veli")[0].split()) == 4
+    assert len(other.ask(DRIVE, "posei")[0].split()) == 6
+    assert other.ask(DRIVE, "acci")[0].split()[3] == "1.0000"
+
+
+def test_single_precision_makes_steps_of_the_time_after_hours() -> None:
+    """0.5 ms and more after two hours."""
+    firmware = Firmware(sums=False, single_precision=True)
+    rig = Rig(firmware=firmware, uptime_s=8000.0)
+    times = []
+    for _ in range(20):
+        times.append(float(rig.ask(DRIVE, "posei")[0].split()[1]))
+    assert all(time * 2048 == pytest.approx(round(time * 2048), abs=0.03) for time in times)
+
+
+def test_the_two_clocks_run_apart() -> None:
+    """Each Teensy has a crystal of its own."""
+    rig = Rig(clock_ppm=(200.0, -300.0))
+    rig.run(20.0)
+    assert rig.board.drive.clock_s == pytest.approx(20.004)
+    assert rig.board.front.clock_s == pytest.approx(19.994)
+
+
+def test_bytes_to_the_boards_can_be_lost() -> None:
+    """By the seed; the same each time."""
+    heard = []
+    for _ in range(2):
+        rig = Rig(firmware=SUMS, lose_inbound=0.05, seed=3).booted()
+        for _ in range(100):
+            rig.say(DRIVE, ";06rc 2 0.250 11.459")
+        rig.run(0.01)
+        heard.append(bytes(rig.board.drive.received))
+    assert heard[0] == heard[1]
+    assert len(heard[0]) < 2090
+
+
+def test_three_lost_characters_leave_a_valid_command() -> None:
+    """``c`` is 99, and ``2`` with ``1`` too: the sum does not see them."""
+    rig = Rig(firmware=SUMS).booted()
+    whole, cut = "rc 2 0.250 11.459", "rc  0.250 1.459"
+    assert wire.sum_of(whole) == wire.sum_of(cut)
+    rig.say(DRIVE, f";{wire.sum_of(whole):02d}{cut}")
+    rig.run(0.01)
+    assert rig.board.drive.reference[0] == 1.459
