@@ -8,7 +8,7 @@ actuator that says orders. It knows no ROS, no port and no clock.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, Literal, Protocol
@@ -16,7 +16,7 @@ from typing import Any, Literal, Protocol
 from omnibot_driver.core.commands.actuator import Actuator
 from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.packets import NO_PACKETS, Packets
-from omnibot_driver.core.readings import Reading, SampleBoundary
+from omnibot_driver.core.readings import ImuReading, Reading, SampleBoundary
 from omnibot_driver.core.traits import Traits
 
 
@@ -59,6 +59,25 @@ class BoardFigures:
     own: Mapping[str, str] = field(default_factory=dict)
 
 
+class ReadingClock(Protocol):
+    """What stamps the readings of a board, in s of the host's steady clock."""
+
+    @property
+    def skew_ppm(self) -> float:
+        """How much faster the board's clock runs than ours."""
+
+    def restart(self) -> None:
+        """What the board does from here on has nothing to do with what it did before."""
+
+    def stamps(
+        self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
+    ) -> list[float]:
+        """Of the readings that ``Board.receive`` or ``elapse`` has just told, in their order."""
+
+    def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
+        """``stamps`` of one that came alone; None, and nothing is changed, where it is not sure."""
+
+
 class Board(Protocol):
     """One kind of board. Requests raise RequestRefused where the mode forbids them.
 
@@ -70,6 +89,9 @@ class Board(Protocol):
 
     settings: Any
     """What its wire does not tell, in values of its own kind; may be replaced at any time."""
+
+    clock: ReadingClock | None = None
+    """What stamps its readings, where they carry the board's time; None: ticks, or arrival."""
 
     @property
     def mode(self) -> Mode:
@@ -165,6 +187,10 @@ class Board(Protocol):
 
     def emergency_stop(self) -> Packets:
         """The board's own emergency stop, and nothing else."""
+        return NO_PACKETS
+
+    def farewell(self) -> Packets:
+        """What else to switch off when the driver ends, behind Stop and what ``on_exit`` says."""
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:

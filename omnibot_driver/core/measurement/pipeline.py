@@ -9,7 +9,7 @@ what else is made of it (``flush``).
 
 from collections.abc import Sequence
 
-from omnibot_driver.core.board import Board
+from omnibot_driver.core.board import Board, ReadingClock
 from omnibot_driver.core.events import Extra
 from omnibot_driver.core.geometry.se2 import Signs
 from omnibot_driver.core.imu.bias_correction import BiasCorrector, ImuEstimate
@@ -45,7 +45,11 @@ class MeasurementPipeline:
         self._tally = StreamStatistics()
         self._board = board
         period_s = board.traits.imu_period_s
-        self._clock = DeviceClock(period_s) if period_s else ArrivalClock()
+        self._clock: ReadingClock
+        if board.clock is not None:
+            self._clock = board.clock
+        else:
+            self._clock = DeviceClock(period_s) if period_s else ArrivalClock()
         self._outliers = OutlierFilter(settings.motion, period_s or 0.0)
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
         """Of each read the readings, and how old the newest was."""

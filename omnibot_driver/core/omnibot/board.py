@@ -70,6 +70,7 @@ class OmniBot:
     """One board on one line. ``settings`` may be replaced at any time, but not the delta period."""
 
     traits = TRAITS
+    clock = None
     wake_at = math.inf
     shows_standstill = True
     refusal = ""
@@ -209,6 +210,10 @@ class OmniBot:
     def emergency_stop(self) -> Packets:
         """The manual's E-stop."""
         return self._encoder.emergency_stop()
+
+    def farewell(self) -> Packets:
+        """Nothing."""
+        return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
         """Always the same."""
