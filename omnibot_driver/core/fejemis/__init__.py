@@ -2,6 +2,7 @@
 
 """The Fejemis sweeping robot: two Teensys, lines of text. Bytes and times, nothing else."""
 
+from omnibot_driver.core.fejemis.decoder import FejemisDecoder
 from omnibot_driver.core.fejemis.readings import (
     BatteryReading,
     Job,
@@ -15,6 +16,7 @@ from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
 
 __all__ = [
     "BatteryReading",
+    "FejemisDecoder",
     "FejemisSettings",
     "Job",
     "JobDone",

@@ -1,0 +1,120 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From the bytes of one line to messages: cut at line ends, sums checked, damage counted.
+
+The manual shows lines without sums, the public hosts lines with them. ``auto`` takes both until the
+heartbeats have told which it is, and from then on only these. A line without sum is all the more
+looked at: the boards print each number with a fixed count of decimals, so a line whose decimals are
+not those of the lines before it has lost some (``forms``).
+
+Reads no clock, never raises on input, holds less than ``LONGEST_LINE`` bytes between calls, and
+looks at each byte a bounded number of times.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.fejemis.codec import parse
+from omnibot_driver.core.fejemis.forms import Forms
+from omnibot_driver.core.fejemis.messages import Comment, Heartbeat, Message
+from omnibot_driver.core.fejemis.settings import LineSums
+from omnibot_driver.core.fejemis.sums import without_sum
+
+LONGEST_LINE: Final = 200
+"""Characters, as the boards' own buffers hold."""
+CHANGED_AFTER: Final = 2
+"""So many heartbeats in a row have or lack a sum before that is believed: one may be damaged."""
+
+
+@dataclass(slots=True)
+class DecoderStatistics:
+    """Counts since they were made. ``faults``: lines that were damaged or of no known kind."""
+
+    lines: int = 0
+    faults: int = 0
+    discarded_bytes: int = 0
+    comments: int = 0
+
+
+class FejemisDecoder:
+    """One board's line. ``sums``: whether its lines have sums; None while that is not known.
+
+    ``changed``: they began or ceased to, since it was set to False last.
+    """
+
+    def __init__(self, line_sums: LineSums = "auto") -> None:
+        self.statistics = DecoderStatistics()
+        self.changed = False
+        self._held = b""
+        self._cut = False
+        """The line in hand is too long already."""
+        self._forms = Forms()
+        self.line_sums = line_sums
+
+    @property
+    def line_sums(self) -> LineSums:
+        """As it was set."""
+        return self._line_sums
+
+    @line_sums.setter
+    def line_sums(self, line_sums: LineSums) -> None:
+        self._line_sums: LineSums = line_sums
+        self.sums = None if line_sums == "auto" else line_sums == "on"
+        self._otherwise = 0
+
+    def feed(self, data: bytes, now: float) -> list[Message]:
+        """The messages that these bytes complete, in their order."""
+        *lines, rest = (self._held + data).split(b"\n")
+        found = []
+        for line in lines:
+            cut, self._cut = self._cut, False
+            message = None if cut or len(line) > LONGEST_LINE else self._take(line)
+            if message is not None:
+                found.append(message)
+            elif cut or line.strip(b"\r \0"):
+                self._damaged(len(line) + 1)
+        if len(rest) >= LONGEST_LINE:
+            self.statistics.discarded_bytes += len(rest)
+            rest, self._cut = b"", True
+        self._held = rest
+        return found
+
+    def flush(self, now: float) -> list[Message]:
+        """The line is closed: a line without its end is none."""
+        if self._held or self._cut:
+            self._damaged(len(self._held))
+        self._held, self._cut = b"", False
+        return []
+
+    def _take(self, line: bytes) -> Message | None:
+        line = line.rstrip(b"\r").lstrip(b"\r\0")
+        text, right = without_sum(line)
+        if right is False or not text.isascii():
+            return None
+        message = parse(text.decode("ascii"))
+        if message is None:
+            return None
+        if isinstance(message, Heartbeat):
+            self._learn(with_sum=right is not None)
+        elif self.sums is not None and self.sums is not (right is not None):
+            return None
+        if isinstance(message, Comment):
+            self.statistics.comments += 1
+        elif not self._forms.admit(text):
+            return None
+        self.statistics.lines += 1
+        return message
+
+    def _learn(self, *, with_sum: bool) -> None:
+        """By heartbeats alone: each board sends them unasked."""
+        if self._line_sums != "auto" or with_sum is self.sums:
+            self._otherwise = 0
+            return
+        self._otherwise += 1
+        if self._otherwise >= CHANGED_AFTER:
+            self.changed = self.sums is not None
+            self.sums, self._otherwise = with_sum, 0
+
+    def _damaged(self, length: int) -> None:
+        self.statistics.faults += 1
+        self.statistics.discarded_bytes += length

@@ -1,0 +1,101 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Gyro and acceleration lines, which carry no time, as readings of one IMU with a time.
+
+The board measures both each ``PERIOD_S`` of its own clock, and sends the gyro first. So samples are
+counted, and a sample's time is a whole count of periods from one phase. The arrivals tell that
+phase and the count: no sample comes before its time; one that comes after a pose in the stream is
+not older than it.
+"""
+
+import math
+from collections import deque
+from typing import Final
+
+from omnibot_driver.core.fejemis.messages import Acceleration, Gyro
+from omnibot_driver.core.fejemis.settings import AccelerationUnit
+from omnibot_driver.core.readings import ImuReading, Vector3
+
+PERIOD_S: Final = 0.01
+STANDARD_GRAVITY: Final = 9.80665
+PAIR_WITHIN_S: Final = 0.008
+"""The two lines of one sample leave the board in one cycle."""
+LOSS_READS: Final = 12
+"""So many samples that were all late by a period or more: one was lost, rather."""
+PHASE_BLOCKS: Final = 20
+BLOCK: Final = 100
+
+
+class ImuPairing:
+    """``unit`` of the acceleration."""
+
+    def __init__(self, unit: AccelerationUnit) -> None:
+        self.unit: AccelerationUnit = unit
+        self.rates: Vector3 = (math.nan,) * 3
+        self.forces: Vector3 = (math.nan,) * 3
+        self.begin()
+
+    def begin(self) -> None:
+        """The board subscribes anew: the phase is another one."""
+        self._gyro: tuple[Gyro, float] | None = None
+        self._count = 0
+        self._phase_s: float | None = None
+        self._floor_s: deque[float] = deque(maxlen=PHASE_BLOCKS)
+        self._block_s, self._block_from = math.inf, 0
+        self._delays_s: deque[float] = deque(maxlen=LOSS_READS)
+
+    def gyro(self, gyro: Gyro, now: float) -> None:
+        """The first half of a sample."""
+        self._gyro = gyro, now
+
+    def acceleration(self, acceleration: Acceleration, now: float) -> ImuReading | None:
+        """The second half; None where the first one is missing."""
+        held, self._gyro = self._gyro, None
+        if held is None or now - held[1] > PAIR_WITHIN_S:
+            return None
+        gyro, _ = held
+        scale = STANDARD_GRAVITY if self.unit == "g" else 1.0
+        self.rates = math.radians(gyro.x), math.radians(gyro.y), math.radians(gyro.z)
+        self.forces = (scale * acceleration.x, scale * acceleration.y, scale * acceleration.z)
+        return ImuReading(self.forces, self.rates)
+
+    def sampled_s(self, arrived_s: float, not_before_s: float) -> float:
+        """The board's time of the sample that has just come, given the board's time of its arrival.
+
+        ``not_before_s``: of the pose that came before it.
+        """
+        if self._phase_s is None or arrived_s - self._phase_s < -1.0:
+            self.begin()
+            self._phase_s = arrived_s
+            return arrived_s
+        self._count += 1
+        time_s = self._phase_s + self._count * PERIOD_S
+        if time_s < not_before_s - PERIOD_S / 2:
+            lost = math.ceil((not_before_s - PERIOD_S / 2 - time_s) / PERIOD_S)
+            self._count += lost
+            time_s += lost * PERIOD_S
+        delay_s = arrived_s - time_s
+        if delay_s < -PERIOD_S / 2:
+            back = round(-delay_s / PERIOD_S)
+            self._count -= back
+            delay_s += back * PERIOD_S
+        self._delays_s.append(delay_s)
+        least_s = min(self._delays_s)
+        if len(self._delays_s) == LOSS_READS and least_s > 0.7 * PERIOD_S:
+            lost = round(least_s / PERIOD_S)
+            self._count += lost
+            delay_s -= lost * PERIOD_S
+            self._delays_s.clear()
+        self._follow(delay_s)
+        return self._phase_s + self._count * PERIOD_S
+
+    def _follow(self, delay_s: float) -> None:
+        """The phase is as late as the arrivals of the last while allow."""
+        assert self._phase_s is not None
+        self._block_s = min(self._block_s, delay_s + self._phase_s)
+        if self._block_s < self._phase_s:
+            self._phase_s = self._block_s
+        if self._count - self._block_from >= BLOCK:
+            self._floor_s.append(self._block_s)
+            self._phase_s = min(self._floor_s)
+            self._block_s, self._block_from = math.inf, self._count

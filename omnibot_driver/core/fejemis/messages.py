@@ -1,0 +1,184 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Every message of the two help lists that tells something, as a value; numbers as they are sent.
+
+Units are the board's: degrees, m/s², µT, V, A, m, s. What only diagnostics show is a ``Status`` or
+a ``Words``. Knows neither characters nor what is made of a message.
+"""
+
+from dataclasses import dataclass
+
+from omnibot_driver.core.values import value
+
+
+@value(frozen=True, slots=True)
+class Heartbeat:
+    """``hbt``. ``state``: on the drive board ``rcSource``, -1 while it is stopped."""
+
+    time_s: float
+    identity: int
+    version: int
+    volts: float
+    state: float
+
+
+@value(frozen=True, slots=True)
+class FrontAngle:
+    """``fwl``: angle of the front wheel in degrees, positive to the left, and how sure it is."""
+
+    angle_deg: float
+    error: int
+    diagnosis: int
+
+
+@value(frozen=True, slots=True)
+class BoardPose:
+    """``pose``: the board's dead reckoning; ``decimals`` of x and y as they were sent."""
+
+    time_s: float
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    decimals: int = 9
+
+
+@value(frozen=True, slots=True)
+class WheelSpeeds:
+    """``vel``, of the rims; ``time_s`` where the firmware sends it."""
+
+    left_mps: float
+    right_mps: float
+    time_s: float | None = None
+
+
+@value(frozen=True, slots=True)
+class Gyro:
+    """``gyro`` in degrees a second."""
+
+    x: float
+    y: float
+    z: float
+
+
+@value(frozen=True, slots=True)
+class Acceleration:
+    """``acc`` in m/s², or in g on some firmware."""
+
+    x: float
+    y: float
+    z: float
+
+
+@value(frozen=True, slots=True)
+class Magnetic:
+    """``mag`` in µT."""
+
+    x: float
+    y: float
+    z: float
+
+
+@value(frozen=True, slots=True)
+class Attitude:
+    """``imupose``: the board's orientation, in rad."""
+
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+
+
+@value(frozen=True, slots=True)
+class Battery:
+    """``bat``."""
+
+    volts: float
+    amps: float
+    cells: int
+
+
+@value(frozen=True, slots=True)
+class Distance:
+    """``tofd``, ``sr04`` in m."""
+
+    keyword: str
+    distance_m: float
+
+
+@value(frozen=True, slots=True)
+class Infrared:
+    """``ir``: both sensors in m, and the calibration where it is sent."""
+
+    distances_m: tuple[float, float]
+    calibration: tuple[float, ...] = ()
+
+
+@value(frozen=True, slots=True)
+class WheelConfiguration:
+    """``conf``: radius of left and right wheel, gear, ticks, track, control period."""
+
+    left_radius_m: float
+    right_radius_m: float
+    gear: float
+    ticks_per_revolution: float
+    track_m: float
+    period_s: float
+
+
+@value(frozen=True, slots=True)
+class SteeringConfiguration:
+    """``confs``: by the help text first the distance of the steered wheel, then the track."""
+
+    first_m: float
+    second_m: float
+
+
+@value(frozen=True, slots=True)
+class FrontWheelOffset:
+    """``fwo``."""
+
+    offset_deg: float
+    inverted: bool
+
+
+@value(frozen=True, slots=True)
+class Status:
+    """Numbers that only diagnostics show, or that answer one request."""
+
+    keyword: str
+    numbers: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """Text: a name, a version, an answer."""
+
+    keyword: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Comment:
+    """A line that begins with ``#``, or the text of ``help``."""
+
+    text: str
+
+
+Message = (
+    Heartbeat
+    | FrontAngle
+    | BoardPose
+    | WheelSpeeds
+    | Gyro
+    | Acceleration
+    | Magnetic
+    | Attitude
+    | Battery
+    | Distance
+    | Infrared
+    | WheelConfiguration
+    | SteeringConfiguration
+    | FrontWheelOffset
+    | Status
+    | Words
+    | Comment
+)

@@ -1,0 +1,159 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From poses and wheel speeds of the drive board to displacements.
+
+A pose tells where the robot is, with few digits: a millimetre in 20 ms is 0.05 m/s. The speeds of
+the wheels tell how it moves. So a displacement is what the speeds make of the time between two
+poses, drawn to where the pose is; and the whole way to the pose where both differ by more than
+rounding: lines were lost, or a wheel was turned quickly. What was told adds up to the pose.
+
+A pose that no robot of such speeds can have reached waits for the next one. If that agrees with it,
+either the pose before both was false, or the board's frame is another one (``enc0``).
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.fejemis.messages import BoardPose, WheelSpeeds
+from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
+from omnibot_driver.core.readings import DisplacementReading
+
+DRAWN: Final = 0.25
+"""Part of a difference within rounding that one displacement makes up for."""
+ROUNDINGS: Final = 1.5
+"""Two poses are rounded by half a digit each, and the heading turns one into the other."""
+SLACK_M: Final = 0.02
+SLACK_RAD: Final = 0.06
+"""What a pose may be beside the way that the speeds explain."""
+SPEED_UP_MPS2: Final = 3.0
+FASTEST_MPS: Final = 4.0
+FASTEST_RADPS: Final = 12.0
+FRESH_S: Final = 0.1
+"""Speeds that are older tell nothing."""
+LEAST_S: Final = 0.001
+YAW_DIGIT_RAD: Final = 1e-4
+
+
+class PoseOdometry:
+    """``track_m``: as the board is configured."""
+
+    def __init__(self, track_m: float) -> None:
+        self.track_m = track_m
+        self.refused = 0
+        """Poses that were not believed."""
+        self._pose: BoardPose | None = None
+        self._told = Pose()
+        self._restarted = False
+        self.begin()
+
+    def begin(self) -> None:
+        """The line is new; the frame may be as it was."""
+        self._doubted: BoardPose | None = None
+        self._speeds: WheelSpeeds | None = None
+        self._before: WheelSpeeds | None = None
+        self._speeds_at = -math.inf
+
+    def forget(self) -> None:
+        """The board has restarted: its frame begins anew, somewhere on the way."""
+        self._restarted |= self._pose is not None
+        self._pose = None
+        self.begin()
+
+    def speeds(self, speeds: WheelSpeeds, now: float) -> None:
+        """Of both wheels."""
+        self._before, self._speeds, self._speeds_at = self._speeds, speeds, now
+
+    def pose(self, pose: BoardPose, now: float) -> DisplacementReading | None:
+        """The displacement up to here; None for the first pose, and for one that is doubted."""
+        before = self._pose
+        if before is None:
+            self._begin_at(pose)
+            restarted, self._restarted = self._restarted, False
+            nothing = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True)
+            return nothing if restarted else None
+        seconds = pose.time_s - before.time_s
+        way = log_of(self._told.way_to(_place(pose)))
+        if seconds < LEAST_S or not self._explained(way, seconds, now):
+            return self._doubt(pose)
+        self._doubted = None
+        displacement = self._drawn(way, seconds, pose.decimals, now)
+        self._pose = pose
+        self._told = self._told.moved(roll(displacement))
+        return _reading(displacement, seconds)
+
+    def _begin_at(self, pose: BoardPose) -> None:
+        self._pose, self._told = pose, _place(pose)
+        self._doubted = None
+
+    def _doubt(self, pose: BoardPose) -> DisplacementReading | None:
+        before, self._doubted = self._doubted, pose
+        self.refused += 1
+        if before is None:
+            return None
+        seconds = pose.time_s - before.time_s
+        way = log_of(_place(before).way_to(_place(pose)))
+        if seconds < LEAST_S or not _possible(way, seconds):
+            return None
+        assert self._pose is not None
+        since_s = pose.time_s - self._pose.time_s
+        whole = log_of(self._told.way_to(_place(pose)))
+        self._begin_at(pose)
+        if since_s > 0.0 and _possible(whole, since_s):
+            return _reading(whole, since_s)
+        return DisplacementReading(
+            way.x_m, way.y_m, way.yaw_rad, "body", seconds, 0, restarted=True
+        )
+
+    def _rolled(self, seconds: float, now: float) -> Pose | None:
+        """What the speeds make of this time; None where they are not known for it."""
+        speeds = self._speeds
+        if speeds is None or now - self._speeds_at > FRESH_S or seconds > FRESH_S:
+            return None
+        before = self._before or speeds
+        left = (speeds.left_mps + before.left_mps) / 2
+        right = (speeds.right_mps + before.right_mps) / 2
+        return Pose((left + right) / 2, 0.0, (right - left) / self.track_m).times(
+            seconds, seconds, seconds
+        )
+
+    def _explained(self, way: Pose, seconds: float, now: float) -> bool:
+        if not _possible(way, seconds):
+            return False
+        rolled = self._rolled(seconds, now)
+        if rolled is None:
+            return True
+        off = way - rolled
+        slack_m = SLACK_M + SPEED_UP_MPS2 * seconds * seconds
+        return off.way_m <= slack_m and abs(off.yaw_rad) <= SLACK_RAD + slack_m / self.track_m
+
+    def _drawn(self, way: Pose, seconds: float, decimals: int, now: float) -> Pose:
+        rolled = self._rolled(seconds, now)
+        if rolled is None:
+            return way
+        off = way - rolled
+        digit_m = 10.0**-decimals
+        if off.way_m > ROUNDINGS * digit_m or abs(off.yaw_rad) > ROUNDINGS * YAW_DIGIT_RAD:
+            return (
+                way if off.way_m > 3.0 * digit_m or abs(off.yaw_rad) > 0.005 else _half(rolled, way)
+            )
+        return rolled + off.times(DRAWN, DRAWN, DRAWN)
+
+
+def _half(one: Pose, other: Pose) -> Pose:
+    return (one + other).times(0.5, 0.5, 0.5)
+
+
+def _place(pose: BoardPose) -> Pose:
+    return Pose(pose.x_m, pose.y_m, pose.yaw_rad)
+
+
+def _possible(way: Pose, seconds: float) -> bool:
+    """Whether a robot can go so far in this time at all."""
+    return (
+        way.way_m <= FASTEST_MPS * seconds + SLACK_M
+        and abs(way.yaw_rad) <= FASTEST_RADPS * seconds + SLACK_RAD
+    )
+
+
+def _reading(tangent: Pose, seconds: float) -> DisplacementReading:
+    return DisplacementReading(tangent.x_m, tangent.y_m, tangent.yaw_rad, "body", seconds, 0)

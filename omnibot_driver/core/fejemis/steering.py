@@ -1,0 +1,170 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From a body twist to what each board is told, so that the body moves so.
+
+The drive board does not do what ``rc`` says: its outer wheel turns with the root of v² + w²,
+about the centre that the *measured* front angle gives. So both are multiplied by
+(`|v|` + `|w|`·B/2) / sqrt(v² + w²), which makes that root the speed of the outer wheel.
+
+While the front wheel is on its way the drive board is told less: as much as moves the body neither
+faster nor turns it quicker than commanded. A turn on the spot begins when the wheel is across;
+until then the drive board is told to stand. Knows geometry and angles; not how they are said.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.geometry.steered import SteeredKinematics
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.values import value
+
+ACROSS_RAD: Final = math.radians(85.0)
+"""Beyond this angle the body turns on the spot."""
+ALIGNED_RAD: Final = math.radians(5.0)
+STILL_ALIGNED_RAD: Final = math.radians(10.0)
+"""A robot that turns goes on up to here."""
+GIVEN_RAD: Final = math.radians(5.0)
+"""What a body may do besides while its wheel is on the way: as if it were off by this angle."""
+FOLLOWS_WITHIN_S: Final = 1.5
+"""A front wheel that is not near its angle for so long does not follow."""
+FOLLOWS_RAD: Final = math.radians(12.0)
+
+
+@value(frozen=True, slots=True)
+class Steered:
+    """``speed_mps``, ``turn_radps`` for the front board; ``part`` of both for the drive board.
+
+    ``angle_rad``: where the wheel is to stand. ``twist``: what the body does with the wheel as it
+    is. ``whole``: whether nothing is held back.
+    """
+
+    speed_mps: float
+    turn_radps: float
+    part: float
+    angle_rad: float
+    twist: BodyTwist
+    whole: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Geometry:
+    """Of the boards: B and F of the manual, in m."""
+
+    track_m: float
+    wheelbase_m: float
+
+    @property
+    def kinematics(self) -> SteeredKinematics:
+        """With wheels of 1 m."""
+        return SteeredKinematics(1.0, self.track_m, self.wheelbase_m)
+
+
+AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
+
+
+def scale(twist: BodyTwist, track_m: float) -> float:
+    """What both numbers of ``rc`` are multiplied by; 1 at rest."""
+    root = math.hypot(twist.vx_mps, twist.yaw_rate_radps)
+    return outer_mps(twist, track_m) / root if root else 1.0
+
+
+def outer_mps(twist: BodyTwist, track_m: float) -> float:
+    """Speed of the rim of the faster wheel, without sign."""
+    return abs(twist.vx_mps) + abs(twist.yaw_rate_radps) * track_m / 2
+
+
+def steer(
+    wanted: BodyTwist, geometry: Geometry, angle_rad: float | None, *, turning: bool
+) -> Steered:
+    """What to tell. ``angle_rad``: of the front wheel, None where it is not known.
+
+    ``turning``: whether the body turns on the spot already.
+    """
+    target_rad = geometry.kinematics.steering_rad(wanted)
+    factor = scale(wanted, geometry.track_m)
+    outer = outer_mps(wanted, geometry.track_m)
+    allowed = 0.0
+    if angle_rad is not None:
+        allowed = min(outer, _allowed(wanted, geometry, target_rad, angle_rad, turning=turning))
+    part = allowed / outer if outer else 1.0
+    twist = AT_REST
+    if angle_rad is not None and allowed:
+        twist = body_twist(math.copysign(allowed, wanted.vx_mps or 1.0), geometry, angle_rad)
+    return Steered(
+        factor * wanted.vx_mps,
+        factor * wanted.yaw_rate_radps,
+        part,
+        target_rad,
+        twist,
+        part == 1.0,
+    )
+
+
+def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTwist:
+    """Of a body whose outer wheel rolls so, by the manual's equations; negative is backward."""
+    across = math.sin(angle_rad) / geometry.wheelbase_m
+    rolled = outer_mps / (math.cos(angle_rad) + abs(across) * geometry.track_m / 2)
+    return BodyTwist(rolled * math.cos(angle_rad), 0.0, rolled * across)
+
+
+def told_twist(
+    speed_mps: float, turn_radps: float, geometry: Geometry, angle_rad: float
+) -> BodyTwist:
+    """Of a body whose drive board is told this, by the manual's equations."""
+    outer = math.copysign(math.hypot(speed_mps, turn_radps), speed_mps)
+    return body_twist(outer, geometry, angle_rad)
+
+
+def _allowed(
+    wanted: BodyTwist, geometry: Geometry, target_rad: float, angle_rad: float, *, turning: bool
+) -> float:
+    """Speed of the outer rim with the wheel at this angle, m/s."""
+    off_rad = abs(angle_rad - target_rad)
+    if abs(target_rad) >= ACROSS_RAD:
+        near = off_rad <= (STILL_ALIGNED_RAD if turning else ALIGNED_RAD)
+        return math.inf if near else 0.0
+    if off_rad <= ALIGNED_RAD:
+        return math.inf
+    front_m = geometry.wheelbase_m
+    sideways = front_m * abs(wanted.yaw_rate_radps)
+    if angle_rad * target_rad < 0.0:
+        sideways = 0.0
+    given = math.hypot(wanted.vx_mps, front_m * wanted.yaw_rate_radps) * math.sin(GIVEN_RAD)
+    cos, sin = math.cos(angle_rad), abs(math.sin(angle_rad))
+    if cos <= 0.0:
+        return 0.0
+    rolled = (abs(wanted.vx_mps) + given) / cos
+    if sin:
+        rolled = min(rolled, (sideways + given) / sin)
+    return rolled * (cos + sin / front_m * geometry.track_m / 2)
+
+
+class Follower:
+    """Whether the front wheel goes where it is commanded to. ``fault``: it does not."""
+
+    def __init__(self) -> None:
+        self.begin()
+
+    def begin(self) -> None:
+        """Nothing is commanded."""
+        self._angle_rad: float | None = None
+        self._since = math.inf
+        self.fault = False
+
+    def aim(self, angle_rad: float, now: float) -> None:
+        """It is to stand here."""
+        if self._angle_rad is None:
+            self._since = now
+        self._angle_rad = angle_rad
+
+    def look(self, angle_rad: float, now: float) -> bool:
+        """It stands there. Whether this shows, for the first time, that it does not follow."""
+        if self._angle_rad is None:
+            return False
+        if abs(angle_rad - self._angle_rad) <= FOLLOWS_RAD:
+            self._since, self.fault = now, False
+            return False
+        late = now - self._since > FOLLOWS_WITHIN_S
+        first, self.fault = late and not self.fault, late
+        return first
