@@ -40,7 +40,7 @@ class Services:
             node.create_service(SetBool, "~/pause", self._on_pause, callback_group=waiting)
         if Request.RESET in traits.requests:
             node.create_service(Trigger, "~/reset", self._on_reset, callback_group=waiting)
-        if traits.imu:
+        if traits.imu and not traits.calibrates_gyro:
             node.create_service(
                 Trigger, "~/calibrate_gyro", self._on_calibrate_gyro, callback_group=waiting
             )

@@ -23,6 +23,7 @@ class Traits:
     OdometryReadings say where the robot is, and displacements only whether it obeys;
     ``stands_after_s``: a robot whose displacements show no motion for so long stands;
     ``baudrate``: whether the speed of its line is to be set;
+    ``calibrates_gyro``: it takes the bias off itself, so its profile has ``~/calibrate_gyro``;
     ``unproved_s``: how long Stop is repeated at most while that is not seen;
     ``stops_within_s``: how long a board that answers a stop takes to obey it; ``slack_mps``,
     ``slack_radps``: how far its displacements, or its wheels when they speed up, may be off what is
@@ -41,6 +42,7 @@ class Traits:
     stands_after_s: float = 0.1
     unproved_s: float = 5.0
     baudrate: bool = True
+    calibrates_gyro: bool = False
     stops_within_s: float = 0.0
     slack_mps: float = 0.0
     slack_radps: float = 0.0

@@ -22,6 +22,7 @@ TRAITS: Final = Traits(
     unheard_s=0.5,
     silence_s=1.5,
     baudrate=False,
+    calibrates_gyro=True,
     slack_mps=0.03,
     slack_radps=0.15,
     advice={
