@@ -107,7 +107,10 @@ class ResetReading:
 
 @dataclass(frozen=True, slots=True)
 class NoticeReading:
-    """Something that a user should be told; ``halt``: the robot is to be driven no further."""
+    """Something that a user should be told; ``halt``: the robot is to be driven no further.
+
+    Without a text what is to be told has been told before.
+    """
 
     text: str
     halt: bool

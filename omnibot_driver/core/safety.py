@@ -78,7 +78,8 @@ class SafetyStops:
                 if reading.pressed:
                     self.estop(True, now, by="the button on the robot")
             elif isinstance(reading, NoticeReading):
-                notify([reading.text])
+                if reading.text:
+                    notify([reading.text])
                 if reading.halt:
                     self._policy.halt(now)
             elif isinstance(reading, ResetReading):
