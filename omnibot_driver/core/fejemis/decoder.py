@@ -111,7 +111,7 @@ class FejemisDecoder:
             self._otherwise = 0
             return
         self._otherwise += 1
-        if self._otherwise >= CHANGED_AFTER:
+        if self.sums is None or self._otherwise >= CHANGED_AFTER:
             self.changed = self.sums is not None
             self.sums, self._otherwise = with_sum, 0
 

@@ -56,6 +56,11 @@ class FrontWheel:
         self._sick = 0
         self._doubted_deg: float | None = None
 
+    @property
+    def stale_at(self) -> float:
+        """When the angle is too old, unless another comes."""
+        return self.heard_at + OLDEST_S + 1e-6
+
     def known(self, now: float) -> bool:
         """Whether the angle is known, and new enough to drive by."""
         return not self.fault and now - self.heard_at <= OLDEST_S

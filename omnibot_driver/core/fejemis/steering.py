@@ -152,10 +152,8 @@ class Follower:
         self._since = math.inf
         self.fault = False
 
-    def aim(self, angle_rad: float, now: float) -> None:
+    def aim(self, angle_rad: float) -> None:
         """It is to stand here."""
-        if self._angle_rad is None:
-            self._since = now
         self._angle_rad = angle_rad
 
     def look(self, angle_rad: float, now: float) -> bool:
@@ -165,6 +163,7 @@ class Follower:
         if abs(angle_rad - self._angle_rad) <= FOLLOWS_RAD:
             self._since, self.fault = now, False
             return False
+        self._since = min(self._since, now)
         late = now - self._since > FOLLOWS_WITHIN_S
         first, self.fault = late and not self.fault, late
         return first

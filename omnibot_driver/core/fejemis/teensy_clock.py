@@ -18,7 +18,7 @@ EARLY_S: Final = 0.005
 """A time that is ahead of the arrivals by more was not measured yet."""
 LATE_S: Final = 1.0
 """One that is behind by more is another time, even where the host was busy."""
-AGAIN: Final = 3
+AGAIN: Final = 2
 """Such times in a row that agree with each other are those of a board that has restarted."""
 SMALLEST_STEP_S: Final = 1e-6
 
@@ -98,8 +98,10 @@ class StampedReadings:
     Stamps of one kind of reading go forward, and are not later than the call.
     """
 
-    def __init__(self, clock: TeensyClock) -> None:
-        self._clock = clock
+    skew_ppm = 0.0
+    """Of the drive board's clock."""
+
+    def __init__(self) -> None:
         self._last: dict[type, float] = {}
         self.begin()
 
@@ -118,11 +120,6 @@ class StampedReadings:
         self._last[kind] = stamp_s
         self.readings.append(reading)
         self._stamps.append(stamp_s)
-
-    @property
-    def skew_ppm(self) -> float:
-        """Of the drive board."""
-        return self._clock.skew_ppm
 
     def restart(self) -> None:
         """The board's own times tell."""

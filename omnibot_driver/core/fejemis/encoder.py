@@ -1,0 +1,136 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""An order as the lines to both boards, by where the front wheel stands.
+
+What goes out last is what counts: ``meaning`` is asked of it, and only then is it known that the
+front wheel is to turn, and whether the drive board is held back. Knows geometry and lines; not when
+they are sent.
+"""
+
+import math
+from typing import Protocol
+
+from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Order, TurnWheels
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.fejemis.motion_lines import LEAST_MPS, STOP, drive_line, front_line
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.fejemis.steering import (
+    ACROSS_RAD,
+    AT_REST,
+    Follower,
+    Geometry,
+    Steered,
+    outer_mps,
+    steer,
+)
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.packets import Packets
+
+SIDEWAYS = "cmd_vel: sideways motion is set to zero, this base has none"
+REVERSE = (
+    "cmd_vel: a negative speed stands still, as `allow_reverse` is false; see"
+    " docs/boards/fejemis.md before setting it"
+)
+
+
+class Pair(Protocol):
+    """What the encoder asks of the two boards."""
+
+    @property
+    def geometry(self) -> Geometry:
+        """B and F."""
+
+    @property
+    def front_angle_rad(self) -> float | None:
+        """Of the front wheel, if it is known."""
+
+    def stop(self) -> Packets:
+        """Stand still."""
+
+    def emergency_stop(self) -> Packets:
+        """What a board has of its own."""
+
+    def motion(self, drive: bytes, front: bytes) -> Packets:
+        """These lines."""
+
+    @property
+    def with_sums(self) -> bool:
+        """Whether lines to both have sums."""
+
+    def remark(self, text: str) -> None:
+        """Something a user should be told."""
+
+
+class Encoder:
+    """``held``: the drive board is told less than commanded until the front wheel stands right."""
+
+    def __init__(self, pair: Pair, settings: FejemisSettings) -> None:
+        self.settings = settings
+        self._pair = pair
+        self.follower = Follower()
+        self.begin()
+
+    def begin(self) -> None:
+        """Nothing is commanded."""
+        self.held = self._turning = False
+        self._encoded: tuple[Packets, Steered] | None = None
+        self.follower.begin()
+
+    def stop(self) -> Packets:
+        """To both."""
+        return self._pair.stop()
+
+    def emergency_stop(self) -> Packets:
+        """To both."""
+        return self._pair.emergency_stop()
+
+    def encode(self, order: Order) -> Packets:
+        """The lines that say it. Raises CommandRefused for what this robot cannot do."""
+        match order:
+            case Drive(twist):
+                return self._drive(twist)
+            case TurnWheels() | GoTo():
+                raise CommandRefused("command rejected: this board takes cmd_vel alone")
+            case EmergencyStop():
+                return self.emergency_stop()
+        return self.stop()
+
+    def meaning(self, packets: Packets) -> BodyTwist:
+        """The body velocity that these lines command, with the front wheel as it stands."""
+        encoded, self._encoded = self._encoded, None
+        if encoded is None or encoded[0] != packets:
+            self.held = self._turning = False
+            return AT_REST
+        _, steered = encoded
+        self.follower.aim(steered.angle_rad)
+        self.held = not steered.whole
+        self._turning = abs(steered.angle_rad) >= ACROSS_RAD and steered.part > 0.0
+        return steered.twist
+
+    def _drive(self, twist: BodyTwist) -> Packets:
+        pair = self._pair
+        geometry = pair.geometry
+        if twist.vy_mps:
+            pair.remark(SIDEWAYS)
+        wanted = BodyTwist(twist.vx_mps, 0.0, twist.yaw_rate_radps)
+        if wanted.vx_mps < 0.0 and not self.settings.allow_reverse:
+            pair.remark(REVERSE)
+            return pair.stop()
+        if outer_mps(wanted, geometry.track_m) < LEAST_MPS:
+            return pair.stop()
+        steered = steer(wanted, geometry, pair.front_angle_rad, turning=self._turning)
+        speed, turn = steered.speed_mps, steered.turn_radps
+        if pair.with_sums:
+            front = front_line(speed, turn, geometry.wheelbase_m)
+            drive = drive_line(steered.part * speed, steered.part * turn)
+        else:
+            front = _plain(speed, turn)
+            drive = _plain(steered.part * speed, steered.part * turn) if steered.part else STOP
+        packets = pair.motion(drive, front)
+        self._encoded = packets, steered
+        return packets
+
+
+def _plain(speed_mps: float, turn_radps: float) -> bytes:
+    """Without a sum no choice of digits helps."""
+    return f"rc 2 {speed_mps:.4f} {math.degrees(turn_radps):.3f}".encode("ascii")

@@ -1,0 +1,188 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""One of the two Teensys, as it is heard at one port: which it is, whether it talks, what of.
+
+What it is to send is subscribed, and subscribed again when it does not come: a line may be lost,
+and a board that restarts forgets all. Knows lines and times; not what a message is used for.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Final, Literal
+
+from omnibot_driver.core.fejemis.decoder import DecoderStatistics, FejemisDecoder
+from omnibot_driver.core.fejemis.messages import (
+    BoardPose,
+    Comment,
+    Distance,
+    Heartbeat,
+    Message,
+)
+from omnibot_driver.core.fejemis.settings import LineSums
+from omnibot_driver.core.fejemis.teensy_clock import TeensyClock
+
+Role = Literal["drive", "front"]
+ROLES: Final[Mapping[int, Role]] = {90: "drive", 91: "front"}
+"""By the identity in the heartbeat (manual, Meta info)."""
+STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
+    "drive": {
+        "hbt": 200, "pose": 20, "vel": 20, "gyro": 10, "acc": 10, "imupose": 20, "mag": 100,
+        "bat": 500, "tofd": 100, "sr04": 100,
+    },
+    "front": {"hbt": 200, "fwl": 15, "ir": 100},
+}  # fmt: skip
+"""What is subscribed, and its period in ms."""
+NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
+"""Without this stream the robot is not driven."""
+TOGETHER: Final = ("gyro", "acc")
+"""Subscribed in one packet, so that both are sent in the same cycle."""
+AGAIN_S: Final = 0.5
+SILENT_S: Final = 1.5
+"""A board that says nothing for so long is not known to be there."""
+_UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
+
+
+class Half:
+    """``identity``: as the heartbeats say, None before. ``restarted``, ``news``: to be taken."""
+
+    def __init__(self, line_sums: LineSums) -> None:
+        self.statistics = DecoderStatistics()
+        self.clock = TeensyClock()
+        self.unknown_words: dict[str, None] = {}
+        """Lines of ours that the firmware does not know."""
+        self.rejected = 0
+        """Lines of ours that came damaged."""
+        self.identity: int | None = None
+        self.begin(line_sums)
+
+    def begin(self, line_sums: LineSums) -> None:
+        """The line is new. Which board it is, is believed until a heartbeat says otherwise."""
+        self.decoder = FejemisDecoder(line_sums)
+        self.decoder.statistics = self.statistics
+        self.heartbeat: Heartbeat | None = None
+        self.heard_at = -math.inf
+        self.restarted = False
+        self.ready = False
+        """Its needed stream flows."""
+        self._told: int | None = None
+        self._at: dict[str, float] = {}
+        self._next_at = -math.inf
+        self._asked_at = -math.inf
+
+    @property
+    def role(self) -> Role | None:
+        """Which one it is; None while that is not known, or where it is neither."""
+        return None if self.identity is None else ROLES.get(self.identity)
+
+    @property
+    def sums(self) -> bool:
+        """Whether lines to it have a sum."""
+        return bool(self.decoder.sums)
+
+    def feed(self, data: bytes, now: float) -> list[Message]:
+        """What these bytes tell, without what cannot be true of this board's time."""
+        return [message for message in self.decoder.feed(data, now) if self._admit(message, now)]
+
+    def came_at(self, keyword: str) -> float:
+        """When a line of this kind came last."""
+        return self._at.get(keyword, -math.inf)
+
+    def note(self, keyword: str, now: float) -> None:
+        """A line of this kind came."""
+        self._at[keyword] = now
+
+    def subscribe_again(self) -> None:
+        """It may have forgotten what it is to send."""
+        self._at = {key: at for key, at in self._at.items() if key == "hbt"}
+        self._next_at = -math.inf
+        self.ready = False
+
+    @property
+    def wake_at(self) -> float:
+        """When ``due`` has something to look at."""
+        return self._next_at
+
+    def due(self, now: float) -> list[bytes]:
+        """Lines that make it talk."""
+        if now < self._next_at:
+            return []
+        self._next_at = now + AGAIN_S
+        if self.role is None or self.heartbeat is None:
+            return [b"hbti"] if now - self.heard_at > AGAIN_S else []
+        wanted = {
+            key: period
+            for key, period in STREAMS[self.role].items()
+            if now - self.came_at(key) > max(AGAIN_S, 4e-3 * period)
+            and f"sub {key} {period}" not in self.unknown_words
+        }
+        if wanted.keys() & set(TOGETHER):
+            wanted |= {key: STREAMS["drive"][key] for key in TOGETHER}
+        return [f"sub {key} {period}".encode("ascii") for key, period in wanted.items()]
+
+    def _admit(self, message: Message, now: float) -> bool:
+        if isinstance(message, Comment):
+            self._read_comment(message.text)
+            self.heard_at = now
+            return True
+        if isinstance(message, Heartbeat | BoardPose) and not self._see(message.time_s, now):
+            return False
+        if isinstance(message, Heartbeat):
+            self._identify(message.identity)
+            self.heartbeat = message
+            self.note("hbt", now)
+        self.heard_at = now
+        return True
+
+    def _see(self, time_s: float, now: float) -> bool:
+        if not self.clock.see(time_s, now):
+            return False
+        if self.clock.restarted:
+            self._restart()
+            self.clock.see(time_s, now)
+        return True
+
+    def _identify(self, identity: int) -> None:
+        """At once where nothing is known yet; otherwise two heartbeats must agree."""
+        told, self._told = self._told, identity
+        if self.identity is None or identity == told:
+            if identity != self.identity:
+                self._next_at = -math.inf
+            self.identity = identity
+        if self.heartbeat is None:
+            self._next_at = -math.inf
+
+    def _read_comment(self, text: str) -> None:
+        if "Starting main loop" in text:
+            self._restart()
+        elif "CRC failed" in text:
+            self.rejected += 1
+        elif found := _UNHANDLED.search(text):
+            self.unknown_words[found[1].strip()] = None
+            if len(self.unknown_words) > 64:
+                del self.unknown_words[next(iter(self.unknown_words))]
+
+    def _restart(self) -> None:
+        self.restarted = self.heartbeat is not None
+        self.clock.begin()
+        self.subscribe_again()
+
+
+def keyword_of(message: Message) -> str:
+    """Of a stream that is subscribed; empty for other messages."""
+    if isinstance(message, Distance):
+        return message.keyword
+    return _KEYWORDS.get(type(message).__name__, "")
+
+
+_KEYWORDS: Final = {
+    "FrontAngle": "fwl",
+    "BoardPose": "pose",
+    "WheelSpeeds": "vel",
+    "Gyro": "gyro",
+    "Acceleration": "acc",
+    "Magnetic": "mag",
+    "Attitude": "imupose",
+    "Battery": "bat",
+    "Infrared": "ir",
+}

@@ -1,0 +1,115 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Brush, lift and lights of the front board: what is switched on, and how it is said.
+
+What turns is never switched on by anything but a call, and never for longer than asked: the lift
+runs for the time that goes with its voltage, and whatever ends a drive for good (e-stop, pause, a
+lost board) switches both off. Nothing is acknowledged, so each line is said several times.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.fejemis.numerals import nearest
+
+OFF: Final = (b"motv 0 0", b"brush 0")
+TIMES: Final = 3
+BETWEEN_S: Final = 0.1
+BRUSH_AGAIN_S: Final = 1.0
+"""A brush that turns is told so again, as a line may be lost."""
+MOST_VOLTS: Final = 12.0
+LEAST_VOLTS: Final = 0.1
+LEAST_TIME_S: Final = 0.04
+
+
+class Machine:
+    """``brush``: whether it was switched on; ``volts``: of the lift, 0 once its time is over."""
+
+    def __init__(self) -> None:
+        self.brush = False
+        self.volts = 0.0
+        self.colour: tuple[int, int, int] | None = None
+        self._lift_until = -math.inf
+        self._lift_line = b""
+        self._off_left = self._led_left = self._brush_left = 0
+        self._next_at = math.inf
+
+    @property
+    def active(self) -> bool:
+        """Whether anything turns."""
+        return self.brush or self.volts != 0.0
+
+    @property
+    def wake_at(self) -> float:
+        """When ``due`` has something."""
+        return min(self._next_at, self._lift_until if self.volts else math.inf)
+
+    def set_brush(self, on: bool) -> None:
+        """Until it is switched off."""
+        self.brush = on
+        self._brush_left = TIMES
+        self._next_at = -math.inf
+
+    def lift(self, volts: float, now: float, longest_s: float) -> None:
+        """Positive lifts the wheel; 0 stops. Raises CommandRefused for what is no voltage."""
+        if not math.isfinite(volts):
+            raise CommandRefused("lift_cmd rejected: contains NaN or infinity; fix the sender")
+        volts = max(-MOST_VOLTS, min(MOST_VOLTS, volts))
+        self.volts = volts if abs(volts) >= LEAST_VOLTS else 0.0
+        self._lift_line, seconds = lift_line(self.volts, longest_s)
+        self._lift_until = now + seconds if self.volts else -math.inf
+        self._next_at = -math.inf
+
+    def set_colour(self, red: int, green: int, blue: int) -> None:
+        """Of the band."""
+        self.colour = red, green, blue
+        self._led_left = TIMES
+        self._next_at = -math.inf
+
+    def begin(self) -> None:
+        """The front board is new: nothing of it turns, and its lights are its own."""
+        self.off()
+        self._led_left = TIMES if self.colour else 0
+
+    def off(self) -> None:
+        """Brush and lift."""
+        self.brush, self.volts = False, 0.0
+        self._lift_line = b""
+        self._off_left, self._brush_left = TIMES, 0
+        self._next_at = -math.inf
+
+    def due(self, now: float) -> list[bytes]:
+        """Lines to write now."""
+        if now < self.wake_at:
+            return []
+        texts: list[bytes] = []
+        if self.volts and now >= self._lift_until:
+            self.volts = 0.0
+            texts.append(OFF[0])
+        if self._lift_line:
+            texts.append(self._lift_line)
+            self._lift_line = b""
+        if self._off_left:
+            self._off_left -= 1
+            texts += OFF
+        elif self.brush or self._brush_left:
+            self._brush_left = max(0, self._brush_left - 1)
+            texts.append(b"brush 1" if self.brush else b"brush 0")
+        if self._led_left and self.colour:
+            self._led_left -= 1
+            texts.append(b"ledb %d %d %d" % self.colour)
+        again = self._off_left or self._brush_left or self._led_left
+        rest_s = BRUSH_AGAIN_S if self.brush else math.inf
+        self._next_at = now + (BETWEEN_S if again else rest_s)
+        return texts
+
+
+def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
+    """``motv`` with digits of which no two can be lost unseen, and the time that it sends."""
+    if not volts:
+        return OFF[0], 0.0
+    seconds, time_text = nearest(max(LEAST_TIME_S, longest_s), negative=True, down=True)
+    _, text = nearest(abs(volts), negative=volts < 0.0, down=True)
+    sign = "-" if volts < 0.0 else ""
+    return f"motv {sign}{text} {time_text}".encode("ascii"), seconds

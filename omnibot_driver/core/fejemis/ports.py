@@ -1,0 +1,103 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Which of the two boards is at which port, and lines to each.
+
+The heartbeats tell, whatever the order of the ports. Until both have, what stops a robot goes to
+both. Knows identities; not what is said.
+"""
+
+from dataclasses import replace
+from typing import Final
+
+from omnibot_driver.core.fejemis import outbound
+from omnibot_driver.core.fejemis.half import Half, Role
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.fejemis.traits import TRAITS
+from omnibot_driver.core.packets import Packets
+from omnibot_driver.core.traits import Traits
+
+ROLES: Final[tuple[Role, Role]] = ("drive", "front")
+PARAMETERS: Final = ("port", "front_port")
+"""By channel."""
+SWAPPED: Final = replace(TRAITS, channels=TRAITS.channels[::-1])
+
+
+class Ports:
+    """``halves`` by channel; ``swapped``: drive is at the second one."""
+
+    def __init__(self, settings: FejemisSettings) -> None:
+        self.halves = Half(settings.line_sums), Half(settings.line_sums)
+        self.swapped = False
+
+    @property
+    def traits(self) -> Traits:
+        """With the channels by what is at them."""
+        return SWAPPED if self.swapped else TRAITS
+
+    def begin(self, settings: FejemisSettings) -> None:
+        """The lines are new."""
+        for half in self.halves:
+            half.begin(settings.line_sums)
+
+    def configure(self, settings: FejemisSettings) -> None:
+        """Whether lines have sums may be set otherwise."""
+        for half in self.halves:
+            if half.decoder.line_sums != settings.line_sums:
+                half.decoder.line_sums = settings.line_sums
+
+    @property
+    def ready(self) -> bool:
+        """Whether both talk, and are what they should be."""
+        return all(half.ready for half in self.halves) and not self.trouble
+
+    @property
+    def with_sums(self) -> bool:
+        """Whether lines to both have sums."""
+        return all(half.sums for half in self.halves)
+
+    def half(self, role: Role) -> Half | None:
+        """The one that is this; None where none or both are."""
+        found = [half for half in self.halves if half.role == role]
+        return found[0] if len(found) == 1 else None
+
+    def role(self, channel: int) -> Role:
+        """What is there, or is believed to be."""
+        return self.halves[channel].role or ROLES[channel ^ self.swapped]
+
+    def identify(self) -> bool:
+        """A heartbeat came. Whether the ports are found to be swapped, or not any more."""
+        first, second = (half.role for half in self.halves)
+        if first == second:
+            return False
+        swapped = first == "front" or (first is None and second == "drive")
+        changed, self.swapped = swapped is not self.swapped, swapped
+        return changed
+
+    @property
+    def trouble(self) -> str:
+        """Why these two are not one robot, and what to do; empty while they may be."""
+        for name, half in zip(PARAMETERS, self.halves, strict=True):
+            if half.identity is not None and half.role is None:
+                return (
+                    f"the board at `{name}` has the id {half.identity}; a Fejemis has 90 (drive)"
+                    " and 91 (front): connect the right board, or set its id"
+                )
+        first, second = self.halves
+        if first.role is not None and first.role == second.role:
+            return (
+                f"both ports lead to a {first.role} board: connect the other one, and check"
+                " `port` and `front_port`"
+            )
+        return ""
+
+    def line(self, role: Role, *texts: bytes) -> Packets:
+        """Lines to one board; to both ports while it is not known where it is."""
+        channels = (0, 1) if self.half(role) is None else (ROLES.index(role) ^ self.swapped,)
+        return tuple(self._at(channel, *texts) for channel in channels)
+
+    def both(self, text: bytes) -> Packets:
+        """A line to each, behind an empty one, which ends whatever was half said."""
+        return tuple((channel, b"\n" + self._at(channel, text)[1]) for channel in (0, 1))
+
+    def _at(self, channel: int, *texts: bytes) -> tuple[int, bytes]:
+        return channel, outbound.lines(*texts, sums=self.halves[channel].sums)

@@ -1,0 +1,175 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""From messages of both boards to readings in SI units, each with its stamp.
+
+Knows units and what a message is worth; not which of them come, nor what is done about it.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.fejemis.front_wheel import FrontWheel
+from omnibot_driver.core.fejemis.imu import ImuPairing
+from omnibot_driver.core.fejemis.messages import (
+    Acceleration,
+    Attitude,
+    Battery,
+    BoardPose,
+    Distance,
+    Gyro,
+    Infrared,
+    Magnetic,
+    Message,
+    WheelSpeeds,
+)
+from omnibot_driver.core.fejemis.odometry import PoseOdometry
+from omnibot_driver.core.fejemis.readings import (
+    BatteryReading,
+    MagneticReading,
+    OrientedImuReading,
+    Quaternion,
+    RangeReading,
+    SteeringReading,
+)
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.fejemis.teensy_clock import StampedReadings, TeensyClock
+from omnibot_driver.core.readings import ExtraReading, NoticeReading, Reading
+
+TESLA_PER_MICROTESLA: Final = 1e-6
+LOW_AGAIN_S: Final = 60.0
+"""A low battery is told so often."""
+PERIOD_S: Final = 0.03
+"""The orientation is of a sample of the IMU that is no older."""
+
+
+class Translation:
+    """``front``, ``odometry``: what is known of the front wheel and of the way."""
+
+    def __init__(self, settings: FejemisSettings) -> None:
+        self._settings = settings
+        self.front = FrontWheel()
+        self.odometry = PoseOdometry(settings.track_m)
+        self._imu = ImuPairing(settings.acceleration_unit)
+        self.stamped = StampedReadings()
+        self._low_told_at = -math.inf
+        self.connect()
+
+    def configure(self, settings: FejemisSettings) -> None:
+        """From the next message on."""
+        self._settings = settings
+        self._imu.unit = settings.acceleration_unit
+
+    def connect(self) -> None:
+        """The lines are new."""
+        self.front.begin()
+        self.odometry.begin()
+        self._imu.begin()
+        self._pose_s = -math.inf
+        self._imu_stamp_s = -math.inf
+
+    def restarted(self) -> None:
+        """The drive board is: its frame and its phases begin anew."""
+        self.odometry.forget()
+        self._imu.begin()
+        self._pose_s = -math.inf
+
+    def add(self, reading: Reading, now: float) -> None:
+        """One that is stamped with its arrival."""
+        self.stamped.add(reading, now, now)
+
+    def extra(self, content: object, now: float) -> None:
+        """A value of this board's own kind."""
+        self.add(ExtraReading(content), now)
+
+    def steering(self, angle_rad: float, now: float) -> None:
+        """Of the front wheel."""
+        self.extra(SteeringReading(angle_rad), now)
+
+    def hear_front(self, message: Message, now: float) -> None:
+        """What the front board tells besides its angle."""
+        if isinstance(message, Infrared):
+            first, second = message.distances_m
+            self.extra(RangeReading("ir1", _seen(first)), now)
+            self.extra(RangeReading("ir2", _seen(second)), now)
+
+    def hear_drive(self, message: Message, clock: TeensyClock, now: float) -> None:
+        """What the drive board tells."""
+        self.stamped.skew_ppm = clock.skew_ppm
+        match message:
+            case BoardPose():
+                self._pose_s = message.time_s
+                reading = self.odometry.pose(message, now)
+                if reading is not None:
+                    self.stamped.add(reading, clock.host_s(message.time_s), now)
+            case WheelSpeeds():
+                self.odometry.speeds(message, now)
+            case Gyro():
+                self._imu.gyro(message, now)
+            case Acceleration():
+                self._sample(message, clock, now)
+            case Attitude():
+                self._orient(message, now)
+            case Magnetic():
+                x, y, z = (
+                    TESLA_PER_MICROTESLA * axis for axis in (message.x, message.y, message.z)
+                )
+                self.extra(MagneticReading((x, y, z)), now)
+            case Battery():
+                self._battery(message, now)
+            case Distance(keyword="tofd"):
+                self.extra(RangeReading("tof", _seen(message.distance_m)), now)
+            case Distance(keyword="sr04"):
+                self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
+
+    def _sample(self, message: Acceleration, clock: TeensyClock, now: float) -> None:
+        reading = self._imu.acceleration(message, now)
+        if reading is None:
+            return
+        stamp_s = now
+        if clock.known:
+            sampled_s = self._imu.sampled_s(clock.board_s(now), self._pose_s)
+            stamp_s = clock.host_s(sampled_s)
+        self._imu_stamp_s = min(stamp_s, now)
+        self.stamped.add(reading, stamp_s, now)
+
+    def _orient(self, message: Attitude, now: float) -> None:
+        if math.isnan(self._imu.rates[0]):
+            return
+        oriented = OrientedImuReading(
+            quaternion(message.roll_rad, message.pitch_rad, message.yaw_rad),
+            self._imu.rates,
+            self._imu.forces,
+        )
+        fresh = now - self._imu_stamp_s < PERIOD_S
+        self.stamped.add(ExtraReading(oriented), self._imu_stamp_s if fresh else now, now)
+
+    def _battery(self, message: Battery, now: float) -> None:
+        low = message.cells > 0 and message.volts < message.cells * self._settings.low_cell_v
+        self.extra(BatteryReading(message.volts, -message.amps, message.cells, low), now)
+        if low and now - self._low_told_at >= LOW_AGAIN_S:
+            self._low_told_at = now
+            self.add(
+                NoticeReading(
+                    f"battery is low: {message.volts:.1f} V of {message.cells} cells; charge it",
+                    halt=False,
+                ),
+                now,
+            )
+
+
+def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
+    """x, y, z, w of turns about the fixed axes x, y, z in this order."""
+    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
+    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
+    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def _seen(distance_m: float) -> float:
+    """Nothing is seen where a sensor tells no positive distance."""
+    return distance_m if distance_m > 0.0 else math.inf

@@ -1,0 +1,155 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A session and the simulated pair of Teensys on one workbench, in simulated time."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.policy import CommandSettings
+from omnibot_driver.core.events import Event, Extra, Notice
+from omnibot_driver.core.fejemis.board import FejemisBoard
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.geometry.steered import SteeredKinematics
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.odometry.covariance import OdometryNoise
+from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.requests import Request, RequestDone
+from omnibot_driver.core.session import Session, SessionSettings
+from omnibot_driver.simulator.fejemis import FejemisSettings as SimulatedSettings
+from omnibot_driver.simulator.fejemis import Firmware, SimulatedFejemis
+
+DRIVE, FRONT = 0, 1
+WHEELS = SteeredKinematics(1.0, 0.4, 0.5)
+
+
+class Bench:
+    """``hears``, ``speaks``: the channels that carry bytes to the robot, and from it."""
+
+    def __init__(
+        self,
+        simulated: SimulatedSettings | None = None,
+        settings: FejemisSettings | None = None,
+        *,
+        limits: SpeedLimits | None = None,
+        run: bool = True,
+    ) -> None:
+        self.robot = SimulatedFejemis(simulated or SimulatedSettings())
+        self.board = FejemisBoard(settings or FejemisSettings())
+        self.session = Session(
+            self.board,
+            SessionSettings(
+                limits=limits or SpeedLimits(linear_mps=1.0, angular_radps=1.5),
+                commands=CommandSettings(),
+                odometry=OdometrySettings(noise=OdometryNoise(wheels=WHEELS)),
+            ),
+            run=run,
+        )
+        self.now = 1000.0
+        self.hears, self.speaks = {DRIVE, FRONT}, {DRIVE, FRONT}
+        self.carry: Callable[[int, bytes], bytes] = lambda _, data: data
+        """What becomes of bytes on the way to us, by channel."""
+        self.events: list[Event] = []
+        self.written: list[tuple[float, int, bytes]] = []
+
+    def open(self, missing: str = "") -> None:
+        self.session.opened(self.now, missing=missing)
+        self.settle()
+
+    def close(self) -> None:
+        self.session.closed(self.now)
+        self.settle()
+
+    def settle(self) -> None:
+        for channel, data in self.session.take_output(self.now):
+            self.written.append((self.now, channel, data))
+            if channel in self.hears:
+                self.robot.receive(data, self.now, channel)
+        self.events += self.session.take_events()
+
+    def step(self) -> None:
+        self.now += self.robot.tick_s
+        for channel, data in self.robot.advance():
+            data = self.carry(channel, data)
+            if channel in self.speaks and data:
+                self.session.receive(data, self.now, channel)
+                self.settle()
+        if self.now >= self.session.wake_at:
+            self.session.tick(self.now)
+            self.settle()
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / self.robot.tick_s)):
+            self.step()
+
+    def run_until(self, predicate: Callable[[], bool], limit_s: float = 12.0) -> None:
+        end = self.now + limit_s
+        while not predicate():
+            assert self.now < end, (self.session.state, self.notices)
+            self.step()
+
+    def drive(self, v: float = 0.3, w: float = 0.0) -> None:
+        self.session.command_twist(BodyTwist(v, 0.0, w), self.now)
+        self.settle()
+
+    def drive_on(self, v: float = 0.3, w: float = 0.0, seconds: float = 1.0) -> None:
+        for _ in range(round(seconds / 0.1)):
+            self.drive(v, w)
+            self.run(0.1)
+
+    def estop(self, active: bool) -> None:
+        self.session.estop(active, self.now)
+        self.settle()
+
+    def ask(self, request: Request, limit_s: float = 6.0) -> RequestDone:
+        token = object()
+        self.session.request(request, token, self.now)
+        self.settle()
+        found: list[RequestDone] = []
+
+        def answered() -> bool:
+            found[:] = [e for e in self.events if isinstance(e, RequestDone) and e.token is token]
+            return bool(found)
+
+        self.run_until(answered, limit_s)
+        return found[0]
+
+    @property
+    def notices(self) -> list[str]:
+        return [event.text for event in self.events if isinstance(event, Notice)]
+
+    @property
+    def odometry(self) -> list[OdometryEstimate]:
+        return [event for event in self.events if isinstance(event, OdometryEstimate)]
+
+    @property
+    def imu(self) -> list[ImuEstimate]:
+        return [event for event in self.events if isinstance(event, ImuEstimate)]
+
+    def extras(self, kind: type) -> list[Any]:
+        return [e.value for e in self.events if isinstance(e, Extra) and isinstance(e.value, kind)]
+
+    def lines(self, channel: int, since: float = -math.inf) -> list[str]:
+        """What was written to a channel, line by line, without sums and padding."""
+        text = b"".join(d for at, to, d in self.written if to == channel and at >= since)
+        found = text.decode("ascii").split("\n")
+        bare = [line[3:] if line.startswith(";") else line for line in found]
+        return [line.rstrip() for line in bare if line]
+
+
+def nominal(
+    simulated: SimulatedSettings | None = None,
+    settings: FejemisSettings | None = None,
+    **more: Any,
+) -> Bench:
+    """A pair that talks and obeys."""
+    bench = Bench(simulated, settings, **more)
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(1.0)
+    return bench
+
+
+__all__ = ["DRIVE", "FRONT", "Bench", "Firmware", "SimulatedSettings", "nominal"]
