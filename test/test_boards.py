@@ -76,16 +76,6 @@ def test_every_profile_names_its_simulated_board(name: str) -> None:
     assert board.facts.keys() >= {"x_m", "y_m", "yaw_rad"}
 
 
-@pytest.mark.parametrize("name", boards.NOT_BUILT)
-def test_a_board_that_is_not_built_is_refused_by_name(name: str) -> None:
-    """In one sentence; it is no choice, and no profile."""
-    sentence = f"the board {name} is not built yet; this driver has {', '.join(boards.PROFILES)}"
-    with pytest.raises(ParameterError) as refused:
-        boards.check_all({"board": name})
-    assert str(refused.value) == sentence
-    assert name not in boards.PROFILES
-
-
 @pytest.mark.parametrize("wrong", ["martha", "", 5, True, None, ["omnibot"]])
 def test_what_is_no_board_is_refused_with_those_there_are(wrong: object) -> None:
     """Of whatever type."""

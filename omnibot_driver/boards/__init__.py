@@ -21,11 +21,10 @@ PROFILES: Final = {
     "omnibot": "omnibot_driver.boards.omnibot",
     "lois_ecu": "omnibot_driver.boards.lois_ecu",
     "mart": "omnibot_driver.boards.mart",
+    "fejemis": "omnibot_driver.boards.fejemis",
 }
 """By the value of the parameter ``board``: the module that is its profile."""
 DEFAULT: Final = "omnibot"
-NOT_BUILT: Final = ("fejemis",)
-"""Names that are kept for boards to come."""
 
 Publish = Callable[[Any, int], None]
 """Publishes a value of the board's own kind that was measured at this stamp, in ns of ROS time."""
@@ -77,10 +76,6 @@ def opener(profile: Profile, values: Mapping[str, Any]) -> Callable[[], Transpor
 def table_for(given: Mapping[str, object]) -> Table:
     """The parameters of the board that is given, or of the usual one. Raises ParameterError."""
     name = given.get("board", DEFAULT)
-    if name in NOT_BUILT and name not in PROFILES:
-        raise ParameterError(
-            f"the board {name} is not built yet; this driver has {', '.join(PROFILES)}"
-        )
     chosen = Parameter("board", DEFAULT, "", "", choices=tuple(PROFILES)).check(name)
     return load(str(chosen)).PARAMETERS
 

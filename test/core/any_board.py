@@ -130,12 +130,44 @@ def mart(firmware: str) -> tuple[Board, Any]:
     return MartBoard(MartSettings()), MartRobot(firmware)
 
 
+class FejemisRobot:
+    """The simulated Fejemis; five of its ticks in one of ours."""
+
+    def __init__(self, sums: bool) -> None:
+        from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
+
+        self.board = SimulatedFejemis(FejemisSettings(firmware=Firmware(sums=sums)))
+
+    @property
+    def stands(self) -> bool:
+        return self.board.standing
+
+    @property
+    def way_m(self) -> float:
+        return self.board.truth.x_m
+
+    def receive(self, data: bytes, now: float, channel: int) -> None:
+        self.board.receive(data, now, channel)
+
+    def advance(self) -> list[Packet]:
+        return [packet for _ in range(5) for packet in self.board.advance()]
+
+
+def fejemis(*, sums: bool) -> tuple[Board, Any]:
+    from omnibot_driver.core.fejemis.board import FejemisBoard
+    from omnibot_driver.core.fejemis.settings import FejemisSettings
+
+    return FejemisBoard(FejemisSettings()), FejemisRobot(sums)
+
+
 MAKERS: dict[str, Callable[[], tuple[Board, Any]]] = {
     "omnibot": omnibot,
     "lois_ecu": lambda: lois_ecu("firmware"),
     "lois_ecu as documented": lambda: lois_ecu("documented"),
     "mart": lambda: mart("firmware"),
     "mart as documented": lambda: mart("documented"),
+    "fejemis": lambda: fejemis(sums=True),
+    "fejemis without sums": lambda: fejemis(sums=False),
     "two lines": lambda: (line_board.make({}), LineRobot()),
     "requests": lambda: (request_board.make({}), RequestRobot()),
 }

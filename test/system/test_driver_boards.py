@@ -139,17 +139,8 @@ def test_what_means_nothing_to_the_board_is_refused(
     assert driver.end() == 2
 
 
-@pytest.mark.parametrize(
-    ("board", "message"),
-    [
-        ("fejemis", "cannot start: the board fejemis is not built yet; this driver has omnibot"),
-        ("martha", "cannot start: parameter 'board' must be one of omnibot"),
-    ],
-)
-def test_a_board_that_is_not_there_ends_the_start(
-    start_driver: Start, board: str, message: str
-) -> None:
+def test_a_board_that_is_not_there_ends_the_start(start_driver: Start) -> None:
     """In one sentence."""
-    driver: Driver = start_driver("/dev/null", board=board)
-    driver.wait_for_line(message)
+    driver: Driver = start_driver("/dev/null", board="martha")
+    driver.wait_for_line("cannot start: parameter 'board' must be one of omnibot")
     assert driver.end() == 2

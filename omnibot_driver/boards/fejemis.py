@@ -1,0 +1,96 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The Fejemis sweeping robot: its parameters, and what makes it of them."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Final
+
+from omnibot_driver.boards.fejemis_parameters import (
+    DRIVING,
+    FRONT_PORT,
+    SENSORS,
+    WHEELS,
+    require_two_ports,
+    require_whole_settings,
+    written,
+)
+from omnibot_driver.core.fejemis.board import FejemisBoard
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.fejemis.traits import TRAITS
+from omnibot_driver.core.geometry.steered import SteeredKinematics
+from omnibot_driver.parameters import table
+from omnibot_driver.transports.serial_port import SerialPort
+from omnibot_driver.transports.several import Several
+
+SIMULATOR: Final = "omnibot_driver.simulator.fejemis"
+USB_BAUDRATE: Final = 115200
+"""A USB port has a speed of its own, whatever this is."""
+WHEEL_RADIUS_M, TRACK_M, WHEELBASE_M = 0.0775, 0.4, 0.42
+"""Where the user gives none: the manual has the track alone."""
+PARAMETERS: Final = table(
+    "fejemis",
+    TRAITS,
+    own={
+        "The line": FRONT_PORT,
+        "The robot's wheels": WHEELS,
+        "The Fejemis": DRIVING,
+        "Sensors": SENSORS,
+    },
+    without=("axis_signs",),
+    changed={
+        "port": {
+            "default": "/dev/ttyACM0",
+            "description": "Serial device of the drive Teensy. sim:// is a simulated pair of boards"
+            " inside the driver, replay://bag a recorded wire.",
+        },
+    },
+    checks=(require_two_ports, require_whole_settings),
+)
+
+
+def make(values: Mapping[str, Any]) -> FejemisBoard:
+    """The pair, nothing of which is heard yet."""
+    return FejemisBoard(settings(values))
+
+
+def settings(values: Mapping[str, Any]) -> FejemisSettings:
+    """What its wire does not tell, by checked values."""
+    wheels = kinematics(values)
+    return FejemisSettings(
+        track_m=wheels.track_m,
+        wheelbase_m=wheels.wheelbase_m,
+        line_sums=values["line_sums"],
+        allow_reverse=values["allow_reverse"],
+        acceleration_unit=values["acceleration_unit"],
+        command_timeout_s=values["cmd_vel_timeout"],
+        power_off_delay_s=values["power_off_delay"],
+        low_cell_v=values["low_cell_voltage"],
+        written=written(values),
+    )
+
+
+def opener(values: Mapping[str, Any]) -> Callable[[], Several]:
+    """Two devices; each may be missing alone."""
+    return partial(
+        Several,
+        [partial(SerialPort, values[name], USB_BAUDRATE, name) for name in ("port", "front_port")],
+    )
+
+
+def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:
+    """Left and right, and the distance of the steered wheel; usual sizes where none are given."""
+    radii_m = values["wheel_radii"] or [WHEEL_RADIUS_M]
+    return SteeredKinematics(
+        wheel_radius_m=sum(radii_m) / len(radii_m),
+        track_m=values["track"] or TRACK_M,
+        wheelbase_m=values["steering_distance"] or WHEELBASE_M,
+    )
+
+
+def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
+    """Steering joint, orientation, field, battery, ranges; brush, lift, light; jobs."""
+    from omnibot_driver.boards.fejemis_topics import FejemisTopics  # needs ROS
+
+    publish: Mapping[type, Any] = FejemisTopics(node, link, values).publish
+    return publish

@@ -1,0 +1,282 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The parameters that a Fejemis has and other boards need not have. Knows no ROS.
+
+What the two Teensys keep by themselves is unset: it is written only where the user gives a value.
+"""
+
+import math
+import os
+from collections.abc import Mapping
+from typing import Any, Final
+
+from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.core.fejemis import Written
+from omnibot_driver.parameters import Parameter
+
+MOST_GAINS: Final = 17
+"""As ``cpsteer`` lists them."""
+
+FRONT_PORT: Final = (
+    Parameter(
+        "front_port",
+        "/dev/ttyACM1",
+        "",
+        "Serial device of the front Teensy; port is that of the drive Teensy. The driver finds out"
+        " by their heartbeats if they are swapped. Not used where port is sim:// or replay://.",
+        fixed=True,
+    ),
+)
+
+WHEELS: Final = (
+    Parameter(
+        "wheel_radii",
+        [0.0775, 0.0775],
+        "m",
+        "Radius of the left and the right driving wheel, written with gear, encoder_ticks and track"
+        " (confw). Unset: the board keeps its own.",
+        low=0.001,
+        high=1.0,
+        unset=True,
+    ),
+    Parameter(
+        "gear",
+        19.0,
+        "",
+        "Turns of the motor for one of a driving wheel (confw). Unset: the board keeps its own.",
+        low=1.0,
+        high=1000.0,
+        unset=True,
+    ),
+    Parameter(
+        "encoder_ticks",
+        68,
+        "ticks",
+        "Encoder ticks of one turn of the motor (confw). Unset: the board keeps its own.",
+        low=1,
+        high=100_000,
+        unset=True,
+    ),
+    Parameter(
+        "track",
+        0.4,
+        "m",
+        "From one driving wheel to the other, B in the manual (confw, confs). Unset: the boards"
+        " keep their own.",
+        low=0.01,
+        high=10.0,
+        unset=True,
+    ),
+    Parameter(
+        "steering_distance",
+        0.42,
+        "m",
+        "From the axle of the driving wheels to the steered wheel, F and S in the manual; written"
+        " to both boards with track (confs). Unset: the boards keep their own.",
+        low=0.01,
+        high=10.0,
+        unset=True,
+    ),
+    Parameter(
+        "front_wheel_offset",
+        0.0,
+        "rad",
+        "What the angle sensor reads when the wheel is straight, written with front_wheel_inverted"
+        " (fwoffset). Unset: the board keeps its own.",
+        low=-math.pi,
+        high=math.pi,
+        unset=True,
+    ),
+    Parameter(
+        "front_wheel_inverted",
+        False,
+        "",
+        "Whether the angle sensor is positive to the right (fwoffset). Unset: the board keeps its"
+        " own.",
+        unset=True,
+    ),
+    Parameter(
+        "steering_gains",
+        [1.0],
+        "",
+        "Parameters of the steering controller in the order of cpsteer (cssteer): use, Kp, useI,"
+        " taui, ilimit, 1, useLeadf, tz, tp, useLeadb, tz, tp, usePre, tz, tp, useULim, Ulim."
+        " Unset: the board keeps its own.",
+        length=(1, MOST_GAINS),
+        low=-1e6,
+        high=1e6,
+        unset=True,
+    ),
+)
+
+DRIVING: Final = (
+    Parameter(
+        "allow_reverse",
+        False,
+        "",
+        "Pass negative speeds on. The manual does not say what the steering then does: first watch"
+        " it with the wheels off the ground (docs/boards/fejemis.md).",
+    ),
+    Parameter(
+        "line_sums",
+        "auto",
+        "",
+        "Whether lines begin with a sum, ;NN: as the heartbeats of each Teensy have it (auto),"
+        " always (on) or never (off).",
+        choices=("auto", "on", "off"),
+        fixed=True,
+    ),
+    Parameter(
+        "power_off_delay",
+        10.0,
+        "s",
+        "From ~/power_off until the board cuts the power, also of this computer if it hangs on it.",
+        low=1.0,
+        high=3600.0,
+    ),
+    Parameter(
+        "low_cell_voltage",
+        3.5,
+        "V",
+        "Voltage of a cell of the battery below which there is a warning.",
+        low=1.0,
+        high=5.0,
+    ),
+)
+
+SENSORS: Final = (
+    Parameter(
+        "acceleration_unit",
+        "m/s^2",
+        "",
+        "What the board's acc lines are in; some firmware sends g.",
+        choices=("m/s^2", "g"),
+        fixed=True,
+    ),
+    Parameter(
+        "ir_calibration",
+        [46000.0, 14000.0, 46000.0, 14000.0],
+        "",
+        "Raw readings of infrared sensor 1 at 13 cm and 50 cm, then of sensor 2 (irc). Unset: the"
+        " board keeps its own.",
+        low=0.0,
+        high=1e6,
+        unset=True,
+    ),
+    Parameter(
+        "mag_calibration",
+        [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        "µT",
+        "Offsets of the magnetometer, then a matrix by rows (magcal). Unset: the board keeps its"
+        " own.",
+        low=-1e4,
+        high=1e4,
+        unset=True,
+    ),
+    Parameter(
+        "accel_calibration",
+        [0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
+        "m/s²",
+        "Offsets of the accelerometer, then scales (acccal). Unset: the board keeps its own.",
+        low=-100.0,
+        high=100.0,
+        unset=True,
+    ),
+    Parameter(
+        "orientation_stddev",
+        [0.02, 0.02, 0.2],
+        "rad",
+        "Standard deviation of roll, pitch and yaw in imu/data. The yaw drifts with the gyro.",
+        low=1e-6,
+        high=10.0,
+    ),
+    Parameter(
+        "magnetic_field_stddev",
+        1e-6,
+        "T",
+        "Noise of the magnetometer, for the covariance of imu/mag.",
+        low=1e-12,
+        high=1.0,
+    ),
+    Parameter(
+        "tof_field_of_view", 0.44, "rad", "Of the time-of-flight sensor.", low=0.01, high=3.0
+    ),
+    Parameter("tof_minimum", 0.03, "m", "Nearest that it tells.", low=0.0, high=20.0),
+    Parameter("tof_maximum", 2.0, "m", "Farthest.", low=0.1, high=20.0),
+    Parameter("sonar_field_of_view", 0.5, "rad", "Of the sonar.", low=0.01, high=3.0),
+    Parameter("sonar_minimum", 0.02, "m", "Nearest that it tells.", low=0.0, high=20.0),
+    Parameter("sonar_maximum", 4.0, "m", "Farthest.", low=0.1, high=20.0),
+    Parameter("ir_field_of_view", 0.1, "rad", "Of both infrared sensors.", low=0.01, high=3.0),
+    Parameter("ir_minimum", 0.1, "m", "Nearest that they tell.", low=0.0, high=20.0),
+    Parameter("ir_maximum", 0.8, "m", "Farthest.", low=0.1, high=20.0),
+)
+
+
+def written(values: Mapping[str, Any]) -> dict[Written, tuple[float, ...]]:
+    """What the user wants on the boards, in the units of the boards."""
+    found: dict[Written, tuple[float, ...]] = {}
+    radii_m, track_m = values["wheel_radii"], values["track"]
+    if radii_m is not None:
+        gear, ticks = values["gear"], values["encoder_ticks"]
+        found[Written.WHEELS] = (*radii_m, gear, float(ticks), track_m)
+    if values["steering_distance"] is not None:
+        found[Written.STEERING] = (track_m, values["steering_distance"])
+    if values["front_wheel_offset"] is not None:
+        found[Written.FRONT_WHEEL] = (
+            math.degrees(values["front_wheel_offset"]),
+            float(values["front_wheel_inverted"]),
+        )
+    for name, setting in _LISTS.items():
+        if values[name] is not None:
+            found[setting] = tuple(values[name])
+    return found
+
+
+_LISTS: Final[Mapping[str, Written]] = {
+    "ir_calibration": Written.INFRARED,
+    "mag_calibration": Written.MAGNETOMETER,
+    "accel_calibration": Written.ACCELEROMETER,
+    "steering_gains": Written.STEERING_GAINS,
+}
+_WHEELS: Final = ("wheel_radii", "gear", "encoder_ticks")
+
+
+def require_two_ports(values: Mapping[str, Any]) -> None:
+    """A robot with one Teensey twice would be half a robot."""
+    port, front = (str(values[name]) for name in ("port", "front_port"))
+    if port == front or (port.startswith("/") and _same(port, front)):
+        raise ParameterError(
+            f"parameter 'front_port' must not be '{front}', which is 'port': the drive and the"
+            " front Teensy have a port each; `ls /dev/serial/by-id/` shows them"
+        )
+
+
+def require_whole_settings(values: Mapping[str, Any]) -> None:
+    """What a board takes with one command is set together."""
+    _require_together(values, (*_WHEELS, "track"), _WHEELS, "confw")
+    _require_together(values, ("steering_distance", "track"), ("steering_distance",), "confs")
+    offset = ("front_wheel_offset", "front_wheel_inverted")
+    _require_together(values, offset, offset, "fwoffset")
+    if values["track"] is not None and not any(
+        values[name] is not None for name in (*_WHEELS, "steering_distance")
+    ):
+        raise ParameterError(
+            "parameter 'track' is written with others: set 'steering_distance' too, or"
+            " 'wheel_radii', 'gear' and 'encoder_ticks', or leave it unset"
+        )
+
+
+def _require_together(
+    values: Mapping[str, Any], names: tuple[str, ...], deciding: tuple[str, ...], command: str
+) -> None:
+    if not any(values[name] is not None for name in deciding):
+        return
+    if lacking := [name for name in names if values[name] is None]:
+        raise ParameterError(
+            f"parameter '{lacking[0]}' must be set too: the board takes {', '.join(names)} with"
+            f" one command ({command}); set all of them or none"
+        )
+
+
+def _same(one: str, other: str) -> bool:
+    return os.path.realpath(one) == os.path.realpath(other)

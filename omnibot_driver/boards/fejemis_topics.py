@@ -1,0 +1,248 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What only a Fejemis has, as topics and services. Wires only."""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, Final, cast
+
+import rclpy
+from geometry_msgs.msg import Quaternion, Vector3
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.task import Future
+from sensor_msgs.msg import BatteryState, Imu, JointState, MagneticField, Range
+from std_msgs.msg import ColorRGBA, Float32, Header
+from std_srvs.srv import SetBool, Trigger
+
+from omnibot_driver import messages
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.fejemis import (
+    BatteryReading,
+    Job,
+    JobDone,
+    MagneticReading,
+    OrientedImuReading,
+    RangeReading,
+    SteeringReading,
+)
+from omnibot_driver.core.fejemis.board import FejemisBoard
+from omnibot_driver.core.geometry.steered import SteeredKinematics
+from omnibot_driver.core.session import Session
+
+NAN: Final = float("nan")
+WARN_EVERY_S: Final = 2.0
+STEERING_EVERY_NS: Final = 40_000_000
+"""The angle comes 66 times a second; joint states are for eyes."""
+RANGES: Final = {
+    "tof": Range.INFRARED,
+    "sonar": Range.ULTRASOUND,
+    "ir1": Range.INFRARED,
+    "ir2": Range.INFRARED,
+}
+SERVICES: Final = {
+    "calibrate_gyro": Job.CALIBRATE_GYRO,
+    "calibrate_accelerometer": Job.CALIBRATE_ACCELEROMETER,
+    "save_configuration": Job.SAVE,
+    "load_configuration": Job.LOAD,
+    "power_off": Job.POWER_OFF,
+}
+
+
+class FejemisTopics:
+    """``publish``: who publishes each type of value."""
+
+    def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
+        self._node, self._link, self._values = node, link, values
+        self._prefix = values["frame_prefix"]
+        self._steering = node.create_publisher(JointState, "joint_states", 10)
+        self._imu = node.create_publisher(Imu, "imu/data", 10)
+        self._mag = node.create_publisher(MagneticField, "imu/mag", 10)
+        self._battery = node.create_publisher(BatteryState, "battery_state", 10)
+        self._ranges = {name: node.create_publisher(Range, f"range/{name}", 10) for name in RANGES}
+        self._steered_ns = 0
+        self.publish: dict[type, Callable[[Any, int], None]] = {
+            SteeringReading: self._publish_steering,
+            OrientedImuReading: self._publish_imu,
+            MagneticReading: self._publish_mag,
+            BatteryReading: self._publish_battery,
+            RangeReading: self._publish_range,
+            JobDone: self._answer,
+        }
+        waiting = ReentrantCallbackGroup()
+        for name, job in SERVICES.items():
+            node.create_service(Trigger, f"~/{name}", self._service(job), callback_group=waiting)
+        node.create_service(SetBool, "~/brush", self._on_brush)
+        node.create_subscription(Float32, "lift_cmd", self._on_lift, 1)
+        node.create_subscription(ColorRGBA, "led_cmd", self._on_led, 1)
+        node.add_post_set_parameters_callback(self._apply)
+
+    def _apply(self, changed: list[rclpy.Parameter]) -> None:
+        self._values = {**self._values, **{item.name: item.value for item in changed}}
+
+    # From the boards
+
+    def _header(self, stamp_ns: int, frame: str = "") -> Header:
+        frame_id = self._prefix + frame if frame else ""
+        return Header(stamp=messages.time_message(stamp_ns), frame_id=frame_id)
+
+    def _publish_steering(self, steering: SteeringReading, stamp_ns: int) -> None:
+        if 0 <= stamp_ns - self._steered_ns < STEERING_EVERY_NS:
+            return
+        self._steered_ns = stamp_ns
+        self._steering.publish(
+            JointState(
+                header=self._header(stamp_ns),
+                name=[SteeredKinematics.steering_joint],
+                position=[steering.angle_rad],
+            )
+        )
+
+    def _publish_imu(self, imu: OrientedImuReading, stamp_ns: int) -> None:
+        x, y, z, w = imu.orientation
+        roll, pitch, yaw = (stddev**2 for stddev in self._values["orientation_stddev"])
+        self._imu.publish(
+            Imu(
+                header=self._header(stamp_ns, self._values["imu_frame"]),
+                orientation=Quaternion(x=x, y=y, z=z, w=w),
+                orientation_covariance=[roll, 0.0, 0.0, 0.0, pitch, 0.0, 0.0, 0.0, yaw],
+                angular_velocity=_vector(imu.angular_velocity),
+                angular_velocity_covariance=messages.isotropic(
+                    self._values["angular_velocity_stddev"]
+                ),
+                linear_acceleration=_vector(imu.specific_force),
+                linear_acceleration_covariance=messages.isotropic(
+                    self._values["linear_acceleration_stddev"]
+                ),
+            )
+        )
+
+    def _publish_mag(self, mag: MagneticReading, stamp_ns: int) -> None:
+        self._mag.publish(
+            MagneticField(
+                header=self._header(stamp_ns, self._values["imu_frame"]),
+                magnetic_field=_vector(mag.field_t),
+                magnetic_field_covariance=messages.isotropic(self._values["magnetic_field_stddev"]),
+            )
+        )
+
+    def _publish_battery(self, battery: BatteryReading, stamp_ns: int) -> None:
+        status = BatteryState.POWER_SUPPLY_STATUS_UNKNOWN
+        if battery.amps < 0.0:
+            status = BatteryState.POWER_SUPPLY_STATUS_DISCHARGING
+        self._battery.publish(
+            BatteryState(
+                header=self._header(stamp_ns),
+                voltage=battery.volts,
+                temperature=NAN,
+                current=battery.amps,
+                charge=NAN,
+                capacity=NAN,
+                design_capacity=NAN,
+                percentage=NAN,
+                power_supply_status=status,
+                power_supply_health=BatteryState.POWER_SUPPLY_HEALTH_UNKNOWN,
+                power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO,
+                present=True,
+                cell_voltage=[NAN] * battery.cells,
+            )
+        )
+
+    def _publish_range(self, reading: RangeReading, stamp_ns: int) -> None:
+        kind = reading.name.rstrip("12")
+        nearest, farthest = self._values[f"{kind}_minimum"], self._values[f"{kind}_maximum"]
+        seen = 0.0 < reading.distance_m <= farthest
+        self._ranges[reading.name].publish(
+            Range(
+                header=self._header(stamp_ns, f"range_{reading.name}_link"),
+                radiation_type=RANGES[reading.name],
+                field_of_view=self._values[f"{kind}_field_of_view"],
+                min_range=nearest,
+                max_range=farthest,
+                range=reading.distance_m if seen else math.inf,
+            )
+        )
+
+    # To the boards
+
+    def _service(self, job: Job) -> Callable[..., Any]:
+        async def serve(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            answer = Future()
+
+            def ask(session: Session, now: float) -> None:
+                cast(FejemisBoard, session.board).ask(job, answer, now)
+
+            try:
+                self._link.call(ask)
+            except RequestRefused as error:
+                response.success, response.message = False, str(error)
+                return response
+            done: JobDone = await answer
+            response.success, response.message = done.success, done.message
+            return response
+
+        return serve
+
+    def _answer(self, done: JobDone, _stamp_ns: int) -> None:
+        if isinstance(done.token, Future):
+            done.token.set_result(done)
+            if self._node.executor is not None:
+                self._node.executor.wake()
+
+    def _on_brush(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        on = bool(request.data)
+        trouble = self._say("brush", lambda board, now: board.set_brush(on, now), needed=on)
+        response.success = not trouble
+        sent = f"brush {'on' if on else 'off'} sent; the board does not confirm it"
+        response.message = trouble or sent
+        return response
+
+    def _on_lift(self, message: Float32) -> None:
+        volts = message.data
+        if not math.isfinite(volts):
+            self._warn("lift_cmd rejected: contains NaN or infinity; fix the publishing node")
+            return
+        self._try("lift_cmd", lambda board, now: board.lift(volts, now), needed=volts != 0.0)
+
+    def _on_led(self, message: ColorRGBA) -> None:
+        parts = (message.r, message.g, message.b)
+        if not all(math.isfinite(part) for part in (*parts, message.a)):
+            self._warn("led_cmd rejected: contains NaN or infinity; fix the publishing node")
+            return
+        red, green, blue = (round(255 * max(0.0, min(1.0, part * message.a))) for part in parts)
+        self._try("led_cmd", lambda board, now: board.set_led(red, green, blue, now), needed=False)
+
+    def _try(
+        self, what: str, action: Callable[[FejemisBoard, float], None], *, needed: bool
+    ) -> None:
+        if trouble := self._say(what, action, needed=needed):
+            self._warn(trouble)
+
+    def _say(
+        self, what: str, action: Callable[[FejemisBoard, float], None], *, needed: bool
+    ) -> str:
+        """Why it was not said; ``needed``: it moves something, so the robot has to be nominal."""
+
+        def say(session: Session, now: float) -> str:
+            if session.state in ("disconnected", "connecting"):
+                return f"{what} refused: the front board is not heard; connect it, then try again"
+            if needed and session.estop_active:
+                return f"{what} refused: the emergency stop is active; release it first (~/estop)"
+            if needed and session.state != "nominal":
+                return f"{what} refused: the robot is paused; call ~/start first"
+            try:
+                action(cast(FejemisBoard, session.board), now)
+            except (CommandRefused, RequestRefused) as error:
+                return str(error)
+            return ""
+
+        trouble: str = self._link.call(say)
+        return trouble
+
+    def _warn(self, text: str) -> None:
+        self._node.get_logger().warning(text, throttle_duration_sec=WARN_EVERY_S)
+
+
+def _vector(parts: tuple[float, float, float]) -> Vector3:
+    x, y, z = parts
+    return Vector3(x=x, y=y, z=z)

@@ -1,0 +1,88 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The parameters of a Fejemis: what is written to the boards, and what is refused."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from omnibot_driver import boards
+from omnibot_driver.boards.fejemis import kinematics, settings
+from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.core.fejemis import Written
+
+
+def check(**given: Any) -> dict[str, Any]:
+    return boards.check_all({"board": "fejemis", **given})
+
+
+def test_nothing_is_written_by_default() -> None:
+    """A board's own settings are not ours to overwrite."""
+    values = check()
+    assert settings(values).written == {}
+    assert kinematics(values).track_m == 0.4
+    assert (values["port"], values["front_port"]) == ("/dev/ttyACM0", "/dev/ttyACM1")
+
+
+def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
+    """``confw``, ``confs``, ``fwoffset``: radii, gear, ticks, B; B and F; degrees."""
+    values = check(
+        wheel_radii=[0.08, 0.081],
+        gear=20.0,
+        encoder_ticks=64,
+        track=0.41,
+        steering_distance=0.45,
+        front_wheel_offset=math.pi / 6,
+        front_wheel_inverted=True,
+        ir_calibration=[1.0, 2.0, 3.0, 4.0],
+    )
+    written = settings(values).written
+    assert written[Written.WHEELS] == (0.08, 0.081, 20.0, 64.0, 0.41)
+    assert written[Written.STEERING] == (0.41, 0.45)
+    assert written[Written.FRONT_WHEEL] == (pytest.approx(30.0), 1.0)
+    assert written[Written.INFRARED] == (1.0, 2.0, 3.0, 4.0)
+    assert all(len(numbers) == setting.count for setting, numbers in written.items())
+
+
+@pytest.mark.parametrize(
+    ("given", "missing"),
+    [
+        ({"gear": 20.0}, "wheel_radii"),
+        ({"steering_distance": 0.4}, "track"),
+        ({"front_wheel_offset": 0.1}, "front_wheel_inverted"),
+        ({"front_wheel_inverted": True}, "front_wheel_offset"),
+    ],
+)
+def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: str) -> None:
+    """Or not at all: the rest would have to be guessed."""
+    with pytest.raises(ParameterError, match=f"parameter '{missing}' must be set too"):
+        check(**given)
+
+
+def test_a_track_alone_is_refused() -> None:
+    """Two commands have it, and neither has it alone."""
+    with pytest.raises(ParameterError, match="set 'steering_distance' too"):
+        check(track=0.4)
+
+
+def test_the_same_port_twice_is_refused(tmp_path: Path) -> None:
+    """By another name too."""
+    link = tmp_path / "front"
+    link.symlink_to("/dev/ttyACM0")
+    for front in ("/dev/ttyACM0", str(link)):
+        with pytest.raises(ParameterError, match="have a port each"):
+            check(port="/dev/ttyACM0", front_port=front)
+
+
+def test_ports_are_not_compared_for_a_simulated_pair() -> None:
+    """``front_port`` is not used then."""
+    assert check(port="sim://")["front_port"] == "/dev/ttyACM1"
+
+
+@pytest.mark.parametrize("name", ["baudrate", "max_wheel_speed", "axis_signs", "low_pass"])
+def test_what_the_robot_has_no_use_for_is_refused(name: str) -> None:
+    """It belongs to other boards."""
+    with pytest.raises(ParameterError, match=f"parameter '{name}' belongs to board"):
+        check(**{name: 1})

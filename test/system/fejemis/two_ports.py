@@ -1,0 +1,116 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A simulated Fejemis on two pseudo-terminals, each of which can be unplugged alone.
+
+Knows descriptors; bytes only as bytes.
+"""
+
+import select
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+from omnibot_driver.simulator.common.board import Packet
+from omnibot_driver.simulator.common.running import RunningBoard
+from omnibot_driver.simulator.common.terminal import Terminal
+from omnibot_driver.simulator.fejemis import CHANNELS, SimulatedFejemis
+
+PATIENCE_S: Final = 30.0
+STANDS_TICKS: Final = 750
+"""A second and a half of the simulated boards."""
+DRIVE, FRONT = 0, 1
+
+
+class TwoPorts(RunningBoard[SimulatedFejemis]):
+    """``ports``: the links that lead to the terminals, as udev makes them.
+
+    ``heard``: what each port received since it was plugged in last.
+    """
+
+    def __init__(self, board: SimulatedFejemis, folder: Path) -> None:
+        super().__init__(board)
+        self.ports = [str(folder / channel.name) for channel in CHANNELS]
+        self.heard = [bytearray(), bytearray()]
+        self._terminals: list[Terminal | None] = [None, None]
+        self._plugging = threading.Lock()
+
+    def __enter__(self) -> Self:
+        for channel in (DRIVE, FRONT):
+            self.plug(channel)
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.stop()
+        for channel in (DRIVE, FRONT):
+            self.unplug(channel)
+
+    def plug(self, channel: int) -> None:
+        """A new terminal, hardly of the old name, behind the old link."""
+        with self._plugging:
+            self.heard[channel] = bytearray()
+            self._terminals[channel] = Terminal(self.ports[channel])
+
+    def unplug(self, channel: int) -> None:
+        """The terminal goes away; the Teensy does what it was told last."""
+        with self._plugging:
+            terminal, self._terminals[channel] = self._terminals[channel], None
+            if terminal is not None:
+                terminal.close()
+
+    def wait_until(self, predicate: Callable[[SimulatedFejemis], object]) -> None:
+        """It comes to hold in time."""
+        found = self.wait_for(lambda board: bool(predicate(board)), PATIENCE_S)
+        assert found, {**self.facts, "last": self.last()}
+
+    def do(self, action: Callable[[SimulatedFejemis], Any]) -> Any:
+        """Between two ticks."""
+        with self.lock:
+            return action(self.board)
+
+    def last(self) -> list[list[str]]:
+        """What both halves executed last."""
+        halves = (self.board.drive, self.board.front)
+        return [[obeyed.text for obeyed in list(half.commands)[-12:]] for half in halves]
+
+    def stands_for_good(self) -> None:
+        """For a second and a half; then brush and lift are off too."""
+        since: list[int] = []
+
+        def stood(board: SimulatedFejemis) -> bool:
+            if not board.standing:
+                since.clear()
+                return False
+            since.append(board.tick)
+            return since[-1] - since[0] >= STANDS_TICKS
+
+        self.wait_until(stood)
+
+    def _receive(self, timeout_s: float) -> Iterator[Packet]:
+        with self._plugging:
+            open_ones = {
+                terminal.descriptor: (channel, terminal)
+                for channel, terminal in enumerate(self._terminals)
+                if terminal is not None
+            }
+            readable, _, _ = select.select(list(open_ones), [], [], timeout_s)
+            found = [
+                (channel, data)
+                for channel, terminal in map(open_ones.__getitem__, readable)
+                for data in terminal.receive()
+            ]
+        for channel, data in found:
+            self.heard[channel] += data
+        yield from found
+
+    def _send(self, channel: int, data: bytes) -> int:
+        with self._plugging:
+            terminal = self._terminals[channel]
+            return 0 if terminal is None else terminal.send(data)
