@@ -8,15 +8,13 @@ not what is in it.
 """
 
 import math
-from typing import Final, Protocol
+from typing import Protocol
 
 from omnibot_driver.core.commands.actuator import Wanted
 from omnibot_driver.core.commands.orders import EmergencyStop, Stop
 from omnibot_driver.core.commands.set_point_stream import SetpointStream
 from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.fejemis.encoder import Encoder
-
-AT_REST: Final = (None, False)
 
 
 class Listener(Protocol):
@@ -52,6 +50,6 @@ class PairStream(SetpointStream):
         """The front wheel stands here. Whether it shows now that it does not follow."""
         if not self.driving:
             return False
-        if self._pair.held:
+        if self._pair.restless:
             self._said_at = -math.inf
         return self._pair.follower.look(angle_rad, now)

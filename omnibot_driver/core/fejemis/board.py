@@ -413,22 +413,26 @@ class FejemisBoard(Board):
 
     def emergency_stop(self) -> Packets:
         """``stop`` to drive; the front board has none, so what turns there is switched off."""
-        return self._ports.line("drive", b"stop") + self.farewell()
+        return self._ports.line("drive", b"stop") + self._all_off()
+
+    def _all_off(self) -> Packets:
+        """Lift and brush."""
+        return self._ports.line("front", *OFF)
 
     def farewell(self) -> Packets:
-        """Lift and brush off."""
-        return self._ports.line("front", *OFF)
+        """Lift and brush off, lights as they were."""
+        return self._ports.line("front", *self._machine.farewell())
 
     def wake(self) -> Packets:
         """Stop, and what else may turn."""
-        return self.stop() + self.farewell()
+        return self.stop() + self._all_off()
 
     def start(self) -> Packets:
         """What was commanded before may hold again, so that is zero first; not in an e-stop."""
         if self._estopped:
             return NO_PACKETS
         self._pause_said = False
-        return self.stop() + self._ports.line("drive", b"start")
+        return self.stop() + self._ports.line("drive", *self._jobs.keep_power(), b"start")
 
     def pause(self) -> Packets:
         """Stop, ``stop``, and what else turns."""

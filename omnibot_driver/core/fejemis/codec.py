@@ -70,7 +70,10 @@ def parse(text: str) -> Message | None:
     """The message that this text is; None where it is damaged, or of no kind that is known."""
     if text.startswith("#") or text.startswith("--"):
         return Comment(text)
-    keyword, *fields = text.split()  # any white space, as the firmware does
+    words = text.split()  # any white space, as the firmware does
+    if not words:
+        return None
+    keyword, *fields = words
     parser = _PARSERS.get(keyword)
     return None if parser is None else parser(fields)
 

@@ -39,12 +39,13 @@ class DecoderStatistics:
 class FejemisDecoder:
     """One board's line. ``sums``: whether its lines have sums; None while that is not known.
 
-    ``changed``: they began or ceased to, since it was set to False last.
+    ``changed``: they began or ceased to, since it was set to False last. ``doubtful``: the last
+    line was otherwise, so what is said without a sum is understood sooner.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:
         self.statistics = DecoderStatistics()
-        self.changed = False
+        self.changed = self.doubtful = False
         self._held = b""
         self._cut = False
         """The line in hand is too long already."""
@@ -97,7 +98,10 @@ class FejemisDecoder:
         if isinstance(message, Heartbeat):
             self._learn(with_sum=right is not None)
         elif self.sums is not None and self.sums is not (right is not None):
+            self.doubtful = self._line_sums == "auto"
             return None
+        else:
+            self.doubtful = False
         if isinstance(message, Comment):
             self.statistics.comments += 1
         elif not self._forms.admit(text):
@@ -113,7 +117,7 @@ class FejemisDecoder:
         self._otherwise += 1
         if self.sums is None or self._otherwise >= CHANGED_AFTER:
             self.changed = self.sums is not None
-            self.sums, self._otherwise = with_sum, 0
+            self.sums, self._otherwise, self.doubtful = with_sum, 0, False
 
     def _damaged(self, length: int) -> None:
         self.statistics.faults += 1

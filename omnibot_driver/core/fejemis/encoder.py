@@ -62,7 +62,11 @@ class Pair(Protocol):
 
 
 class Encoder:
-    """``held``: the drive board is told less than commanded until the front wheel stands right."""
+    """``held``: the drive board is told less than commanded until the front wheel stands right.
+
+    ``restless``: the lines are worth saying again with each angle: while it is held, or where no
+    sum protects them, so that a damaged one is obeyed for 15 ms instead of a whole repetition.
+    """
 
     def __init__(self, pair: Pair, settings: FejemisSettings) -> None:
         self.settings = settings
@@ -75,6 +79,11 @@ class Encoder:
         self.held = self._turning = False
         self._encoded: tuple[Packets, Steered] | None = None
         self.follower.begin()
+
+    @property
+    def restless(self) -> bool:
+        """Whether to say it again with the next angle."""
+        return self.held or not self._pair.with_sums
 
     def stop(self) -> Packets:
         """To both."""
@@ -132,5 +141,10 @@ class Encoder:
 
 
 def _plain(speed_mps: float, turn_radps: float) -> bytes:
-    """Without a sum no choice of digits helps."""
-    return f"rc 2 {speed_mps:.4f} {math.degrees(turn_radps):.3f}".encode("ascii")
+    """Without a sum no choice of digits helps, but few of them are damaged more seldom."""
+    return b"rc 2 %s %s" % (_short(speed_mps, 4), _short(math.degrees(turn_radps), 2))
+
+
+def _short(number: float, decimals: int) -> bytes:
+    text = f"{number:.{decimals}f}".rstrip("0").rstrip(".")
+    return (text if text.strip("-") else "0").encode("ascii")

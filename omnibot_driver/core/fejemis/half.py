@@ -27,10 +27,10 @@ ROLES: Final[Mapping[int, Role]] = {90: "drive", 91: "front"}
 """By the identity in the heartbeat (manual, Meta info)."""
 STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
     "drive": {
-        "hbt": 200, "pose": 20, "vel": 20, "gyro": 10, "acc": 10, "imupose": 20, "mag": 100,
+        "hbt": 400, "pose": 20, "vel": 20, "gyro": 10, "acc": 10, "imupose": 20, "mag": 100,
         "bat": 500, "tofd": 100, "sr04": 100,
     },
-    "front": {"hbt": 200, "fwl": 15, "ir": 100},
+    "front": {"hbt": 400, "fwl": 15, "ir": 100},
 }  # fmt: skip
 """What is subscribed, and its period in ms."""
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
@@ -66,6 +66,7 @@ class Half:
         self.ready = False
         """Its needed stream flows."""
         self._told: int | None = None
+        self._left = False
         self._at: dict[str, float] = {}
         self._next_at = -math.inf
         self._asked_at = -math.inf
@@ -78,7 +79,7 @@ class Half:
     @property
     def sums(self) -> bool:
         """Whether lines to it have a sum."""
-        return bool(self.decoder.sums)
+        return bool(self.decoder.sums) and not self.decoder.doubtful
 
     def feed(self, data: bytes, now: float) -> list[Message]:
         """What these bytes tell, without what cannot be true of this board's time."""
@@ -118,7 +119,12 @@ class Half:
         }
         if wanted.keys() & set(TOGETHER):
             wanted |= {key: STREAMS["drive"][key] for key in TOGETHER}
-        return [f"sub {key} {period}".encode("ascii") for key, period in wanted.items()]
+        texts = [f"sub {key} {period}".encode("ascii") for key, period in wanted.items()]
+        if not self._left:
+            self._left = True  # what somebody else has subscribed would only fill the line
+            every = (f"sub {key} {period}" for key, period in STREAMS[self.role].items())
+            return [b"leave", *(text.encode("ascii") for text in every)]
+        return texts
 
     def _admit(self, message: Message, now: float) -> bool:
         if isinstance(message, Comment):

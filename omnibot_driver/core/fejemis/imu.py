@@ -20,9 +20,13 @@ PERIOD_S: Final = 0.01
 STANDARD_GRAVITY: Final = 9.80665
 PAIR_WITHIN_S: Final = 0.008
 """The two lines of one sample leave the board in one cycle."""
-LOSS_READS: Final = 12
-"""So many samples that were all late by a period or more: one was lost, rather."""
-PHASE_BLOCKS: Final = 20
+LATE: Final = 0.98
+REGULAR: Final = 0.6
+"""Two samples in a row that are late by a period and come apart: one was lost before them. After a
+stall of the host they come at once."""
+CYCLE_S: Final = 0.0015
+"""What is sent in one control cycle of the board may be in any order."""
+PHASE_BLOCKS: Final = 3
 BLOCK: Final = 100
 
 
@@ -39,10 +43,11 @@ class ImuPairing:
         """The board subscribes anew: the phase is another one."""
         self._gyro: tuple[Gyro, float] | None = None
         self._count = 0
+        self._arrived_s = -math.inf
         self._phase_s: float | None = None
         self._floor_s: deque[float] = deque(maxlen=PHASE_BLOCKS)
         self._block_s, self._block_from = math.inf, 0
-        self._delays_s: deque[float] = deque(maxlen=LOSS_READS)
+        self._delay_s = 0.0
 
     def gyro(self, gyro: Gyro, now: float) -> None:
         """The first half of a sample."""
@@ -66,26 +71,21 @@ class ImuPairing:
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
-            self._phase_s = arrived_s
+            self._phase_s = self._arrived_s = arrived_s
             return arrived_s
+        since_s, self._arrived_s = arrived_s - self._arrived_s, arrived_s
         self._count += 1
         time_s = self._phase_s + self._count * PERIOD_S
-        if time_s < not_before_s - PERIOD_S / 2:
-            lost = math.ceil((not_before_s - PERIOD_S / 2 - time_s) / PERIOD_S)
-            self._count += lost
-            time_s += lost * PERIOD_S
-        delay_s = arrived_s - time_s
+        lost = max(0, math.ceil((not_before_s - CYCLE_S - time_s) / PERIOD_S))
+        delay_s = arrived_s - time_s - lost * PERIOD_S
         if delay_s < -PERIOD_S / 2:
-            back = round(-delay_s / PERIOD_S)
-            self._count -= back
-            delay_s += back * PERIOD_S
-        self._delays_s.append(delay_s)
-        least_s = min(self._delays_s)
-        if len(self._delays_s) == LOSS_READS and least_s > 0.7 * PERIOD_S:
-            lost = round(least_s / PERIOD_S)
-            self._count += lost
-            delay_s -= lost * PERIOD_S
-            self._delays_s.clear()
+            lost += (more := round(delay_s / PERIOD_S))
+            delay_s -= more * PERIOD_S
+        elif since_s > REGULAR * PERIOD_S and min(delay_s, self._delay_s) > LATE * PERIOD_S:
+            lost += (more := int(min(delay_s, self._delay_s) / PERIOD_S + 1.0 - LATE))
+            delay_s -= more * PERIOD_S
+        self._delay_s = delay_s
+        self._count += lost
         self._follow(delay_s)
         return self._phase_s + self._count * PERIOD_S
 

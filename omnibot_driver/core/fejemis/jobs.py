@@ -74,6 +74,14 @@ class Jobs:
         if self.job is not None:
             self._finish(False, f"{self.job.value} failed: {why}")
 
+    def keep_power(self) -> list[bytes]:
+        """What calls a power off back; nothing where none is due."""
+        lines = [b"on"] if self.powering_off else []
+        if self.job is Job.POWER_OFF:
+            self.cancel("it was called back")
+        self.powering_off = False
+        return lines
+
     def begin(self) -> None:
         """The line is new."""
         self.powering_off = False

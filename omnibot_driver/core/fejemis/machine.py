@@ -79,6 +79,12 @@ class Machine:
         self._off_left, self._brush_left = TIMES, 0
         self._next_at = -math.inf
 
+    def farewell(self) -> list[bytes]:
+        """What ends all that was switched on, lights included."""
+        self.off()
+        lights = [b"ledon 1", b"leds"] if self.colour else []
+        return [*OFF, *lights]
+
     def due(self, now: float) -> list[bytes]:
         """Lines to write now."""
         if now < self.wake_at:
@@ -98,7 +104,7 @@ class Machine:
             texts.append(b"brush 1" if self.brush else b"brush 0")
         if self._led_left and self.colour:
             self._led_left -= 1
-            texts.append(b"ledb %d %d %d" % self.colour)
+            texts += [b"ledon %d" % any(self.colour), b"ledb %d %d %d" % self.colour]
         again = self._off_left or self._brush_left or self._led_left
         rest_s = BRUSH_AGAIN_S if self.brush else math.inf
         self._next_at = now + (BETWEEN_S if again else rest_s)

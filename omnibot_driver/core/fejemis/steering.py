@@ -26,8 +26,9 @@ STILL_ALIGNED_RAD: Final = math.radians(10.0)
 """A robot that turns goes on up to here."""
 GIVEN_RAD: Final = math.radians(5.0)
 """What a body may do besides while its wheel is on the way: as if it were off by this angle."""
-FOLLOWS_WITHIN_S: Final = 1.5
-"""A front wheel that is not near its angle for so long does not follow."""
+FOLLOWS_WITHIN_S: Final = 1.0
+"""A front wheel that comes no nearer to its angle for so long does not follow."""
+NEARER_RAD: Final = math.radians(1.0)
 FOLLOWS_RAD: Final = math.radians(12.0)
 
 
@@ -149,7 +150,7 @@ class Follower:
     def begin(self) -> None:
         """Nothing is commanded."""
         self._angle_rad: float | None = None
-        self._since = math.inf
+        self._since = self._least_rad = math.inf
         self.fault = False
 
     def aim(self, angle_rad: float) -> None:
@@ -160,10 +161,12 @@ class Follower:
         """It stands there. Whether this shows, for the first time, that it does not follow."""
         if self._angle_rad is None:
             return False
-        if abs(angle_rad - self._angle_rad) <= FOLLOWS_RAD:
-            self._since, self.fault = now, False
+        off_rad = abs(angle_rad - self._angle_rad)
+        if off_rad <= FOLLOWS_RAD:
+            self._since, self._least_rad, self.fault = now, math.inf, False
             return False
-        self._since = min(self._since, now)
+        if off_rad < self._least_rad - NEARER_RAD:
+            self._since, self._least_rad = now, off_rad
         late = now - self._since > FOLLOWS_WITHIN_S
         first, self.fault = late and not self.fault, late
         return first

@@ -1,0 +1,145 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Motion lines of which characters are lost on the way to a board."""
+
+import itertools
+import math
+import random
+import re
+
+import pytest
+
+from omnibot_driver.core.fejemis.front_wheel import relay_text
+from omnibot_driver.core.fejemis.machine import lift_line
+from omnibot_driver.core.fejemis.motion_lines import STOP, drive_line, front_line
+from omnibot_driver.core.fejemis.outbound import harmless, line
+from omnibot_driver.core.fejemis.sums import sum_of
+
+FRONT_M = 0.42
+COMMANDS = [
+    (v, w)
+    for v in (0.0, 0.015, 0.1, 0.15, 0.25, 0.5, 1.0, 1.25, -0.2, -0.65)
+    for w in (0.0, 0.02, 0.1, 0.2, 0.5, 1.0, 2.5, -0.3, -1.2)
+]
+NUMBER = re.compile(rb"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
+
+
+def motions(data: bytes, keyword: bytes = b"rc", count: int = 3) -> list[tuple[float, ...]]:
+    """What a board takes out of these bytes that has sums, and reads numbers as C does.
+
+    It is as lenient as any: missing numbers are 0, what follows them is left alone, a sum may have
+    one digit.
+    """
+    found = []
+    for text in re.split(rb"[\r\n]", data):
+        bodies = [text]
+        if text.startswith(b";"):
+            bodies = []
+            for digits in (2, 1):
+                sum_text, body = text[1 : 1 + digits], text[1 + digits :]
+                if len(sum_text) == digits and sum_text.isdigit() and int(sum_text) == sum_of(body):
+                    bodies.append(body)
+        for body in bodies:
+            if not body.startswith(keyword):
+                continue
+            at, numbers = len(keyword), []
+            while match := NUMBER.match(body, at):
+                numbers.append(float(match[1]))
+                at = match.end()
+            found.append(tuple([*numbers, *count * [0.0]][:count]))
+    return found
+
+
+def without(data: bytes, places: tuple[int, ...]) -> bytes:
+    return bytes(byte for at, byte in enumerate(data) if at not in places)
+
+
+def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
+    """Which is what the digits are chosen against."""
+    text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
+    damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
+    assert motions(damaged) == [(0.25, 1.459, 0.0)]
+
+
+def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
+    """Over the whole range of commands, with the line that comes behind."""
+    chance = random.Random(5)
+    texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
+    behind = [line(b"fwl .04", sums=True), line(b"rc 2 .299 28.6", sums=True)]
+    for text in sorted(texts - {STOP}):
+        for after in chance.sample(behind, 1):
+            data = line(text, sums=True) + after
+            right = set(motions(data))
+            length = data.index(b"\n") + 1
+            for count in (1, 2):
+                for lost in itertools.combinations(range(length), count):
+                    assert set(motions(without(data, lost))) <= right, (text, lost)
+
+
+def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
+    """By the pairs that a sum does not see: the line has none of them."""
+    chance = random.Random(7)
+    for _ in range(400):
+        v = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.3)
+        w = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.8)
+        for text in (front_line(v, w, FRONT_M), drive_line(v, w)):
+            assert text == STOP or harmless(text[2:].decode()), text
+
+
+def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
+    """However much."""
+    data = line(STOP, sums=True)
+    for count in range(1, 5):
+        for lost in itertools.combinations(range(len(data)), count):
+            assert all(v == w == 0.0 for _, v, w in motions(without(data, lost)))
+
+
+def test_what_three_lost_characters_leave() -> None:
+    """Of a thousand losses of three, few make another motion; docs/boards/fejemis.md has them."""
+    passed = total = 0
+    for v, w in ((0.25, 0.2), (0.5, -0.5), (0.15, 0.0)):
+        for text in (front_line(v, w, FRONT_M), drive_line(v, w)):
+            data = line(text, sums=True) + line(b"fwl .04", sums=True)
+            right = set(motions(data))
+            for lost in itertools.combinations(range(data.index(b"\n") + 1), 3):
+                total += 1
+                passed += not set(motions(without(data, lost))) <= right
+    assert passed / total < 0.01
+
+
+@pytest.mark.parametrize(("v", "w"), COMMANDS)
+def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
+    """The front wheel's angle within 0.2°, the outer wheel's speed within half a per cent."""
+    if v == w == 0.0:
+        return
+    _, front_v, front_w = motions(front_line(v, w, FRONT_M) + b"\n")[0]
+    told = math.atan2(FRONT_M * math.radians(front_w), front_v)
+    assert told == pytest.approx(math.atan2(FRONT_M * w, v), abs=0.0035)
+    _, drive_v, drive_w = motions(drive_line(v, w) + b"\n")[0]
+    assert math.hypot(drive_v, math.radians(drive_w)) == pytest.approx(math.hypot(v, w), rel=6e-3)
+    assert (drive_v < 0.0) is (v < 0.0)
+
+
+@pytest.mark.parametrize("volts", [6.0, -6.0, 12.0, -12.0, 0.5, 1.25])
+def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
+    """It gets no more than was asked for, and is near that."""
+    text, seconds = lift_line(volts, 0.5)
+    data = line(text, sums=True)
+    said_volts, said_s = motions(data, b"motv", 2)[0]
+    assert said_s == seconds <= 0.5
+    assert 0.6 * abs(volts) < abs(said_volts) <= abs(volts)
+    for count in (1, 2):
+        for lost in itertools.combinations(range(len(data) - 1), count):
+            for found_volts, found_s in motions(without(data, lost), b"motv", 2):
+                assert abs(found_volts) <= 12.0
+                assert found_s <= 0.5
+
+
+def test_a_relayed_angle_is_near_and_mostly_safe() -> None:
+    """Within a quarter of a degree; where digits cannot be chosen it is exact, and lasts 15 ms."""
+    safe = 0
+    for tenth in range(-900, 901):
+        text = relay_text(math.radians(tenth / 10))
+        assert float(text.split()[1]) == pytest.approx(tenth / 10, abs=0.26)
+        safe += harmless(text[3:].decode())
+    assert safe > 1200
