@@ -1,0 +1,236 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Two boards, one robot: each may be swapped, lost, restarted or silent alone."""
+
+import pytest
+from fejemis_bench import DRIVE, FRONT, Bench, nominal
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
+from omnibot_driver.simulator.fejemis import Firmware
+
+HALVES = {"drive": DRIVE, "front": FRONT}
+
+
+def drive_until_refused(bench: Bench, limit_s: float = 5.0) -> float:
+    """Seconds until a command is refused."""
+    began = bench.now
+    with pytest.raises(CommandRefused):
+        bench.drive_on(seconds=limit_s)
+    return bench.now - began
+
+
+def assert_stands(bench: Bench) -> None:
+    bench.run(1.0)
+    assert bench.robot.standing
+    before = bench.robot.truth.x_m
+    bench.run(2.0)
+    assert bench.robot.truth.x_m == before
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
+    """The heartbeats tell; the channels are named by what is there."""
+    bench = nominal(Simulated(swapped=swapped))
+    bench.drive_on()
+    assert bench.robot.truth.speed_mps == pytest.approx(0.3, abs=0.01)
+    assert bench.board.traits.channels == (("front", "drive") if swapped else ("drive", "front"))
+    assert any("swapped" in text for text in bench.notices) is swapped
+    bench.estop(True)
+    bench.run(1.0)
+    assert bench.robot.drive.source == -1
+    assert not bench.board.figures.own.get("Front lines unknown")
+
+
+@pytest.mark.parametrize("half", HALVES)
+def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> None:
+    """It is driven again when both talk, on a new command."""
+    bench = nominal()
+    bench.drive_on()
+    bench.speaks = {1 - HALVES[half]}
+    assert drive_until_refused(bench) <= (0.11 if half == "front" else 0.31)
+    bench.run(2.0)
+    assert bench.session.state == "connecting"
+    assert any(f"the {half} board is silent" in text for text in bench.notices)
+    assert_stands(bench)
+    bench.speaks = {DRIVE, FRONT}
+    bench.run_until(lambda: bench.session.state == "nominal")
+    assert_stands(bench)
+    bench.drive_on()
+    assert not bench.robot.standing
+
+
+@pytest.mark.parametrize("half", HALVES)
+def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
+    """The robot stands meanwhile, and moves only on a new command."""
+    bench = nominal()
+    bench.drive_on()
+    before = dict(bench.robot.half(half).subscriptions)
+    bench.robot.half(half).reboot()
+    drive_until_refused(bench)
+    bench.run(1.5)
+    assert any(f"the {half} board has restarted" in text for text in bench.notices)
+    bench.run_until(lambda: bench.session.state == "nominal")
+    assert bench.robot.half(half).subscriptions == before
+    assert_stands(bench)
+    odom, truth = bench.odometry[-1].pose, bench.robot.truth
+    assert odom.x_m == pytest.approx(truth.x_m, abs=0.06)
+    bench.drive_on()
+    assert not bench.robot.standing
+
+
+@pytest.mark.parametrize("half", HALVES)
+def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: str) -> None:
+    """As the link does it: all begins again with the lines that are there."""
+    bench = nominal()
+    bench.drive_on()
+    mark = bench.now
+    channel = HALVES[half]
+    bench.close()
+    bench.hears = bench.speaks = {1 - channel}
+    bench.open(missing=f"the line '{half}' is missing")
+    bench.run(0.5)
+    assert "rc 2 0 0" in bench.lines(1 - channel, mark)
+    assert bench.session.state == "connecting"
+    with pytest.raises(CommandRefused, match=half):
+        bench.drive()
+    bench.close()
+    bench.hears = bench.speaks = {DRIVE, FRONT}
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(0.5)
+    assert_stands(bench)
+    odom, truth = bench.odometry[-1].pose, bench.robot.truth
+    assert (odom.x_m, odom.y_m) == pytest.approx((truth.x_m, truth.y_m), abs=0.002)
+    bench.drive_on()
+    assert not bench.robot.standing
+
+
+@pytest.mark.parametrize(
+    ("ids", "sentence"),
+    [
+        ((90, 90), "both ports lead to a drive board"),
+        ((91, 91), "both ports lead to a front board"),
+        ((90, 7), "has the id 7"),
+        ((0, 91), "has the id 0"),
+    ],
+)
+def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: str) -> None:
+    """One sentence, and no motion."""
+    bench = Bench(Simulated(ids=ids))
+    bench.open()
+    bench.run(6.0)
+    assert sum(sentence in text for text in bench.notices) == 1
+    assert bench.session.state == "connecting"
+    with pytest.raises(CommandRefused):
+        bench.drive()
+
+
+@pytest.mark.parametrize("half", HALVES)
+def test_a_board_that_never_speaks_is_missed(half: str) -> None:
+    """By name and port."""
+    bench = Bench()
+    bench.speaks = {1 - HALVES[half]}
+    bench.open()
+    bench.run(5.0)
+    assert sum(f"nothing is heard from the {half} board" in text for text in bench.notices) == 1
+
+
+@pytest.mark.parametrize("begins", [False, True])
+def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
+    """From then on it is driven in the other way."""
+    bench = nominal(Simulated(firmware=Firmware(sums=not begins)))
+    bench.drive_on()
+    bench.robot.drive.sums = bench.robot.front.sums = begins
+    drive_until_refused(bench)
+    bench.run(2.0)
+    assert bench.robot.standing
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.drive_on()
+    assert not bench.robot.standing
+    words = "have sums now" if begins else "have no sums any more"
+    assert sum(words in text for text in bench.notices) == 2
+
+
+def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
+    """66 times a second, with what was told."""
+    bench = nominal()
+    mark = bench.now
+    bench.drive_on(0.2, 0.4, 1.0)
+    relayed = [at for at, to, data in bench.written if to == DRIVE and at > mark and b"fwl" in data]
+    assert 60 <= len(relayed) <= 68
+    assert bench.robot.drive.told_angle_deg == pytest.approx(
+        bench.robot.vehicle.servo.angle_deg, abs=1.5
+    )
+
+
+def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
+    """At that moment, not with the next command."""
+    bench = nominal()
+    bench.drive_on()
+    mark = bench.now
+    bench.carry = lambda channel, data: b"" if channel == FRONT and b"fwl" in data else data
+    bench.run(0.08)
+    stops = [
+        at for at, to, data in bench.written if at > mark and to == DRIVE and b"rc 2 0 0" in data
+    ]
+    assert stops[0] - mark <= 0.064
+    assert any("60 ms" in text for text in bench.notices)
+
+
+SENSOR = [
+    "sensor-absent", "sensor-error", "hall-broken", "agc-unsettled", "offset-unfinished",
+    "sine-unfinished", "cosine-unfinished", "magnet-weak", "agc-high", "agc-low",
+    "cordic-overflow", "loops-unfinished", "supply-5v",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", SENSOR)
+def test_a_broken_angle_sensor_stops_the_robot(fault: str) -> None:
+    """Each bit of the diagnosis, in words; when it is well again a new command drives."""
+    bench = nominal()
+    bench.drive_on()
+    bench.robot.befall("front", fault)
+    drive_until_refused(bench)
+    assert any("angle sensor" in text for text in bench.notices)
+    bench.run(1.0)
+    assert bench.robot.standing
+    with pytest.raises(CommandRefused, match="angle sensor"):
+        bench.drive()
+    bench.robot.befall("front", "sensor-well")
+    bench.run(0.5)
+    bench.drive_on()
+    assert not bench.robot.standing
+
+
+def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_turn() -> None:
+    """It says that all is well."""
+    bench = nominal()
+    bench.robot.befall("front", "sensor-frozen")
+    bench.drive_on(0.0, 0.5, 2.0)
+    assert any("does not go where it is commanded" in text for text in bench.notices)
+    assert bench.robot.standing
+
+
+def test_help_text_and_unknown_answers_are_no_trouble() -> None:
+    """A flood of them costs nothing but their bytes."""
+    bench = nominal()
+    bench.robot.receive(b"help\nxyz\n", bench.now, DRIVE)
+    bench.robot.receive(b"help\nxyz\n", bench.now, FRONT)
+    bench.drive_on()
+    assert not bench.robot.standing
+    assert bench.board.figures.own["Drive lines unknown"] == "xyz"
+
+
+@pytest.mark.parametrize("firmware", [
+    Firmware(acceleration_in_g=True), Firmware(timed_velocity=True), Firmware(tilt=True),
+    Firmware(carriage_return=False), Firmware(single_precision=True), Firmware(confirms=True),
+    Firmware(shows_source=False),
+])  # fmt: skip
+def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
+    """Whichever way it says it."""
+    bench = nominal(Simulated(firmware=firmware))
+    bench.drive_on(0.3, 0.2)
+    assert bench.robot.truth.speed_mps == pytest.approx(0.3, abs=0.01)
+    assert bench.board.figures.faults == 0
+    assert not bench.notices

@@ -1,0 +1,222 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What each board is told, and what the body does of it by the manual's equations."""
+
+import math
+
+import pytest
+from fejemis_bench import nominal
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from omnibot_driver.core.fejemis.motion_lines import drive_line, front_line
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.fejemis.steering import (
+    ALIGNED_RAD,
+    Follower,
+    Geometry,
+    outer_mps,
+    scale,
+    steer,
+    told_twist,
+)
+from omnibot_driver.core.geometry.steered import SteeredKinematics
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
+from omnibot_driver.simulator.fejemis import Firmware
+
+ROBOT = Geometry(track_m=0.4, wheelbase_m=0.5)
+speeds = st.floats(-1.0, 1.0)
+rates = st.floats(-2.0, 2.0)
+angles = st.floats(-math.pi / 2, math.pi / 2)
+
+
+def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
+    """Speed and turn rate of the body, word by word from the manual, Turning control."""
+    b, f = 0.4, 0.5
+    v2 = math.copysign(math.hypot(v, w), v)
+    if theta_rad == 0.0:
+        return v2, 0.0
+    d = f / math.tan(abs(theta_rad)) + b / 2
+    v1 = v2 - v2 * b / d
+    return (v1 + v2) / 2, math.copysign((v2 - v1) / b, theta_rad * v2)
+
+
+@pytest.mark.parametrize(
+    ("v", "w", "theta_deg", "body_v", "body_w"),
+    [
+        (0.5, 1.0, 45.0, 0.7986, 1.5972),  # d = 0.7, v2 = 1.1180, v1 = 0.4792
+        (0.0, 1.0, 90.0, 0.0, 5.0),  # d = 0.2, v2 = 1, v1 = -1
+        (0.3, 0.0, 0.0, 0.3, 0.0),
+        (0.3, -0.4, -30.0, 0.4061, -0.4689),  # d = 1.0660, v2 = 0.5, v1 = 0.3124
+        (-0.3, 0.0, 0.0, -0.3, 0.0),
+    ],
+)
+def test_what_rc_alone_would_do(
+    v: float, w: float, theta_deg: float, body_v: float, body_w: float
+) -> None:
+    """Computed by hand: the boards do not do what it says."""
+    body = told_twist(v, w, ROBOT, math.radians(theta_deg))
+    assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((body_v, body_w), abs=2e-4)
+
+
+@given(speeds, rates, angles)
+def test_the_equations_are_those_of_the_manual(v: float, w: float, theta_rad: float) -> None:
+    """For every angle that the wheel may have."""
+    assume(math.hypot(v, w) > 1e-3 and abs(theta_rad) > 1e-6)
+    body = told_twist(v, w, ROBOT, theta_rad)
+    expected = manual(v, w, theta_rad)
+    assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx(expected, abs=1e-9)
+
+
+@given(speeds, rates)
+def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
+    """With the wheel where the front board puts it."""
+    assume(outer_mps(BodyTwist(v, 0.0, w), 0.4) > 1e-3 and v >= 0.0)
+    factor = scale(BodyTwist(v, 0.0, w), 0.4)
+    theta_rad = math.atan2(0.5 * factor * w, factor * v)
+    body = told_twist(factor * v, factor * w, ROBOT, theta_rad)
+    assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((v, w), abs=1e-9)
+
+
+@given(speeds, rates, angles)
+def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
+    v: float, w: float, angle_rad: float
+) -> None:
+    """But for what an angle that is off by 5° gives."""
+    wanted = BodyTwist(v, 0.0, w)
+    assume(outer_mps(wanted, 0.4) > 1e-3)
+    told = steer(wanted, ROBOT, angle_rad, turning=False).twist
+    given_mps = 1.001 * math.hypot(v, 0.5 * w) * math.sin(ALIGNED_RAD)
+    near = abs(angle_rad - ROBOT.kinematics.steering_rad(wanted)) <= ALIGNED_RAD
+    if not near:
+        assert abs(told.vx_mps) <= abs(v) + given_mps + 1e-9
+        assert abs(told.yaw_rate_radps) <= abs(w) + given_mps / 0.5 + 1e-9
+    assert told.vx_mps * v >= 0.0 or not v
+
+
+@given(rates, angles)
+def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> None:
+    """Within 5° of ±90°."""
+    assume(abs(w) > 0.01)
+    told = steer(BodyTwist(0.0, 0.0, w), ROBOT, angle_rad, turning=False)
+    stands = abs(angle_rad - math.copysign(math.pi / 2, w)) <= ALIGNED_RAD
+    assert (told.part == 1.0) is stands
+    assert stands or told.twist == BodyTwist(0.0, 0.0, 0.0)
+
+
+def test_without_an_angle_the_drive_board_is_told_to_stand() -> None:
+    """It would compute with an old one."""
+    told = steer(BodyTwist(0.3, 0.0, 0.1), ROBOT, None, turning=False)
+    assert told.part == 0.0
+    assert told.speed_mps > 0.3
+
+
+@given(speeds, rates)
+def test_the_steered_wheel_rolls_without_slip(v: float, w: float) -> None:
+    """Its own velocity points where it does, forward or backward."""
+    assume(math.hypot(v, w) > 1e-3)
+    wheels = SteeredKinematics(0.1, 0.4, 0.5)
+    theta = wheels.steering_rad(BodyTwist(v, 0.0, w))
+    assert abs(theta) <= math.pi / 2
+    across = -v * math.sin(theta) + 0.5 * w * math.cos(theta)
+    assert across == pytest.approx(0.0, abs=1e-9)
+
+
+COMMANDS = [
+    (v, w) for v in (0.0, 0.02, 0.15, 0.3, 0.6) for w in (-1.0, -0.2, 0.0, 0.05, 0.5) if v or w
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sums", [True, False])
+@pytest.mark.parametrize(("v", "w"), COMMANDS)
+def test_the_simulated_body_moves_as_commanded(v: float, w: float, *, sums: bool) -> None:
+    """Within 1 % of the outer wheel's speed, over the whole range."""
+    bench = nominal(Simulated(firmware=Firmware(sums=sums)))
+    bench.drive_on(v, w, 3.0)
+    truth = bench.robot.truth
+    outer = abs(v) + abs(w) * 0.2
+    assert truth.speed_mps == pytest.approx(v, abs=0.012 * outer + 5e-4)
+    assert truth.yaw_rate_radps == pytest.approx(w, abs=0.03 * outer / 0.4 + 1e-3)
+
+
+def test_the_digits_cost_less_than_one_per_cent() -> None:
+    """What is told, by the manual, against what is commanded."""
+    for v in (0.05, 0.1, 0.15, 0.25, 0.5, 1.0):
+        for w in (-1.5, -0.3, 0.0, 0.1, 0.12, 0.8):
+            factor = scale(BodyTwist(v, 0.0, w), 0.4)
+            front = front_line(factor * v, factor * w, 0.5).split()
+            drive = drive_line(factor * v, factor * w).split()
+            theta = math.atan2(0.5 * math.radians(float(front[3])), float(front[2]))
+            body = told_twist(float(drive[2]), math.radians(float(drive[3])), ROBOT, theta)
+            outer = abs(v) + abs(w) * 0.2
+            assert body.vx_mps == pytest.approx(v, abs=0.01 * outer)
+            assert body.yaw_rate_radps == pytest.approx(w, abs=0.01 * outer / 0.2)
+
+
+def test_a_turn_on_the_spot_begins_without_rolling() -> None:
+    """From straight ahead: ``rc 2 0 w`` to both would roll 0.17 m first."""
+    bench = nominal()
+    for _ in range(12):
+        bench.drive(0.0, 1.0)
+        bench.run(0.1)
+        assert abs(bench.robot.truth.x_m) < 0.006
+    assert bench.robot.truth.yaw_rate_radps > 0.8
+
+
+def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> None:
+    """The servo takes more than a second for 180°, and that is no fault."""
+    bench = nominal()
+    bench.drive_on(0.0, 1.0, 2.0)
+    before_m = bench.robot.truth.x_m
+    bench.drive_on(0.0, -1.0, 3.0)
+    assert bench.robot.truth.yaw_rate_radps == pytest.approx(-1.0, abs=0.03)
+    assert abs(bench.robot.truth.x_m - before_m) < 0.03
+    assert not bench.notices
+
+
+def test_reverse_is_off_until_it_is_allowed() -> None:
+    """It stands, and says so once."""
+    bench = nominal()
+    bench.drive_on(-0.2, 0.3, 1.0)
+    assert bench.robot.standing
+    assert bench.robot.truth.x_m == 0.0
+    assert sum("allow_reverse" in text for text in bench.notices) == 1
+
+
+def test_a_mirrored_reverse_is_driven() -> None:
+    """As commanded, along the same curve."""
+    bench = nominal(
+        Simulated(firmware=Firmware(reverse="mirrored")), FejemisSettings(allow_reverse=True)
+    )
+    bench.drive_on(-0.2, 0.3, 3.0)
+    truth = bench.robot.truth
+    assert (truth.speed_mps, truth.yaw_rate_radps) == pytest.approx((-0.2, 0.3), abs=0.01)
+    assert not bench.notices
+
+
+@pytest.mark.parametrize("w", [0.0, 0.3, -0.3])
+def test_a_clamped_reverse_is_stopped(w: float) -> None:
+    """The wheel goes across instead; the robot rolls some centimetres at the most."""
+    bench = nominal(
+        Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)
+    )
+    bench.drive_on(-0.2, w, 3.0)
+    bench.run(1.0)
+    assert bench.robot.standing
+    assert math.hypot(bench.robot.truth.x_m, bench.robot.truth.y_m) < 0.06
+    assert any("allow_reverse" in text for text in bench.notices)
+
+
+def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
+    """One that comes nearer, however slowly, follows."""
+    follower = Follower()
+    follower.aim(1.5)
+    assert not any(follower.look(0.015 * n, 0.015 * n) for n in range(100))
+    follower.begin()
+    follower.aim(1.5)
+    assert sum(follower.look(0.0, 0.015 * n) for n in range(200)) == 1
+    assert follower.fault
+    follower.look(1.45, 3.1)
+    assert not follower.fault
