@@ -117,7 +117,7 @@ def twist(data: bytes) -> BodyTwist:
         return messages.body_twist(deserialize_message(data, Twist))
     except (RMWError, struct.error) as error:
         raise CommandRefused(
-            f"cmd_vel refused: its bytes are no Twist ({error}): mend the sender"
+            f"cmd_vel rejected: not a valid Twist ({error}); fix the publishing node"
         ) from error
 
 

@@ -55,19 +55,21 @@ def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, p
     unread = [name for name in names if name not in table.calibrated + calibration.RECORDED]
     if not names:
         node.get_logger().warning(
-            f"there is no calibration_file {path} yet: nothing of it is applied; check the path;"
-            " a calibration writes it"
+            f"calibration_file {path} does not exist, so nothing is loaded from it; check the"
+            " path, or create the file by a calibration"
         )
     if unread:
         nearest = [
-            f"{name} (the nearest that is: {parameters.nearest(name, table.calibrated or [name])})"
+            f"{name} (the nearest known name:"
+            f" {parameters.nearest(name, table.calibrated or [name])})"
             for name in unread
         ]
         node.get_logger().warning(
-            f"the calibration_file {path} holds what is not read from it: {', '.join(nearest)}"
+            f"calibration_file {path} has names that the driver does not read from it:"
+            f" {', '.join(nearest)}"
         )
     if found:
-        node.get_logger().info(f"the calibration_file {path} gives {', '.join(found)}")
+        node.get_logger().info(f"calibration_file {path} sets {', '.join(found)}")
     return found
 
 

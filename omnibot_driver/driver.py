@@ -97,13 +97,13 @@ def _main(args: list[str]) -> int:
 
     try:
         if unknown := remove_ros_args(args)[1:]:
-            return _refuse(f"it does not know {' '.join(unknown)}; {USAGE}")
+            return _refuse(f"unknown argument {' '.join(unknown)}; {USAGE}")
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         rclpy.get_default_context().on_shutdown(ending.begin)
         _run(ending, args)
     except UnknownROSArgsError as error:  # its text is Python's for a list
         words = str(error)[1:-1].replace("', '", " ").strip("'")
-        return _refuse(f"it does not know {words}; {USAGE}")
+        return _refuse(f"unknown argument {words}; {USAGE}")
     except NameValidationException as error:  # its second line is the name, which may be long
         why = str(error).partition(":\n")[0]
         return _refuse(f"{why}; give another namespace or name: --ros-args -r __ns:=/robot1")
@@ -126,8 +126,8 @@ def _run(ending: Ending, args: list[str]) -> None:
     driver = OmniBotDriver(end=ending.begin)
     if "--params-file" in args and not driver._parameter_overrides:
         driver.get_logger().warning(
-            "no parameter of the --params-file is for this node, which is"
-            f" {driver.get_fully_qualified_name()}: let the file begin with /**:"
+            "the --params-file has no parameters for this node,"
+            f" {driver.get_fully_qualified_name()}; begin the file with /**:"
         )
     executor = SingleThreadedExecutor()
     executor.add_node(driver)
@@ -158,7 +158,7 @@ def _set_deadline() -> None:
 
     def give_up() -> None:
         try:
-            text = "omnibot_driver hangs while it ends: it is cut short"
+            text = "omnibot_driver hung during shutdown and is terminated"
             print(text, file=sys.stderr, flush=True)
             time.sleep(0.1)  # until that is copied
         finally:  # also when nobody takes what is printed

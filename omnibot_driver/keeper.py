@@ -65,7 +65,7 @@ class Keeper:
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT
         if self._process is not None and (trouble := self._beat(self._process, word)):
-            self._tell(f"{trouble}; another one is started")
+            self._tell(f"{trouble}; starting another one")
         if self._process is None and now >= self._restart_at and len(self._dying) < MOST_DYING:
             self._restart_at = now + RESTART_S
             self._start()
@@ -151,7 +151,7 @@ class Keeper:
                 start_new_session=True,  # ctrl-C is for the driver alone
             )
         except OSError as error:
-            self._tell(f"no guard process can be started ({error}): {WITHOUT_GUARD}")
+            self._tell(f"cannot start the guard process ({error}): {WITHOUT_GUARD}")
             return
         assert self._process.stdin is not None
         os.set_blocking(self._process.stdin.fileno(), False)
@@ -176,4 +176,4 @@ class Keeper:
             self._told, self._trouble = True, trouble
 
 
-WITHOUT_GUARD: Final = "if the driver is killed, the robot goes on with its last command"
+WITHOUT_GUARD: Final = "if the driver is killed, the robot continues with its last command"

@@ -199,23 +199,23 @@ def goal_pose(stamped: Any, odom_frame: str) -> Pose:
     frame, position, turn = stamped.header.frame_id, stamped.pose.position, stamped.pose.orientation
     if frame not in ("", odom_frame):
         raise CommandRefused(
-            f"cmd_pose refused: it is given in '{frame}'; transform it to '{odom_frame}' first"
+            f"cmd_pose rejected: it is given in '{frame}'; transform it to '{odom_frame}' first"
         )
     quaternion = (turn.x, turn.y, turn.z, turn.w)
     require_finite("cmd_pose", (position.x, position.y, position.z, *quaternion))
     length = math.hypot(*quaternion)
     if not SHORTEST_QUATERNION < length < 1.0 / SHORTEST_QUATERNION:
         raise CommandRefused(
-            f"cmd_pose refused: its orientation is no rotation (a quaternion of length {length:g});"
-            " for no turn at all set w to 1"
+            f"cmd_pose rejected: its orientation is not a unit quaternion (length {length:g}); for"
+            " no rotation set w to 1"
         )
     x, y, z, w = (part / length for part in quaternion)
     upright = 1.0 - 2.0 * (x * x + y * y)
     if upright < math.cos(MOST_TILT_RAD):
         tilt_deg = math.degrees(math.acos(max(-1.0, upright)))
         raise CommandRefused(
-            f"cmd_pose refused: its orientation is tilted by {tilt_deg:.0f}°; this robot turns"
-            " about z alone"
+            f"cmd_pose rejected: its orientation is tilted by {tilt_deg:.0f}°; this robot turns"
+            " about z only"
         )
     return Pose(position.x, position.y, yaw_of(x, y, z, w))
 
@@ -231,7 +231,7 @@ def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
     if not unheard:
         return ""
     return (
-        f"{', '.join(unheard)} publishes something else than {ours} on cmd_vel and is not heard:"
+        f"{', '.join(unheard)} publishes another type than {ours} on cmd_vel and is not received;"
         f" for {other} start the driver with enable_stamped_cmd_vel:={str(not stamped).lower()}"
     )
 

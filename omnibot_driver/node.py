@@ -124,11 +124,10 @@ class OmniBotDriver(Node):
         if not self._link.close(self._values["on_exit"]):
             return
         if self._link.stands:
-            self.get_logger().info("the robot stands still, and the port is closed")
+            self.get_logger().info("robot stopped and port closed")
         else:
             self.get_logger().warning(
-                "stop sent but unconfirmed, and the port is closed: the board did not show in time"
-                " that the robot stands; check by eye"
+                "stop sent but unconfirmed, port closed; check by eye that the robot has stopped"
             )
 
     def report_defect(self, error: BaseException) -> None:
@@ -138,7 +137,7 @@ class OmniBotDriver(Node):
             return
         trace = "".join(traceback.format_exception(error))
         self.get_logger().fatal(
-            f"stopping after a defect of the driver, please report it:\n{trace}"
+            f"the driver stops because of a defect in it; please report this:\n{trace}"
         )
         self._end(error)
 

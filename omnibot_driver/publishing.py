@@ -54,8 +54,8 @@ class Publishing:
         if strange := difference(settings):
             self._maker = Messages
             node.get_logger().warning(
-                f"rclpy serialises {strange} in a way of its own here: messages are published as"
-                " ordinary ones, which takes the processor a little more time"
+                f"rclpy serialises {strange} differently on this computer; the driver publishes"
+                " ordinary messages instead, which costs a little processor time"
             )
         self.settings = settings
         self._port, self._channels = values["port"], traits.channels

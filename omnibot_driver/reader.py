@@ -104,7 +104,7 @@ class Reader:
         with self._lock:
             self._shared.write(self._session.broken_off())
             self._session.closed(now := time.monotonic())
-            self._session.opened(now, missing="the lines of the board are changing")
+            self._session.opened(now, missing="a line of the board was connected or lost")
             keeper = self._shared.keeper
         try:
             self._attach(port)

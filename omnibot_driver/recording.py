@@ -46,7 +46,9 @@ class Recording:
                     content: Any = types.deserialize_cdr(message, RAW_TYPE)
                     yield at_ns, (self.topics.index(source.topic), content.data.tobytes())
         except Exception as error:  # whatever a damaged bag makes the library stumble over
-            raise LinkError(f"the recording {self.path} cannot be read on: {error}") from error
+            raise LinkError(
+                f"the recording {self.path} cannot be read any further: {error}"
+            ) from error
 
 
 def is_recording(url: str) -> bool:
@@ -85,7 +87,7 @@ def _find_topics(url: str, path: Path, wanted: str, channels: Sequence[str]) -> 
         with Reader(path) as bag:
             raw = sorted({item.topic for item in bag.connections if item.msgtype == RAW_TYPE})
     except Exception as error:  # rosbags raises whatever it stumbles over
-        raise _refusal(url, f"{path} is no bag that can be read: {error}") from error
+        raise _refusal(url, f"{path} is not a readable bag: {error}") from error
     names = [f"/{name}" if name else "" for name in channels]
     found = {
         topic.removesuffix(name)
@@ -99,7 +101,7 @@ def _find_topics(url: str, path: Path, wanted: str, channels: Sequence[str]) -> 
         (home,) = found
         return tuple(home + name for name in names)
     if not raw:
-        raise _refusal(url, f"no {RAW_NAME[1:]} is in it: record with `publish_raw: true`")
+        raise _refusal(url, f"it has no topic {RAW_NAME[1:]}; record with `publish_raw: true`")
     raise _refusal(url, f"choose one of its topics with topic={' or topic='.join(raw)}")
 
 
@@ -114,4 +116,4 @@ def _number(url: str, name: str, text: str, low: float, high: float) -> float:
 
 
 def _refusal(url: str, why: str) -> ParameterError:
-    return ParameterError(f"port '{url}' is not understood: {why}")
+    return ParameterError(f"port '{url}' is not valid: {why}")

@@ -106,7 +106,7 @@ class Replay:
     def _play(self) -> None:
         if self._closing.wait(self._recording.delay_s):
             return
-        end = "the recording has ended: nothing more will come"
+        end = "the recording has ended; press ctrl-C to end the driver"
         opened = False
         try:
             for at_ns, packet in self._recording.chunks():

@@ -30,8 +30,8 @@ def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
     if latency_ms <= LONGEST_LATENCY_MS:
         return ""
     return (
-        f"the USB adapter of {port} keeps bytes for {latency_ms} ms (its latency_timer), so that"
-        " measurements come in bunches: install udev/99-omnibot.rules, or until it is unplugged:"
+        f"the USB adapter of {port} holds bytes for {latency_ms} ms (its latency_timer), so"
+        " measurements arrive in bursts; install udev/99-omnibot.rules, or until it is unplugged:"
         f" echo 1 | sudo tee /sys/class/tty/{device}/device/latency_timer"
     )
 
@@ -51,8 +51,8 @@ def waiting_advice(port: str, now_ns: int) -> str:
     if now_ns or port.startswith(RECORDING):
         return ""
     return (
-        "use_sim_time is set and nothing comes on /clock: all measurements wait for it; start what"
-        " publishes it, or the driver with use_sim_time:=false"
+        "use_sim_time is set but nothing publishes /clock, so no measurements are published; start"
+        " the publisher of /clock, or start the driver with use_sim_time:=false"
     )
 
 
@@ -62,6 +62,6 @@ def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
     if names.count(name) < 2:
         return ""
     return (
-        f"another node is called {name} as well: both obey the same commands; end one, or start it"
-        " in a namespace of its own (--ros-args -r __ns:=/robot2)"
+        f"another node has the name {name}, and both obey the same commands; end one, or start it"
+        " in its own namespace (--ros-args -r __ns:=/robot2)"
     )

@@ -59,7 +59,7 @@ class Services:
             return response
         if active and state != DISCONNECTED and self._link.blocked:
             response.message = (
-                "e-stop latched; the port takes nothing: the stop follows when it is open again"
+                "e-stop latched; port is not accepting data; the stop will be sent after it reopens"
             )
         response.success = True
         return response
@@ -69,7 +69,7 @@ class Services:
     ) -> Trigger.Response:
         self._link.call(lambda session, now: session.reset_odometry(now))
         response.success = True
-        response.message = "the odometry begins here"
+        response.message = "odometry set to zero"
         return response
 
     async def _on_start(

@@ -23,7 +23,7 @@ from omnibot_driver.outbox import Outbox
 from omnibot_driver.stall_detector import StallDetector, boot_time_s
 from omnibot_driver.transports import Transport
 
-WAITED: Final = "motion command refused: it waited while the driver stood still; send it again"
+WAITED: Final = "motion command refused: it waited while the driver was stalled; send it again"
 
 T = TypeVar("T")
 

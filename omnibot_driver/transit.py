@@ -73,8 +73,8 @@ class Delay:
             return
         if 2 * self.waited_s > self.total_s:
             where = (
-                f"{self.waited_s:.1f} s of it in this driver's queue: its executor was held up;"
-                " check the load of this computer"
+                f"{self.waited_s:.1f} s of it in this driver's queue: check the load of this"
+                " computer"
             )
         else:
             where = "check the network, and the load and the clock of the sending computer"

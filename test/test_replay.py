@@ -27,7 +27,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 EPOCH_NS = 1_790_000_000_123_456_789
 TICK_NS = 10_000_000
-ENDED = Notice("the recording has ended: nothing more will come")
+ENDED = Notice("the recording has ended; press ctrl-C to end the driver")
 
 Chunks = list[tuple[int, bytes]]
 
@@ -210,12 +210,12 @@ def test_a_recording_that_breaks_off_says_so() -> None:
 
     def broken() -> Iterator[tuple[int, bytes]]:
         yield from TAPE
-        raise LinkError("the recording x cannot be read on: torn")
+        raise LinkError("the recording x cannot be read any further: torn")
 
     replay, heard = start(Tape(broken()))
     heard.wait_for(lambda: heard.states[-1:] == ["disconnected"] and heard.events[-1] != ENDED)
     replay.close("stop")
-    assert heard.events[-1] == Notice("the recording x cannot be read on: torn")
+    assert heard.events[-1] == Notice("the recording x cannot be read any further: torn")
     assert len(measured(heard.events)) > 100
 
 

@@ -79,7 +79,7 @@ def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
 )
 def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, warned: bool) -> None:
     """Where measurements wait for it; a recording has stamps of its own."""
-    assert ("nothing comes on /clock" in selfcheck.waiting_advice(port, now_ns)) == warned
+    assert ("nothing publishes /clock" in selfcheck.waiting_advice(port, now_ns)) == warned
 
 
 @pytest.mark.parametrize(
@@ -99,4 +99,4 @@ def test_a_node_of_the_same_full_name_is_told_of(
         for namespace, name in [("/", "omnibot_driver"), *others]
     ]
     text = selfcheck.namesake_advice("/omnibot_driver", publishers)
-    assert ("another node is called /omnibot_driver as well" in text) == warned
+    assert ("another node has the name /omnibot_driver," in text) == warned

@@ -175,7 +175,7 @@ class LoisEcuTopics:
         require_finite("duty_cmd", duties)
         if len(duties) != 2:
             raise CommandRefused(
-                f"duty_cmd refused: it has {len(duties)} values; send exactly 2, left and right"
+                f"duty_cmd rejected: it has {len(duties)} values; send exactly 2, left and right"
             )
         settings = session.board.settings
         if settings.drive_mode != "duty":

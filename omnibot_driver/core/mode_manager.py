@@ -236,11 +236,14 @@ class ModeManager:
     def _give_up(self, now: float) -> None:
         mode = self._board.mode
         if mode is Mode.UNKNOWN:
-            reason = f"nothing was understood from the board: check {self._board.traits.to_check}"
+            reason = f"no valid data from the board; check {self._board.traits.to_check}"
         elif mode is Mode.PAUSED:
-            reason = "the board still says that it is paused: does the cable carry our bytes to it?"
+            reason = (
+                "the board still reports that it is paused; check that the cable carries data"
+                " to the board"
+            )
         else:
-            reason = "the board goes on sending data: does the cable carry our bytes to it?"
+            reason = "the board keeps sending data; check that the cable carries data to the board"
         if self.phase is Phase.RESETTING:
             self.phase = Phase.SETTLED
             if self._wanted is Wanted.PAUSED:

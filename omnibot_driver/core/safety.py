@@ -99,11 +99,14 @@ class SafetyStops:
             self._policy.latch(now)
             self._task.give_up("the e-stop was latched meanwhile")
             if self._mode_manager.phase is CLOSED:
-                return "e-stop latched; the port is not open: the stop is sent as soon as it is"
+                return "e-stop latched; the port is not open; the stop will be sent when it opens"
             if missing := self._reporter.missing:
-                return f"e-stop latched; {missing}: only the lines that are there hear it"
+                return f"e-stop latched; {missing}: the stop is sent on the other lines only"
             if self._board.mode is Mode.UNKNOWN:
-                return "e-stop latched; nothing comes from the board: nobody knows if it hears us"
+                return (
+                    "e-stop latched; the board is not responding; delivery of the stop is"
+                    " unconfirmed"
+                )
             return "e-stop latched"
         if not latched:
             return "the e-stop was not latched"
@@ -111,7 +114,7 @@ class SafetyStops:
             raise RequestRefused(BUTTON_HELD)
         self._commanding.release(now)
         self._reporter.notify([f"e-stop released by {by}"])
-        return "e-stop released; the robot stands still until a new command comes"
+        return "e-stop released; robot stopped until the next command"
 
     def set_out(self, now: float) -> None:
         """The board runs (again): it may still carry out an old command."""
@@ -132,19 +135,16 @@ class SafetyStops:
         )
         if self._board.mode is not Mode.UNKNOWN:
             self._board.silence()
-            self._task.give_up("the board fell silent meanwhile; check its power and cable")
+            self._task.give_up("the board stopped responding; check its power and cable")
             self._measurement.restart()
             self.set_out(now)
             self._mode_manager.heard_nothing(now)
 
     def stalled(self, seconds: float, now: float) -> None:
-        """To a stall of this process: for so long nobody looked after the robot."""
+        """This process stalled for ``seconds``: end what was under way and stop the robot."""
         self._liveness.stalled(now)
-        self._task.give_up("the driver did not run for some time meanwhile; call again")
+        self._task.give_up("the driver stalled meanwhile; call again")
         self._policy.halt(now)
         self._reporter.notify(
-            [
-                f"the driver stood still for {seconds:.1f} s: the robot is stopped"
-                " until a new command comes"
-            ]
+            [f"driver stalled for {seconds:.1f} s; robot stopped until the next command"]
         )

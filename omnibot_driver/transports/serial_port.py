@@ -198,7 +198,7 @@ def _write_whole(descriptor: int, data: bytes) -> None:
         room = select.poll()
         room.register(descriptor, select.POLLOUT)
         if not room.poll(max(0.0, 1e3 * (until - time.monotonic()))):
-            raise TimeoutError(f"it takes no more bytes for {WRITE_TIMEOUT_S:g} s")
+            raise TimeoutError(f"it has accepted no data for {WRITE_TIMEOUT_S:g} s")
 
 
 def _explain(url: str, parameter: str, error: Exception) -> str:
@@ -208,15 +208,18 @@ def _explain(url: str, parameter: str, error: Exception) -> str:
     misread = TypeError | ValueError | LookupError | re.error
     if isinstance(error, misread) or isinstance(error.__context__, misread):
         return (
-            f"{parameter} '{url}' is not understood: give a device like /dev/ttyUSB0"
+            f"{parameter} '{url}' is not valid: give a device like /dev/ttyUSB0"
             " or a pyserial URL like socket://host:port, or sim:// for a simulated board"
         )
     no_terminal = isinstance(error, termios.error) or isinstance(error.__context__, termios.error)
     if no_terminal or code == errno.EISDIR:
-        return f"{url} is no serial port: `ls /dev/serial/by-id/` shows what is; set `{parameter}`"
+        return (
+            f"{url} is not a serial port; find the port with `ls /dev/serial/by-id/` and set"
+            f" `{parameter}`"
+        )
     if code == errno.ENOENT:
         return (
-            f"{url} does not exist: plug the board in, look it up with `ls /dev/serial/by-id/`"
+            f"{url} does not exist; plug the board in, find its port with `ls /dev/serial/by-id/`"
             f" and set the parameter `{parameter}`; without a robot try port:=sim://"
         )
     if code in (errno.EACCES, errno.EPERM):
@@ -226,14 +229,17 @@ def _explain(url: str, parameter: str, error: Exception) -> str:
         )
     if code in (errno.EAGAIN, errno.EBUSY):
         return (
-            f"{url} is in use by another program{_owner(url)}, perhaps a second driver:"
-            f" end it first (`fuser {url}` names it; the guard of a killed driver leaves by itself)"
+            f"{url} is in use by another program{_owner(url)}, perhaps a second driver; end it"
+            f" first (`fuser {url}` names it; the guard of a killed driver leaves by itself)"
         )
     # Those of its texts that are made of another error name the port twice.
     source = error.__context__ if isinstance(error.__context__, OSError) else error
     reason = getattr(source, "strerror", None) or source
     if isinstance(source, ConnectionRefusedError):
-        return f"cannot open {url}: {reason}: is the server running, and is that its port?"
+        return (
+            f"cannot open {url}: {reason}: check that the server is running and that this is"
+            " its port"
+        )
     return f"cannot open {url}: {reason}; check the parameter `{parameter}`"
 
 

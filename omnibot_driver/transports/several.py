@@ -18,7 +18,7 @@ from omnibot_driver.core.packets import Packet, Packets, joined
 from omnibot_driver.transports import READ_TIMEOUT_S, WRITE_TIMEOUT_S, LinesChanged, Transport
 from omnibot_driver.transports.wake_up import WakeUp
 
-FULL: Final = f"it takes no more bytes for {WRITE_TIMEOUT_S:g} s"
+FULL: Final = f"it has accepted no data for {WRITE_TIMEOUT_S:g} s"
 RETRY_S: Final = 0.5
 """A missing line is tried so often: that disturbs none of the others."""
 

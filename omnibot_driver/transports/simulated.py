@@ -47,7 +47,7 @@ class SimulatedTransport:
             )
         except options.OptionError as error:
             raise LinkError(
-                f"port '{url}' is not understood: {error}; the options are those of"
+                f"port '{url}' is not valid: {error}; the options are those of"
                 f" `ros2 run omnibot_driver {options.command(simulator)} --help`,"
                 " as in sim://?seed=1&lose=0.001"
             ) from error

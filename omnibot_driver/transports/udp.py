@@ -132,7 +132,9 @@ class UdpPorts:
                 room = select.poll()
                 room.register(ours, select.POLLOUT)
                 if not room.poll(max(0.0, 1e3 * (until - time.monotonic()))):
-                    raise TimeoutError(f"it takes nothing for {WRITE_TIMEOUT_S:g} s") from None
+                    raise TimeoutError(
+                        f"it has accepted no data for {WRITE_TIMEOUT_S:g} s"
+                    ) from None
             except OSError as error:
                 if not (may_be_stale and _is_silence(error)):
                     raise
@@ -161,4 +163,4 @@ def _place(url: str, channels: int) -> tuple[str, int]:
             return host, port
     except ValueError:
         pass
-    raise LinkError(f"port '{url}' is not understood: give udp://HOST:PORT, or sim://")
+    raise LinkError(f"port '{url}' is not valid: give udp://HOST:PORT, or sim://")

@@ -119,7 +119,7 @@ def cut_to_the_board(rig: Rig) -> None:
 def cut_from_the_board(rig: Rig) -> None:
     rig.drive()
     rig.line.from_board = cut
-    rig.expect_still(rig.line.tick, "nothing comes from the board", SILENCE_S)
+    rig.expect_still(rig.line.tick, "no data from the board", SILENCE_S)
     rig.hand.leave()
     rig.line.heal()
 

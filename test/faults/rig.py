@@ -253,9 +253,7 @@ class Rig:
             )
         refused = sum(
             int(number)
-            for number in re.findall(
-                r"readings refused that cannot be true: (\d+)", self.driver.output
-            )
+            for number in re.findall(r"implausible readings rejected: (\d+)", self.driver.output)
         )
         self.findings.expect(  # what framing made up of damaged bytes may be among them
             refused <= (len(imu) or len(odom)) / one_in,

@@ -11,7 +11,7 @@ from other_rigs import NetworkRig
 from rig import TIMEOUT_S, Rig
 from std_srvs.srv import SetBool
 
-TAKES_NOTHING: Final = "lost .* while writing: it takes no more bytes"
+TAKES_NOTHING: Final = "lost .* while writing: it has accepted no data"
 LOST: Final = "lost .*retrying"
 
 
@@ -48,7 +48,7 @@ def full_for_long(rig: Rig) -> None:
     states, mark = len(rig.states), len(rig.driver.lines)
     with rig.terminal.kept_full(rig.kind.old_command):
         rig.probe.wait_for(lambda: len(rig.states) >= states + 6)  # opened in vain, twice
-        rig.wait_for_diagnosis("takes no more bytes")
+        rig.wait_for_diagnosis("accepted no data")
         rig.hand.leave()
     rig.probe.wait_for_state("nominal")
     rig.expect_still(rig.line.tick, "the port takes bytes again, and is open", TIMEOUT_S)
@@ -63,7 +63,7 @@ def estop_into_a_full_port(rig: Rig) -> None:
     rig.wait_ticks(100)  # the line is quiet
     with rig.terminal.kept_full(rig.kind.old_command):
         answer = rig.probe.call(SetBool, "estop", data=True)
-        late = any(why in answer.message for why in ("takes nothing", "not open"))
+        late = any(why in answer.message for why in ("not accepting data", "not open"))
         rig.findings.expect(late, f"it said {answer.message!r}")
         obeyed = len(rig.line.board.commands)
     assert rig.wait_for_board(

@@ -122,7 +122,7 @@ def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
     with ExitStack() as stack:
         replays = [replay(stack, drive) for _ in range(2)]
         for driver, probe, _ in replays:
-            driver.wait_for_line("the recording has ended: nothing more will come")
+            driver.wait_for_line("the recording has ended; press ctrl-C to end the driver")
             probe.wait_for_state("disconnected")
         for topic, kind in MEASURED.items():
             first, second = (by_stamp(heard[topic], kind) for _, _, heard in replays)

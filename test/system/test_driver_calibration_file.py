@@ -9,7 +9,7 @@ import pytest
 from driver_process import Driver
 
 Start = Callable[..., Driver]
-WARNED = "there is no calibration_file {} yet: nothing of it is applied; check the path"
+WARNED = "calibration_file {} does not exist, so nothing is loaded from it; check the path"
 
 
 def said_of(path: Path, start_driver: Start) -> str:
@@ -40,7 +40,7 @@ def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) ->
     path.write_text("axis_signs: [1, -1, -1]\nimu_rpy: [0, 0, 0]\nstep: {}\nlinear_scale: 80\n")
     line = said_of(path, start_driver)
     assert "INFO" in line
-    assert line.endswith(f"the calibration_file {path} gives axis_signs, linear_scale\n")
+    assert line.endswith(f"calibration_file {path} sets axis_signs, linear_scale\n")
 
 
 def test_names_that_are_not_read_are_told_with_the_nearest(
@@ -52,8 +52,8 @@ def test_names_that_are_not_read_are_told_with_the_nearest(
     line = said_of(path, start_driver)
     assert "WARN" in line
     assert (
-        f"{path} holds what is not read from it: axis_sings (the nearest that is: axis_signs)"
-        in line
+        f"{path} has names that the driver does not read from it: axis_sings (the nearest known"
+        " name: axis_signs)" in line
     )
     assert ", max_linear_speed (" in line
     assert ", 7 (" in line

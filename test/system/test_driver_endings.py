@@ -68,7 +68,7 @@ def test_a_signal_while_driving_ends_with_the_stop_frame_and_exit_code_zero(
     driving(probe, board)
     assert driver.end(*signals) == 0
     assert "Traceback" not in driver.output
-    assert driver.lines[-1].endswith("the robot stands still, and the port is closed\n")
+    assert driver.lines[-1].endswith("robot stopped and port closed\n")
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
 
 

@@ -76,7 +76,7 @@ def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list
     command = [sys.executable, "-m", "omnibot_driver.driver", *before, *words]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
     assert ended.returncode == 2
-    assert f"cannot start: it does not know {' '.join(words)}; parameters are" in ended.stderr
+    assert f"cannot start: unknown argument {' '.join(words)}; parameters are" in ended.stderr
     assert ended.stderr.endswith("like this: --ros-args -p port:=/dev/ttyUSB0\n")
 
 

@@ -68,7 +68,7 @@ def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(
         probe.wait_for_state("nominal")
     probe.wait_for_state("disconnected")
     answer = probe.call(SetBool, "estop", data=True)
-    assert answer.message.endswith("the port is not open: the stop is sent as soon as it is")
+    assert answer.message.endswith("the port is not open; the stop will be sent when it opens")
     driver.wait_for_line("e-stop latched by the service ~/estop")
 
 
@@ -86,11 +86,11 @@ def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
 @pytest.mark.parametrize(
     ("port", "reason"),
     [
-        ("nonsense://board", "not understood.*socket://"),
-        ("/", ": / is no serial port.*by-id"),
+        ("nonsense://board", "not valid.*socket://"),
+        ("/", ": / is not a serial port.*by-id"),
         ("/dev/null", "no serial port.*by-id"),
-        ("socket://nohost", "not understood.*socket://"),
-        ("socket://localhost:99999", "not understood.*socket://"),
+        ("socket://nohost", "not valid.*socket://"),
+        ("socket://localhost:99999", "not valid.*socket://"),
         (
             "socket://localhost:1",
             "cannot open socket://localhost:1: Connection refused: is the server running",
@@ -105,7 +105,7 @@ def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
     driver.wait_for_line(reason)
     assert driver.process.poll() is None
     assert driver.end(signal.SIGINT) == 0
-    assert "the robot is told" not in driver.output
+    assert "robot stopped" not in driver.output
 
 
 def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
@@ -116,7 +116,7 @@ def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
     probe: Probe = probe_of(driver)
     imu = probe.listen(Imu, "imu/data_raw")
     probe.wait_for_state("connecting")
-    driver.wait_for_line("nothing comes from the board.*power")
+    driver.wait_for_line("no data from the board.*power")
     write_to_silent_port(bytes(range(256)) * 40)
     write_to_silent_port(bytes.fromhex("FF FA 00 00 00 00 40 00 00 01 00 02 00 03") * 3)
     probe.wait_for(lambda: len(imu) >= 2)

@@ -194,7 +194,7 @@ def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
 def test_a_host_that_does_not_answer_is_told(start_driver: Start) -> None:
     """Nothing listens there."""
     driver = start_driver("udp://127.0.0.1:9", before=TOYS, board="request_board")
-    driver.wait_for_line("nothing comes from the board for 1.5 s")
+    driver.wait_for_line("no data from the board for 1.5 s")
 
 
 def test_a_line_that_is_lost_leaves_the_robot_standing(

@@ -109,6 +109,4 @@ def test_two_of_the_same_name_are_told_of_each_other() -> None:
     """Whichever came first: both would drive."""
     with Driver(port="sim://") as first, Driver(port="sim://", namespace=first.namespace) as second:
         for driver in (first, second):
-            driver.wait_for_line(
-                f"another node is called /{first.namespace}/omnibot_driver as well"
-            )
+            driver.wait_for_line(f"another node has the name /{first.namespace}/omnibot_driver,")

@@ -54,7 +54,7 @@ def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
         fake.wait_for_graph(lambda: feed.view().state)
         feed.estop()
         assert feed.view().estop_asked
-        assert "nobody offers /fake/omnibot_driver/estop" in feed.view().said
+        assert "service /fake/omnibot_driver/estop not found" in feed.view().said
         fake.wait_for(lambda: len(said) >= 3 and all(message.data for message in said))
         latch = fake.node.create_publisher(Bool, "omnibot_driver/estop_active", LATCHED)
         latch.publish(Bool(data=True))
@@ -144,7 +144,7 @@ def test_a_pipe_gets_a_snapshot(fake: Probe, capsys: pytest.CaptureFixture[str])
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--namespace", "a b"], "no such driver can be"),
+        (["--namespace", "a b"], "not a valid driver name"),
         (["--once", "--ros-args", "--nonsense"], "ROS does not start"),
     ],
 )

@@ -96,10 +96,10 @@ def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
     """A fifth is enough, crawling need not show, wheels are judged by their rates."""
     watch("cmd_vel", (0.2, 0.0, 0.4), (0.05, 0.0, 0.1))
     watch("cmd_vel", (0.02, 0.0, 0.0), HALT)
-    with pytest.raises(ToolError, match=r"does not move when told \(wheel_cmd\)"):
+    with pytest.raises(ToolError, match=r"does not move when commanded \(wheel_cmd\)"):
         watch("wheel_cmd", (0.0, 3.0, 0.0), (0.1, 0.1, 0.1))
     for measured in ((0.2, 0.0, 0.0), (math.nan, 0.0, 0.4)):
-        with pytest.raises(ToolError, match=r"does not move when told \(cmd_vel\)"):
+        with pytest.raises(ToolError, match=r"does not move when commanded \(cmd_vel\)"):
             watch("cmd_vel", (0.2, 0.0, 0.4), measured)
 
 

@@ -135,7 +135,7 @@ def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Severa
     finally:
         select.poll = poll  # type: ignore[misc]
     assert os.read(ends.far[1], 99) == b"stopstop"
-    assert changed(lines) == {0: "it takes no more bytes for 0.2 s"}
+    assert changed(lines) == {0: "it has accepted no data for 0.2 s"}
     lines.write(((0, b"new"), (1, b"stop")))
     assert heard(ends.far[0], b"new").strip(b"x") == b"new"
 

@@ -118,7 +118,7 @@ def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -
     """The sentence names the command line that lists them."""
     with pytest.raises(LinkError) as refusal:
         SimulatedTransport(url, TOY)
-    assert f"port '{url}' is not understood: " in str(refusal.value)
+    assert f"port '{url}' is not valid: " in str(refusal.value)
     assert why in str(refusal.value)
     assert "simulator --board toy_lines --help" in str(refusal.value)
 

@@ -46,15 +46,15 @@ class Interlocks:
         if self._policy.latched:
             return "the e-stop is latched; release it with the service ~/estop (data: false)"
         if phase is not Phase.SETTLED:
-            hint = "; the service ~/start makes it run" if phase is Phase.PAUSING else ""
+            hint = "; call ~/start to run it" if phase is Phase.PAUSING else ""
             return f"the board is {phase.value}{hint}"
         if not mode.running:
             starts = Request.START in self._board.traits.requests
-            hint = "; the service ~/start makes it run" if starts else ""
+            hint = "; call ~/start to run it" if starts else ""
             return f"the board is {mode.value}{hint}"
         unheard_s = self._liveness.unheard_s
         if not stands and now - self._liveness.heard_at >= unheard_s:
-            return f"nothing was heard from the board for {unheard_s:g} s"
+            return f"no data from the board for {unheard_s:g} s"
         if not stands and (refusal := self._board.refusal):
             return refusal
         return tripped
@@ -79,9 +79,7 @@ class Interlocks:
         if phase is Phase.CLOSED:
             return "the port is not open; connect the board, then call again"
         if mode is Mode.UNKNOWN:
-            return (
-                "nothing was understood from the board: check its power and cable, then call again"
-            )
+            return "no valid data from the board; check its power and cable, then call again"
         if not mode.running:
             return f"the board is {mode.value}; call ~/start, then call again"
         if self._calibration.measuring:

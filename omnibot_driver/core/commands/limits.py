@@ -72,7 +72,8 @@ def require_finite(what: str, values: Sequence[float]) -> None:
     if not all(map(math.isfinite, values)):
         numbers = ", ".join(f"{value:g}" for value in values)
         raise CommandRefused(
-            f"{what} refused: ({numbers}) is not finite and counts as no command: mend the sender"
+            f"{what} rejected: contains NaN or infinity; fix the publishing node (received"
+            f" {numbers})"
         )
 
 
@@ -81,12 +82,14 @@ def require_timely(what: str, age_s: float, longest_s: float) -> None:
     if abs(age_s) <= longest_s:
         return
     if age_s > 0.0:
-        wrong = f"it is {age_s:.2f} s old and worth nothing after {longest_s:g} s (cmd_vel_timeout)"
+        wrong = (
+            f"it is {age_s:.2f} s old, and commands expire after {longest_s:g} s (cmd_vel_timeout)"
+        )
     else:
         wrong = f"its stamp is {-age_s:.2f} s in the future"
     raise CommandRefused(
         f"{what} refused: {wrong}: check the network and that both clocks agree (NTP,"
-        " use_sim_time), or leave the stamp at zero"
+        " use_sim_time), or set the stamp to zero"
     )
 
 

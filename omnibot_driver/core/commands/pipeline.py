@@ -86,7 +86,7 @@ class CommandPipeline:
         if not stricter or current is None or current.is_zero or isinstance(current, GoalSetpoint):
             return []
         self.policy.halt(now)
-        return ["the robot is stopped, as its limits are stricter now: command it anew"]
+        return ["robot stopped because a limit was lowered; send a new command"]
 
     def check_anew(self, now: float) -> list[str]:
         """The board's settings have changed: the command that is repeated is said in them."""
@@ -226,7 +226,8 @@ class CommandPipeline:
         ):
             self.interlock.trip(now)
             why = (
-                "the robot drives away from it: does the board's switch stand on position?"
+                "the robot is moving away from it; check that the board's switch is set to"
+                " position."
                 f" {self.interlock.until.value}"
             )
         else:

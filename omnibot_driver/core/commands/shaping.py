@@ -71,7 +71,7 @@ class CommandShaper:
         wheels = self._board.traits.wheels
         if len(rates_radps) != len(wheels):
             raise CommandRefused(
-                f"wheel_cmd refused: it has {len(rates_radps)} values; send exactly {len(wheels)},"
+                f"wheel_cmd rejected: it has {len(rates_radps)} values; send exactly {len(wheels)},"
                 f" the rates of wheels {', '.join(wheels)} in rad/s"
             )
         require_finite("wheel_cmd", rates_radps)
@@ -88,8 +88,8 @@ class CommandShaper:
         place = goal if own else self._odometry.in_board_frame(goal)
         if place is None or self._board.mode is Mode.IMU_ONLY:
             raise CommandRefused(
-                "cmd_pose refused: where the board believes to be is not known; this needs its"
-                " poses (nominal mode) and `use_board_pose`. After a restart, wait a second"
+                "cmd_pose refused: the board's own pose is not known; it needs nominal mode and"
+                " `use_board_pose`. After a restart, wait a second"
             )
         return GoalSetpoint(
             goal,
@@ -102,5 +102,5 @@ class CommandShaper:
     def _at_odds(self, authority: Authority) -> CommandRefused:
         return CommandRefused(
             f"{authority.value} refused: the parameter `control_method` is '{self._control}';"
-            " it must say where the board's switch stands"
+            " set it to the position of the board's switch"
         )

@@ -85,7 +85,7 @@ class Look:
         if shaken_mps2 > STILL_MPS2:
             return f"its accelerometer varies by {shaken_mps2:.2f} m/s²"
         if bias_radps > LARGEST_BIAS_RADPS:
-            return f"its gyro reads {bias_radps:.2f} rad/s, which is turning and no bias"
+            return f"its gyro reads {bias_radps:.2f} rad/s, which is a rotation, not a bias"
         return ""
 
 
@@ -121,12 +121,12 @@ class GyroCalibration:
     def give_up(self, reason: str) -> None:
         """A measurement under way has failed, and this is why and what to do."""
         if self.wake_at < math.inf:
-            self._answer(False, f"the gyro's bias stays as it was: {reason}")
+            self._answer(False, f"gyro bias unchanged: {reason}")
 
     def tick(self, now: float) -> None:
         """Give up what is overdue."""
         if now >= self.wake_at:
-            self.give_up("no two seconds of readings came without a gap; see ~/state, call again")
+            self.give_up("no two seconds of readings without a gap; check ~/state, then call again")
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
         """A reading of the IMU, as the sensor gave it, but for the accelerometer's bias."""
@@ -145,7 +145,7 @@ class GyroCalibration:
     def _conclude(self) -> None:
         look, self._look = self._look, Look()
         if motion := look.motion:
-            self.give_up(f"the robot moves ({motion}); let it stand still for 2 s and call again")
+            self.give_up(f"the robot moves ({motion}); keep it still for 2 s, then call again")
             return
         self.gravity_mps2 = math.hypot(*mean(look.forces))
         self.noise = deviation(look.rates)

@@ -48,8 +48,7 @@ class Fault(Enum):
     TOO_FAST = "robot moves faster than commanded"
     TURNS_TOO_FAST = "robot turns faster than commanded"
     BEYOND_LIMITS = (
-        "robot is faster than `fastest_linear_speed` or `fastest_angular_speed`, which it was not"
-        " to exceed even when pushed"
+        "robot exceeds `fastest_linear_speed` or `fastest_angular_speed`, its physical limits"
     )
     UNCOMMANDED = "robot is moving without a command"
     BLOCKED = "robot is commanded and does not move"

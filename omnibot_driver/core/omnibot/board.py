@@ -56,8 +56,8 @@ TRAITS: Final = Traits(
             " hand, and check the cable"
         ),
         Fault.BLOCKED: (
-            "check motor power, whether the wheels are blocked, and that `control_method` says"
-            " where the board's switch stands"
+            "check motor power, whether the wheels are blocked, and that `control_method` matches"
+            " the board's switch"
         ),
         Fault.HELD_BY_ESTOP: "the board may hold the stop itself; call ~/reset",
     },

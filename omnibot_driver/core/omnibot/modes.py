@@ -57,7 +57,7 @@ class ModeTracker:
             self.mode = TRANSITIONS[happening][self.mode]
         except KeyError:
             raise RequestRefused(
-                f"the board is {self.mode.value}: {happening.value} would do nobody knows what"
+                f"the board is {self.mode.value}: {happening.value} is not allowed in this mode"
             ) from None
         self.imus_to_come = self._imus_alone
 
@@ -73,7 +73,7 @@ class ModeTracker:
             self.apply(Happening.HEARD_MOTION)
 
     def hear_imus(self, count: int) -> None:
-        """So many IMU frames, and no more than are to come."""
+        """So many IMU frames, and the limits are are to come."""
         self.imus_to_come -= count
         if not self.imus_to_come:
             self.apply(Happening.HEARD_IMU_ALONE)

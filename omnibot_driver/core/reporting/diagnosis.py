@@ -140,12 +140,12 @@ class Diagnosis:
             "disconnected": (Level.STALE, "not known while the port is closed"),
             "connecting": (
                 Level.ERROR,
-                f"nothing is understood from the board: check {self._to_check}",
+                f"no valid data from the board; check {self._to_check}",
             ),
-            "paused": (Level.WARN, "paused: the service ~/start makes it run"),
+            "paused": (Level.WARN, "paused; call ~/start to run it"),
             "imu_only": (
                 Level.WARN,
-                "IMU-only mode, without odometry: set the board's own mode and reboot it",
+                "IMU-only mode, so there is no odometry; set the board's own mode and reboot it",
             ),
             "nominal": (Level.OK, "running"),
         }[session.state]
@@ -198,8 +198,8 @@ class Diagnosis:
         elif doubtful:
             level = Level.WARN
             message = (
-                "readings that cannot be true were refused: the line changes bits, or a limit of"
-                " motion (fastest_…) is set too low"
+                "implausible readings rejected: the line corrupts bits, or a motion limit"
+                " (fastest_…) is set too low"
             )
         elif waiting > BUSY_SHARE:
             message = (
@@ -262,22 +262,26 @@ class Diagnosis:
         skewed = session.state in RUNNING and abs(session.skew_ppm) > LARGEST_SKEW_PPM
         self._skewed_since = min(self._skewed_since, now) if skewed else math.inf
         if session.state not in RUNNING or not reads:
-            return Status("Time", Level.STALE, "no measurements tell the board's time", {})
+            return Status(
+                "Time", Level.STALE, "no measurements, so the board's time is unknown", {}
+            )
         delay_s = (new.delay_s - old.delay_s) / reads
         variance = (new.squared_delay_s2 - old.squared_delay_s2) / reads - delay_s * delay_s
         level, message = Level.OK, "stamps are sampling times"
         if now - self._skewed_since > SKEW_KNOWN_S:
             level = Level.WARN
-            message = "the two clocks differ more than crystals do: is this computer's clock right?"
+            message = (
+                "the two clocks drift apart faster than crystals do; check this computer's clock"
+            )
         elif delay_s > LATE_S:
             level = Level.WARN
             message = (
-                "measurements wait before they can be read: set the adapter's latency_timer to 1"
-                " (udev/99-omnibot.rules), or relieve this computer"
+                "measurements are read late; set the adapter's latency_timer to 1"
+                " (udev/99-omnibot.rules), or reduce the load of this computer"
             )
         values = {
             "Clock skew (ppm)": f"{session.skew_ppm:.1f}",
-            "Delay over the least (ms)": f"{1e3 * delay_s:.2f}",
+            "Delay above minimum (ms)": f"{1e3 * delay_s:.2f}",
             "Jitter (ms rms)": f"{1e3 * math.sqrt(max(0.0, variance)):.2f}",
         }
         return Status("Time", level, message, values)
@@ -293,21 +297,21 @@ class Diagnosis:
             level, message = Level.ERROR, f"motion is refused: {commands.interlock}"
         elif tripped:
             level = Level.WARN
-            message = "the motion monitor has stopped the robot: the log says what it saw"
+            message = "the motion monitor has stopped the robot; the log has the reason"
         elif not commands.monitored:
             level = Level.WARN
-            message = "the motion monitor is off: set `motion_monitor` to true to have it back"
+            message = "the motion monitor is off; set `motion_monitor` to true to turn it on"
         elif refused:
             level, message = Level.WARN, f"lately: {refusals.last}"
         elif too_large:
             level = Level.WARN
-            message = "speeds do not fit into a command: lower the scales or the speed limits"
+            message = "speeds do not fit into a command; lower the scales or the speed limits"
         elif commands.source is None:
-            message = "nobody commands; the robot stands"
+            message = "idle"
         elif limited:
-            message = f"{commands.source} commands, faster than the limits max_… allow"
+            message = f"{commands.source} is limited: it exceeds the limits max_…"
         else:
-            message = f"{commands.source} commands"
+            message = f"{commands.source} is in control"
         values = {
             "Source": commands.source or "none",
             "Age (s)": f"{commands.age_s:.2f}" if commands.source else "none",
@@ -322,7 +326,9 @@ class Diagnosis:
         level, message = Level.OK, "not latched"
         if session.commands.estop:
             level = Level.WARN
-            message = "latched: look why, then release it with the service ~/estop (data: false)"
+            message = (
+                "latched; find the cause, then release it with the service ~/estop (data: false)"
+            )
         return Status("E-stop", level, message, {"Latched": _yes(session.commands.estop)})
 
     def _imu(self, session: SessionFigures) -> Status:
@@ -337,11 +343,13 @@ class Diagnosis:
             level, message = Level.STALE, "the board sends no measurements"
         elif stuck:
             level = Level.ERROR
-            message = f"always the same from the {' and '.join(stuck)}: switch the board off and on"
+            message = (
+                f"identical readings from the {' and '.join(stuck)}; switch the board off and on"
+            )
         elif imu.advice:
             level, message = Level.WARN, imu.advice
         elif imu.gravity_mps2 is None:
-            message = "measuring; the robot has not stood still yet"
+            message = "measuring; waiting for the robot to be at rest"
         values = {
             "Gravity (m/s²)": "none" if imu.gravity_mps2 is None else f"{imu.gravity_mps2:.3f}",
             "Gyro bias (rad/s)": _numbers(imu.bias_radps),

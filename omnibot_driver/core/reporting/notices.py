@@ -14,21 +14,21 @@ from omnibot_driver.core.measurement.outlier_filter import Refused
 NEWS_S: Final = 10.0
 """What is counted is told no more often than this."""
 HEADING_ASSUMED: Final = (
-    "the board sends no pose that makes sense: its heading is assumed to have been 0 at first"
+    "no valid pose from the board; the driver assumes that its heading was 0 at first"
 )
 
 STOP_UNSEEN: Final = (
     "stop unconfirmed: in IMU-only mode the board does not report motion, so Stop is repeated for"
-    " 5 s each time; check by eye that the robot stands"
+    " 5 s each time; check by eye that the robot has stopped"
 )
 STOP_BLIND: Final = (
     "stop unconfirmed: the board does not measure its wheels after this command; check by eye that"
-    " the robot stands (said once)"
+    " the robot has stopped (said once)"
 )
 STOP_UNANSWERED: Final = "stop unconfirmed: the board is not responding"
 STOP_UNMEASURED: Final = (
-    "stop unconfirmed: no odometry frames come from the board; check by eye that the"
-    " robot stands, and check cable and hub"
+    "stop unconfirmed: no odometry frames from the board; check by eye that the robot has stopped,"
+    " and check cable and hub"
 )
 STOP_UNHEEDED: Final = (
     "stop unconfirmed: Stop was repeated and the robot still moves; if it is not being pushed, the"
@@ -74,9 +74,9 @@ class Notices:
         total = refused.imu + refused.displacements + refused.poses
         if more := self._refused.since_told(total, now):
             news.append(
-                f"readings refused that cannot be true: {more} (in all {refused.imu} imu,"
-                f" {refused.displacements} odometry, {refused.poses} poses); the line changes bits,"
-                " or a limit of motion is set too low"
+                f"implausible readings rejected: {more} (in all {refused.imu} imu,"
+                f" {refused.displacements} odometry, {refused.poses} poses); the line corrupts"
+                " bits, or a motion limit is set too low"
             )
         return news
 
@@ -110,11 +110,11 @@ def why_silent(silence_s: float, *, bytes_came: bool, baudrate: bool) -> str:
     """Why nothing was understood for so long, and what to do."""
     if bytes_came:
         return (
-            f"nothing that comes in makes sense for {silence_s:g} s: check"
+            f"no valid data for {silence_s:g} s; check"
             f"{' the parameter `baudrate`,' if baudrate else ''} the cable, and that it is this"
-            " board"
+            " type of board"
         )
     return (
-        f"nothing comes from the board for {silence_s:g} s: check its power and the cable,"
-        " and that `port` is its port"
+        f"no data from the board for {silence_s:g} s; check its power, its cable and the parameter"
+        " `port`"
     )

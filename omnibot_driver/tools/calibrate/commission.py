@@ -146,8 +146,8 @@ class Walk:
         if len(set(signs)) > 1:
             odd = WHEELS[next(n for n in range(3) if signs.count(signs[n]) == 1)]
             raise ToolError(
-                f"wheel {odd} turns the other way than the two others: no parameter mends a single"
-                " wheel; check how its motor and encoder are connected, then begin again"
+                f"wheel {odd} turns the other way than the two others: no parameter corrects"
+                " a single wheel; check how its motor and encoder are connected, then begin again"
             )
         if found.control_method == "position":
             self._console.say("The axes cannot be looked at with the switch on positional control.")

@@ -92,8 +92,8 @@ def _remarks(found: Found) -> list[str]:
         )
     if found.wheel_signs == (-1, -1, -1):
         remarks.append(
-            "All wheels turn the other way than the manual says: axis_signs mends cmd_vel and odom;"
-            " wheel_cmd and joint_states stay reversed."
+            "All wheels turn the other way than the manual says: axis_signs corrects cmd_vel and"
+            " odom; wheel_cmd and joint_states stay reversed."
         )
     if found.axis_signs is not None and mirrored(found.axis_signs):
         remarks.append(

@@ -121,7 +121,7 @@ class Console:
         except EOFError:
             self.say()
             raise ToolError(
-                f"nobody answered “{question.strip()}”: run it in a terminal, or pipe answers in"
+                f"no answer to “{question.strip()}”; run it in a terminal, or pipe the answers in"
             ) from None
 
 

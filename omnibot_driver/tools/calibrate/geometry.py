@@ -173,7 +173,7 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
     ]
     notes += [
         f"Wheel {wheel} is {abs(more):.1%} {'larger' if more > 0 else 'smaller'} than the mean,"
-        " which no parameter mends: look at its rollers, and whether all wheels carry alike."
+        " which no parameter corrects; look at its rollers, and whether all wheels carry alike."
         for wheel, more, sigma in zip(WHEELS, found.unlike, found.unlike_sigma, strict=True)
         if abs(more) > max(PLAIN, 3 * sigma)
     ]

@@ -45,7 +45,7 @@ class Interruption:
     def check(self) -> None:
         """Raises Interrupted once a signal has come."""
         if self._requested and not self._deferred:
-            raise Interrupted("interrupted: the robot is told to stand still, nothing was written")
+            raise Interrupted("interrupted; the robot is stopped, nothing was written")
 
     @contextmanager
     def deferred(self) -> Iterator[None]:

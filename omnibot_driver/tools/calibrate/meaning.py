@@ -70,7 +70,8 @@ def require_motion(odometry: Odometry) -> None:
     """Raises ToolError for a robot that has not moved at all."""
     if not len(odometry.pose) or np.ptp(odometry.pose[:, :2], axis=0).max() < LEAST_M:
         raise ToolError(
-            "the robot does not move when told: check the motors' power, and what the driver logs"
+            "the robot does not move when commanded: check the motors' power, and what the driver"
+            " logs"
         )
 
 

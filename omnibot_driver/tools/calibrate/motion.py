@@ -124,7 +124,8 @@ class Obedience:
         for told, done, plain in zip(told_ways, done_ways, PLAIN[self._topic], strict=True):
             if told > plain * self._look_s and not done >= OBEYED_PART * told:  # NaN is no motion
                 raise ToolError(
-                    f"the robot does not move when told ({self._topic}): check the motors' power,"
+                    f"the robot does not move when commanded ({self._topic}): check the motors'"
+                    " power,"
                     f"{SCALES if self._has_scales else ''} and what the driver logs"
                 )
 

@@ -45,7 +45,8 @@ STOOD_S: Final = 0.3
 STANDING: Final = 0.01
 """m/s and rad/s: slower is standing."""
 UNRULY: Final = (
-    "the robot was told to stand still and is not seen to: cut its power, then see docs/safety.md"
+    "Stop was sent, but the robot still moves or sends no odometry; cut its power, then see"
+    " docs/safety.md"
 )
 
 

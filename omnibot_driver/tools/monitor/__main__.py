@@ -118,8 +118,8 @@ def _find(feed: "Feed", timeout_s: float) -> None:
     there = feed.drivers()
     if feed.driver in there:
         raise ToolError(
-            f"{feed.driver} is there, but says nothing for {timeout_s:g} s: does it hang, or is its"
-            " computer out of reach?"
+            f"{feed.driver} exists, but has sent nothing for {timeout_s:g} s; check that it runs"
+            " and that its computer can be reached"
         )
     if not there:
         domain = os.environ.get("ROS_DOMAIN_ID", "0")
@@ -152,8 +152,8 @@ def _print(view: View, feed: "Feed", as_json: bool) -> int:
         )
     if strange := view.not_finite():
         troubles.append(
-            f"not a finite number: {', '.join(strange)}; whoever publishes that is not to be"
-            " trusted with a robot"
+            f"not a finite number: {', '.join(strange)}; fix the node that publishes this before"
+            " you drive"
         )
     print(
         text.as_json(view, troubles) if as_json else text.report(view), end="\n" if as_json else ""

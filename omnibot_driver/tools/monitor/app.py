@@ -65,8 +65,8 @@ class Release(ModalScreen[bool]):
     def compose(self) -> ComposeResult:
         """One question."""
         yield Static(
-            "Release the e-stop?\n\nIs everybody clear of the robot?\nIt stands until a new command"
-            " comes.\n\ny releases, any other key does not",
+            "Release the e-stop?\n\nIs everybody clear of the robot?\nIt stays stopped until the"
+            " next command.\n\ny releases, any other key does not",
             markup=False,
         )
 
@@ -179,7 +179,9 @@ class Monitor(App[None]):
             f"steer: WASD or arrows, J L turn, +/- speed {dead_man.level}/{LEVELS}: "
             f"{linear:.2f} m/s {angular:.2f} rad/s"
         )
-        self._parts["teleop"].update(Text(words if steers else "steer: nobody takes cmd_vel yet"))
+        self._parts["teleop"].update(
+            Text(words if steers else "steer: no subscriber on cmd_vel yet")
+        )
 
     # Keys
 

@@ -85,7 +85,7 @@ class Feed:
             self._listen()
             self._offer()
         except (InvalidNamespaceException, InvalidTopicNameException) as error:
-            raise ToolError(f"no such driver can be: {error}") from error
+            raise ToolError(f"not a valid driver name: {error}") from error
         except (RCLError, UnknownROSArgsError) as error:
             raise ToolError(f"ROS does not start: {error}") from error
         self._executor = SingleThreadedExecutor(context=self._context)
@@ -267,7 +267,7 @@ class Feed:
     def _call(self, client: Any, request: Any, what: str) -> None:
         if not client.service_is_ready():
             service = self._node.resolve_service_name(client.srv_name)
-            self.say(f"{what}: nobody offers {service}; is the driver running?")
+            self.say(f"{what}: service {service} not found; is the driver running?")
             return
         self.say(f"{what}: asked, no answer yet")
         client.call_async(request).add_done_callback(partial(self._answered, what))
@@ -294,5 +294,5 @@ class Feed:
         except ExternalShutdownException:
             pass
         except Exception as error:
-            self.say(f"the monitor hears nothing any more after a defect of its own: {error!r}")
+            self.say(f"the monitor has stopped receiving because of a defect in it: {error!r}")
             raise

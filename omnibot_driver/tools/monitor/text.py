@@ -83,7 +83,7 @@ def figures(view: View) -> list[str]:
 def verdicts(view: View) -> list[tuple[Level, str]]:
     """Each status that is not OK in its own words, all that are in one line, and the counts."""
     if not view.statuses:
-        return [(Level.STALE, "no diagnostics are heard")]
+        return [(Level.STALE, "no diagnostics received")]
     worst = sorted((s for s in view.statuses if s.level), key=_urgency, reverse=True)
     lines = [(s.level, clean(f"{s.name}: {s.message}")) for s in worst]
     if fine := [s.name for s in view.statuses if not s.level]:

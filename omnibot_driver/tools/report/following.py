@@ -127,7 +127,8 @@ def judge(log: Log) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Commands",
-            "No cmd_vel and no wheel_cmd: whether the robot did what it was told is not known.",
+            "No cmd_vel and no wheel_cmd, so the report cannot say whether the robot followed its"
+            " commands.",
             "",
         )
         return
@@ -138,7 +139,7 @@ def judge(log: Log) -> Iterator[Finding]:
                 Level.WARN,
                 "Commands",
                 f"{counted(broken, 'message')} of {name} with NaN, infinity or a wrong length.",
-                "The driver refuses them: mend the node that publishes them.",
+                "The driver rejects them; fix the node that publishes them.",
             )
     found = pairs(log)
     for pair in found:
@@ -208,7 +209,7 @@ def _stalled(stalls: list[Span]) -> Iterator[Finding]:
         yield Finding(
             Level.BAD,
             "Commands",
-            f"Told to move, the robot stood {counted(len(stalls), 'time')},"
+            f"Commanded to move, the robot stood still {counted(len(stalls), 'time')},"
             f" {span(sum(item.length_s for item in stalls))} in all, first at"
             f" {stalls[0].begin_s:.1f} s.",
             "Check the motors' power, the board's own e-stop and its switch (velocity control), and"

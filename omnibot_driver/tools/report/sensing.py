@@ -117,7 +117,8 @@ def judge(log: Log) -> Iterator[Finding]:
         yield Finding(
             Level.BAD,
             "IMU",
-            f"The {' and the '.join(stuck)} said exactly the same {STUCK_READINGS} times and more.",
+            f"The {' and the '.join(stuck)} sent identical readings {STUCK_READINGS} times or more"
+            " in a row.",
             "Switch the board off and on; if it stays so, the sensor is broken.",
         )
     rest = at_rest(log, imu)

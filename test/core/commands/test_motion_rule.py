@@ -202,8 +202,6 @@ def test_a_driver_that_stood_still_has_no_command_and_blames_nobody(bench: Bench
     bench.run(2.0)
     assert {data for _, data in bench.written[mark:]} == {STOP}
     assert bench.still()
-    assert bench.notices == [
-        "the driver stood still for 3.0 s: the robot is stopped until a new command comes"
-    ]
+    assert bench.notices == ["driver stalled for 3.0 s; robot stopped until the next command"]
     bench.drive(vx=0.3)
     assert bench.board.commands[-1].kind == "velocity"

@@ -132,5 +132,5 @@ def test_nobody_answers() -> None:
     bench.open()
     bench.run(12.0)
     assert bench.session.state == "connecting"
-    assert sum("nothing comes from the board" in notice for notice in bench.notices) == 1
+    assert sum("no data from the board" in notice for notice in bench.notices) == 1
     assert bench.try_command(0.3, 0.0)

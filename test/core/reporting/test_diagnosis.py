@@ -92,10 +92,10 @@ def test_a_healthy_robot_is_all_ok() -> None:
     assert stream["IMU rate (Hz)"] == "100.0 of 100"
     assert stream["Pose rate (Hz)"] == "5.0 of 5"
     assert time == {
-        "Clock skew (ppm)": "20.0", "Delay over the least (ms)": "1.00", "Jitter (ms rms)": "0.00",
+        "Clock skew (ppm)": "20.0", "Delay above minimum (ms)": "1.00", "Jitter (ms rms)": "0.00",
     }  # fmt: skip
     assert robot.statuses["IMU"].values["Gravity (m/s²)"] == "9.800"
-    assert robot.statuses["Commands"].message == "nobody commands; the robot stands"
+    assert robot.statuses["Commands"].message == "idle"
 
 
 FAULTS: list[tuple[Change, str, Level, str]] = [
@@ -118,7 +118,7 @@ FAULTS: list[tuple[Change, str, Level, str]] = [
     (lambda r: r.command(monitored=False), "Commands", Level.WARN, "the motion monitor is off"),
     (lambda r: r.command(interlock="why"), "Commands", Level.ERROR, "motion is refused: why"),
     (lambda r: r.command(estop=True), "E-stop", Level.WARN, "~/estop (data: false)"),
-    (lambda r: r.count(same_rate=100), "IMU", Level.ERROR, "always the same from the gyro"),
+    (lambda r: r.count(same_rate=100), "IMU", Level.ERROR, "identical readings from the gyro"),
     (lambda r: r.count(same_force=100, same_rate=100), "IMU", Level.ERROR, "accelerometer and"),
     (lambda r: r.sensor(advice="set `accel_range` to 4"), "IMU", Level.WARN, "`accel_range` to 4"),
 ]  # fmt: skip
@@ -253,7 +253,7 @@ def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
     robot.command(source="cmd_vel", age_s=0.05)
     robot.seconds(1)
     commands = robot.statuses["Commands"]
-    assert commands.message == "cmd_vel commands"
+    assert commands.message == "cmd_vel is in control"
     assert (commands.values["Source"], commands.values["Age (s)"]) == ("cmd_vel", "0.05")
     robot.command(source="cmd_vel", age_s=0.05, limited=3)
     robot.seconds(1)

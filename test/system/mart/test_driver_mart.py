@@ -188,4 +188,4 @@ def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
 def test_a_server_that_does_not_answer_is_told(start_driver: Start) -> None:
     """Nothing listens there."""
     driver = start_driver("udp://127.0.0.1:9", board="mart")
-    driver.wait_for_line("nothing comes from the board")
+    driver.wait_for_line("no data from the board")
