@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import xacro
 from hypothesis import given
 from hypothesis import strategies as st
-from urdf_parser_py.urdf import URDF
 
 from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
+
+xacro = pytest.importorskip("xacro")
+URDF = pytest.importorskip("urdf_parser_py.urdf").URDF
 
 ROOT = Path(__file__).parents[2]
 WHEELS = ("wheel_a_joint", "wheel_b_joint", "wheel_c_joint")

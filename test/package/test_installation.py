@@ -65,10 +65,16 @@ def first_line_with(text: str, process: subprocess.Popen[str]) -> str:
     pytest.fail(f"{process.args} ended without a line with {text!r}:\n{''.join(seen)}")
 
 
+MADE_HERE = (".*", "__pycache__", "*.egg-info", "build", "install", "log")
+"""What tests and tools leave in a source archive that they run in."""
+
+
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a copy of the repository as a commit of everything in it would have it."""
     copy = tmp_path_factory.mktemp("sources") / PACKAGE
+    if not (ROOT / ".git").exists():  # a source archive has nothing else than the sources
+        return Path(shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(*MADE_HERE)))
     listing = run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], ROOT)
     for name in filter(None, listing.split("\0")):
         if (ROOT / name).is_file():  # a tracked file may have been deleted since

@@ -5,12 +5,14 @@
 from pathlib import Path
 from typing import Any
 
-import xacro
+import pytest
 import yaml
-from urdf_parser_py.urdf import URDF
 
 from omnibot_driver.boards.fejemis import PARAMETERS, kinematics
 from omnibot_driver.boards.fejemis_topics import RANGES
+
+xacro = pytest.importorskip("xacro")
+URDF = pytest.importorskip("urdf_parser_py.urdf").URDF
 
 ROOT = Path(__file__).parents[3]
 LINEAR, ANGULAR, TIMEOUT = (
