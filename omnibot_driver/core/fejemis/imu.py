@@ -76,7 +76,7 @@ class ImuPairing:
         since_s, self._arrived_s = arrived_s - self._arrived_s, arrived_s
         self._count += 1
         time_s = self._phase_s + self._count * PERIOD_S
-        lost = max(0, math.ceil((not_before_s - CYCLE_S - time_s) / PERIOD_S))
+        lost = math.ceil(max(0.0, (not_before_s - CYCLE_S - time_s) / PERIOD_S))
         delay_s = arrived_s - time_s - lost * PERIOD_S
         if delay_s < -PERIOD_S / 2:
             lost += (more := round(delay_s / PERIOD_S))
