@@ -6,6 +6,7 @@ Knows angles, the sensor's bits and times; not what is commanded.
 """
 
 import math
+from functools import lru_cache
 from typing import Final
 
 from omnibot_driver.core.fejemis.messages import FrontAngle
@@ -109,11 +110,15 @@ def relay_text(angle_rad: float) -> bytes:
 
     A false angle lasts until the next line, 15 ms later.
     """
-    angle_deg = math.degrees(angle_rad)
-    plain = f"{angle_deg:.2f}"
+    return _relay_text(round(100 * math.degrees(angle_rad)))
+
+
+@lru_cache(maxsize=20_000)
+def _relay_text(hundredths: int) -> bytes:
     for off in range(int(100 * ROUNDED_DEG) + 1):
-        for near_deg in (angle_deg + off / 100, angle_deg - off / 100):
-            for text in (f"{near_deg:.2f}", f"{near_deg:.2f}".replace("0.", ".", 1)):
-                if harmless(text) and abs(float(text) - angle_deg) <= ROUNDED_DEG:
-                    return b"fwl " + text.encode("ascii")
-    return b"fwl " + plain.encode("ascii")
+        for near in (hundredths + off, hundredths - off):
+            text = f"{near / 100:.2f}"
+            for written in (text, text.replace("0.", ".", 1)):
+                if harmless(written) and abs(100 * float(written) - hundredths) <= off + 0.5:
+                    return b"fwl " + written.encode("ascii")
+    return b"fwl %.2f" % (hundredths / 100)

@@ -54,6 +54,8 @@ class Half:
         self.rejected = 0
         """Lines of ours that came damaged."""
         self.identity: int | None = None
+        self.role: Role | None = None
+        """Which one it is; None while that is not known, or where it is neither."""
         self.begin(line_sums)
 
     def begin(self, line_sums: LineSums) -> None:
@@ -70,11 +72,6 @@ class Half:
         self._at: dict[str, float] = {}
         self._next_at = -math.inf
         self._asked_at = -math.inf
-
-    @property
-    def role(self) -> Role | None:
-        """Which one it is; None while that is not known, or where it is neither."""
-        return None if self.identity is None else ROLES.get(self.identity)
 
     @property
     def sums(self) -> bool:
@@ -154,7 +151,7 @@ class Half:
         if self.identity is None or identity == told:
             if identity != self.identity:
                 self._next_at = -math.inf
-            self.identity = identity
+            self.identity, self.role = identity, ROLES.get(identity)
         if self.heartbeat is None:
             self._next_at = -math.inf
 

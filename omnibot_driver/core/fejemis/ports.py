@@ -57,8 +57,10 @@ class Ports:
 
     def half(self, role: Role) -> Half | None:
         """The one that is this; None where none or both are."""
-        found = [half for half in self.halves if half.role == role]
-        return found[0] if len(found) == 1 else None
+        first, second = self.halves
+        if first.role == role:
+            return None if second.role == role else first
+        return second if second.role == role else None
 
     def role(self, channel: int) -> Role:
         """What is there, or is believed to be."""

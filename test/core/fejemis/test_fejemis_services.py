@@ -1,0 +1,201 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is asked of the boards besides motion, and what they keep."""
+
+import pytest
+from fejemis_bench import DRIVE, FRONT, Bench, nominal
+
+from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.fejemis.readings import (
+    BatteryReading,
+    Job,
+    JobDone,
+    MagneticReading,
+    OrientedImuReading,
+    RangeReading,
+    SteeringReading,
+)
+from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
+from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
+
+
+def ask(bench: Bench, job: Job, limit_s: float = 10.0) -> JobDone:
+    token = object()
+    bench.board.ask(job, token, bench.now)
+    bench.settle()
+    bench.run_until(lambda: any(d.token is token for d in bench.extras(JobDone)), limit_s)
+    return next(done for done in bench.extras(JobDone) if done.token is token)
+
+
+def test_the_gyro_is_calibrated_by_the_board() -> None:
+    """The offset that is read back has changed."""
+    bench = nominal(Simulated(gyro_bias_dps=(1.0, -2.0, 3.0)))
+    done = ask(bench, Job.CALIBRATE_GYRO)
+    assert done.success
+    assert bench.robot.drive.config.gyro_offset_dps == pytest.approx((1.0, -2.0, 3.0), abs=0.2)
+    bench.events.clear()
+    bench.run(0.5)
+    assert bench.imu[-1].angular_velocity[2] == pytest.approx(0.0, abs=0.02)
+
+
+def test_the_accelerometer_is_calibrated_by_the_board() -> None:
+    """On level ground."""
+    bench = nominal(Simulated(accel_bias_mps2=(0.2, -0.1, 0.3)))
+    assert ask(bench, Job.CALIBRATE_ACCELEROMETER).success
+    bench.events.clear()
+    bench.run(0.5)
+    assert bench.imu[-1].specific_force == pytest.approx((0.0, 0.0, 9.80665), abs=0.1)
+
+
+@pytest.mark.parametrize("job", Job)
+def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
+    """Loading stops it first."""
+    bench = nominal()
+    bench.drive_on()
+    if job is not Job.LOAD:
+        with pytest.raises(RequestRefused, match="commanded"):
+            bench.board.ask(job, None, bench.now)
+        return
+    assert ask(bench, job).success
+    assert bench.robot.standing
+
+
+def test_a_job_that_nothing_confirms_fails() -> None:
+    """Within its time, with a sentence; one at a time."""
+    bench = nominal()
+    bench.hears = {FRONT}
+    token = object()
+    bench.board.ask(Job.CALIBRATE_GYRO, token, bench.now)
+    with pytest.raises(RequestRefused, match="under way"):
+        bench.board.ask(Job.SAVE, None, bench.now)
+    bench.run(9.0)
+    (done,) = bench.extras(JobDone)
+    assert not done.success
+    assert done.token is token
+
+
+def test_a_configuration_is_saved_and_loaded() -> None:
+    """On both boards."""
+    bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.41, 0.43)}))
+    assert bench.robot.drive.saved.confs_m == (0.4, 0.42)
+    assert ask(bench, Job.SAVE).success
+    assert bench.robot.drive.saved.confs_m == (0.41, 0.43)
+    assert bench.robot.front.saved.confs_m == (0.41, 0.43)
+    assert ask(bench, Job.LOAD).success
+
+
+def test_power_off_is_called_back_by_a_start() -> None:
+    """Meanwhile nothing is driven."""
+    bench = nominal(settings=FejemisSettings(power_off_delay_s=5.0))
+    done = ask(bench, Job.POWER_OFF)
+    assert done.success
+    assert "5 s" in done.message
+    assert "power" in bench.board.refusal
+    for channel, data in bench.board.start():
+        bench.robot.receive(data, bench.now, channel)
+    bench.run(6.0)
+    assert bench.robot.drive.powered
+    assert not bench.board.refusal
+
+
+def test_power_off_cuts_the_power() -> None:
+    """After the delay that was set."""
+    bench = nominal(settings=FejemisSettings(power_off_delay_s=4.0))
+    assert ask(bench, Job.POWER_OFF).success
+    bench.run(4.0)
+    assert not bench.robot.drive.powered
+
+
+WRITTEN: dict[Written, tuple[float, ...]] = {
+    Written.WHEELS: (0.08, 0.081, 20.0, 48.0, 0.41),
+    Written.STEERING: (0.41, 0.43),
+    Written.FRONT_WHEEL: (2.5, 0.0),
+    Written.INFRARED: (40000.0, 13000.0, 41000.0, 12000.0),
+    Written.MAGNETOMETER: (1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+    Written.ACCELEROMETER: (0.1, 0.2, 0.3, 1.0, 1.0, 1.0),
+    Written.STEERING_GAINS: (1.0, 40.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.15, 0.05),
+}
+
+
+def test_only_what_the_user_set_is_written() -> None:
+    """All else is read and shown."""
+    bench = nominal()
+    bench.run(3.0)
+    words = {text.split()[0] for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
+    assert not words & {setting.command for setting in Written}
+    assert "setid" not in words
+    own = bench.board.figures.own
+    assert own["Drive conf"] == "0.0775 0.0775 19 68 0.4"
+    assert own["Front confs"] == "0.42 0.4"
+    assert own["Drive ver"].startswith("110")
+    assert own["Front id"] == "front 91"
+
+
+@pytest.mark.parametrize("sums", [True, False])
+def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restart(
+    *, sums: bool
+) -> None:
+    """On the board whose it is."""
+    from omnibot_driver.simulator.fejemis import Firmware
+
+    bench = nominal(Simulated(firmware=Firmware(sums=sums)), FejemisSettings(written=WRITTEN))
+    for _ in range(2):
+        drive, front = bench.robot.drive.config, bench.robot.front.config
+        assert drive.radii_m == (0.08, 0.081)
+        assert (drive.gear, drive.ticks, drive.wheel_base_m) == (20.0, 48.0, 0.41)
+        assert drive.confs_m == front.confs_m == (0.41, 0.43)
+        assert front.angle_offset_deg == 2.5
+        assert front.ir == (40000.0, 13000.0, 41000.0, 12000.0)
+        assert front.steering[:2] == (1.0, 40.0)
+        assert bench.board.geometry.track_m == 0.41
+        mark = bench.now
+        bench.run(3.0)
+        written = {setting.command for setting in Written}
+        assert not written & {text.split()[0] for text in bench.lines(FRONT, mark)}
+        assert bench.board.advice is None
+        bench.robot.drive.reboot()
+        bench.robot.front.reboot()
+        bench.run(5.0)
+
+
+def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
+    """After some tries."""
+    bench = nominal(settings=FejemisSettings(written={Written.WHEELS: (0.08, -1.0, 1.0, 1.0, 1.0)}))
+    bench.run(6.0)
+    assert any("confw" in text for text in bench.notices)
+
+
+def test_boards_with_different_geometries_are_told_of() -> None:
+    """One of them computes with a robot that is not there."""
+    bench = nominal()
+    bench.robot.receive(b"confs 0.4 0.5\n", bench.now, FRONT)
+    bench.session.closed(bench.now)
+    bench.open()
+    bench.run(4.0)
+    assert any("different steering geometries" in text for text in bench.notices)
+
+
+def test_all_sensors_are_told_in_si_units() -> None:
+    """Battery, magnetometer, orientation, four ranges, the steered wheel."""
+    bench = nominal(Simulated(front_m=0.3))
+    bench.run(1.0)
+    battery = bench.extras(BatteryReading)[-1]
+    assert battery.volts == pytest.approx(24.9, abs=0.1)
+    assert battery.amps < 0.0
+    assert battery.cells == 6
+    assert not battery.low
+    assert bench.extras(MagneticReading)[-1].field_t == pytest.approx((17e-6, 0.0, -47e-6))
+    oriented = bench.extras(OrientedImuReading)[-1]
+    assert oriented.orientation == pytest.approx((0.0, 0.0, 0.0, 1.0), abs=0.01)
+    assert oriented.specific_force[2] == pytest.approx(9.81, abs=0.1)
+    ranges = {reading.name: reading.distance_m for reading in bench.extras(RangeReading)}
+    assert ranges == pytest.approx({"tof": 0.3, "sonar": 0.3, "ir1": 0.3, "ir2": 0.3}, abs=0.01)
+    assert bench.extras(SteeringReading)[-1].angle_rad == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_low_battery_is_told_once_a_minute() -> None:
+    """By the voltage of a cell."""
+    bench = nominal(Simulated(volts=20.4))
+    bench.run(20.0)
+    assert bench.extras(BatteryReading)[-1].low
+    assert sum("battery is low" in text for text in bench.notices) == 1

@@ -1,0 +1,209 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""E-stop, pause and what else turns: brush, lift, lights; and what is said last."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+from fejemis_bench import DRIVE, FRONT, Bench, nominal
+
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.requests import Request
+from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
+from omnibot_driver.simulator.fejemis import Firmware
+
+
+def without_relays(lines: list[str]) -> list[str]:
+    return [text for text in lines if not text.startswith(("fwl", "hcsr", "sub"))]
+
+
+@pytest.mark.parametrize("resumes", [False, True])
+def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
+    """What was commanded before is zero when ``start`` is said, whatever the firmware does then."""
+    bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
+    bench.drive_on()
+    mark = bench.now
+    bench.estop(True)
+    assert bench.lines(DRIVE, mark)[:2] == ["stop", "rc 2 0 0"]
+    assert bench.lines(FRONT, mark)[:3] == ["motv 0 0", "brush 0", "rc 2 0 0"]
+    bench.run(2.0)
+    assert bench.robot.standing
+    assert bench.robot.drive.source == -1
+    said = [at for at, to, data in bench.written if at > mark and to == DRIVE and b"stop" in data]
+    assert len(said) >= 37
+    mark = bench.now
+    bench.estop(False)
+    bench.run(1.5)
+    drive = without_relays(bench.lines(DRIVE, mark))
+    assert drive.index("rc 2 0 0") < drive.index("start")
+    assert "start" not in bench.lines(FRONT)[-200:]
+    assert bench.robot.standing
+    assert bench.session.state == "nominal"
+    bench.drive_on()
+    assert not bench.robot.standing
+
+
+def test_a_lost_start_after_an_estop_is_said_again() -> None:
+    """Until the heartbeat shows that drive obeys."""
+    bench = nominal()
+    bench.estop(True)
+    bench.run(1.0)
+    bench.hears = {FRONT}
+    bench.estop(False)
+    bench.run(3.0)
+    assert bench.session.state == "paused"
+    bench.hears = {DRIVE, FRONT}
+    bench.run_until(lambda: bench.session.state == "nominal", 2.0)
+    bench.run(0.5)
+    bench.drive_on()
+    assert not bench.robot.standing
+
+
+def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
+    """It outlives an e-stop, and ends with a start alone."""
+    bench = nominal()
+    bench.drive_on()
+    answer = bench.ask(Request.PAUSE)
+    assert answer.success
+    assert bench.robot.drive.source == -1
+    with pytest.raises(CommandRefused, match="paused"):
+        bench.drive()
+    bench.estop(True)
+    bench.run(1.0)
+    bench.estop(False)
+    bench.run(2.0)
+    assert bench.session.state == "paused"
+    assert bench.ask(Request.START).success
+    bench.run(0.3)
+    bench.drive_on()
+    assert not bench.robot.standing
+
+
+def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone() -> None:
+    """By ``auto_start``."""
+    for run in (True, False):
+        bench = Bench(run=run)
+        bench.run(0.5)
+        bench.robot.receive(b"stop\n", bench.now, DRIVE)
+        bench.open()
+        bench.run(3.0)
+        assert bench.session.state == ("nominal" if run else "paused")
+
+
+def lift_it(bench: Bench, volts: float = 6.0) -> None:
+    bench.board.lift(volts, bench.now)
+    bench.settle()
+
+
+def test_the_lift_runs_no_longer_than_a_command() -> None:
+    """By the time that goes with its voltage, should the driver die."""
+    bench = nominal()
+    lift_it(bench)
+    bench.hears = {DRIVE}
+    bench.run(0.01)
+    assert bench.robot.vehicle.lift.volts == pytest.approx(6.0, abs=1.2)
+    bench.run(0.44)
+    assert bench.robot.vehicle.lift.volts > 0.0
+    bench.run(0.1)
+    assert bench.robot.vehicle.lift.volts == 0.0
+
+
+def test_the_time_of_the_lift_follows_the_timeout() -> None:
+    """It is never longer."""
+    bench = nominal(settings=FejemisSettings(command_timeout_s=0.2))
+    lift_it(bench, -6.0)
+    said = [text for text in bench.lines(FRONT) if text.startswith("motv -")]
+    assert 0.0 < float(said[-1].split()[2]) <= 0.2
+    with pytest.raises(CommandRefused, match="NaN"):
+        lift_it(bench, math.nan)
+
+
+ENDS: dict[str, Callable[[Bench], object]] = {
+    "e-stop": lambda bench: bench.estop(True),
+    "pause": lambda bench: bench.ask(Request.PAUSE),
+    "a silent front board": lambda bench: (setattr(bench, "speaks", {DRIVE}), bench.run(2.5)),
+    "a silent drive board": lambda bench: (setattr(bench, "speaks", {FRONT}), bench.run(2.5)),
+    "a restart of the drive board": lambda bench: bench.robot.drive.reboot(),
+    "a restart of the front board": lambda bench: bench.robot.front.reboot(),
+    "a lost line": lambda bench: (bench.close(), bench.open(missing="a line is missing")),
+    "reconnect": lambda bench: (bench.close(), bench.open()),
+}
+
+
+@pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)
+def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]) -> None:
+    """When all is well again they are still off."""
+    bench = nominal()
+    bench.board.set_brush(True, bench.now)
+    lift_it(bench)
+    bench.run(0.1)
+    assert bench.robot.vehicle.brush
+    ends(bench)
+    bench.run(1.0)
+    assert not bench.robot.vehicle.brush
+    assert bench.robot.vehicle.lift.volts == 0.0
+    bench.speaks = bench.hears = {DRIVE, FRONT}
+    bench.close()
+    bench.open()
+    bench.estop(False)
+    bench.run(3.0)
+    assert not bench.robot.vehicle.brush
+    assert not bench.board._machine.active
+
+
+def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
+    """To switch it off is always allowed."""
+    bench = nominal()
+    bench.estop(True)
+    with pytest.raises(RequestRefused, match="e-stop"):
+        bench.board.set_brush(True, bench.now)
+    with pytest.raises(CommandRefused, match="e-stop"):
+        bench.board.lift(3.0, bench.now)
+    bench.board.set_brush(False, bench.now)
+    bench.board.lift(0.0, bench.now)
+    bench.estop(False)
+    bench.ask(Request.PAUSE)
+    with pytest.raises(RequestRefused, match="paused"):
+        bench.board.set_brush(True, bench.now)
+
+
+def test_a_command_that_expires_leaves_the_brush_on() -> None:
+    """A robot that sweeps may stand for a while."""
+    bench = nominal()
+    bench.board.set_brush(True, bench.now)
+    bench.drive_on()
+    bench.run(1.5)
+    assert bench.robot.standing
+    assert bench.robot.vehicle.brush
+
+
+def test_the_lights_are_given_back_at_the_end() -> None:
+    """Where they were changed."""
+    bench = nominal()
+    assert not any(b"leds" in data for _, data in bench.board.farewell())
+    bench.board.set_led(300, 128, -5, bench.now)
+    bench.settle()
+    bench.run(0.5)
+    assert bench.robot.front.leds == [(255, 128, 0)] * 12
+    assert any(b"leds" in data for _, data in bench.board.farewell())
+
+
+def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
+    """Whoever says it."""
+    for words in ("guard", "guard latched", "exit"):
+        bench = nominal()
+        bench.board.set_brush(True, bench.now)
+        lift_it(bench)
+        bench.drive_on(seconds=0.4)
+        stop, emergency = bench.board.last_words()
+        last = {"guard": stop, "guard latched": emergency}.get(words)
+        packets = last or bench.session.shutdown_sequence("stop", bench.now)
+        for channel, data in packets:
+            bench.robot.receive(data, bench.now, channel)
+        bench.hears = bench.speaks = set()
+        bench.run(1.5)
+        assert bench.robot.standing, words
+        assert not bench.robot.vehicle.brush, words
+        assert bench.robot.vehicle.lift.volts == 0.0
