@@ -1,0 +1,346 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The way of the robot from poses and wheel speeds, and the times of all that is told."""
+
+import contextlib
+import itertools
+import math
+import random
+import statistics
+from collections.abc import Callable
+
+import pytest
+from fejemis_bench import WHEELS, Bench, nominal
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.fejemis.imu import ImuPairing
+from omnibot_driver.core.fejemis.messages import Acceleration, BoardPose, Gyro, WheelSpeeds
+from omnibot_driver.core.fejemis.odometry import PoseOdometry
+from omnibot_driver.core.fejemis.teensy_clock import StampedReadings, TeensyClock
+from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
+from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
+from omnibot_driver.core.odometry.estimator import Odometry, OdometrySettings
+from omnibot_driver.core.readings import DisplacementReading, ImuReading
+from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
+from omnibot_driver.simulator.fejemis import Firmware
+
+PERIOD_S = 0.02
+TRACK_M = 0.4
+
+
+def told(place: Pose, time_s: float) -> BoardPose:
+    """As the board prints it."""
+    return BoardPose(
+        round(time_s, 5), round(place.x_m, 3), round(place.y_m, 3), round(place.yaw_rad, 4), 3
+    )
+
+
+class Drive:
+    """A board on its way: what it says each 20 ms, taken by an odometry."""
+
+    def __init__(self, *, with_speeds: bool = True) -> None:
+        self.odometry = PoseOdometry(TRACK_M)
+        self.board, self.out, self.now = Pose(), Pose(), 10.0
+        self.readings: list[DisplacementReading] = []
+        self.with_speeds = with_speeds
+
+    def say(self, pose: BoardPose) -> DisplacementReading | None:
+        reading = self.odometry.pose(pose, self.now)
+        if reading is not None:
+            self.readings.append(reading)
+            self.out = self.out.moved(roll(Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad)))
+        return reading
+
+    def step(self, v: float, w: float, *, heard: bool = True) -> None:
+        self.now += PERIOD_S
+        self.board = self.board.moved(roll(Pose(v * PERIOD_S, 0.0, w * PERIOD_S)))
+        if not heard:
+            return
+        if self.with_speeds:
+            half = w * TRACK_M / 2
+            self.odometry.speeds(WheelSpeeds(round(v - half, 3), round(v + half, 3)), self.now)
+        self.say(told(self.board, self.now))
+
+    def run(self, v: float, w: float, seconds: float, *, heard: bool = True) -> None:
+        for _ in range(round(seconds / PERIOD_S)):
+            self.step(v, w, heard=heard)
+
+
+def test_displacements_add_up_to_the_pose() -> None:
+    """Whatever is rounded."""
+    drive = Drive()
+    drive.run(0.0, 0.0, 0.1)
+    for v, w in ((0.3, 0.5), (0.1, -0.7), (0.0, 1.0), (0.5, 0.0)):
+        drive.run(v, w, 3.0)
+    way = drive.out.way_to(drive.board)
+    assert way.way_m < 0.003
+    assert abs(way.yaw_rad) < 0.001
+
+
+def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
+    """A millimetre in 20 ms is 0.05 m/s."""
+    spread = {}
+    for with_speeds in (True, False):
+        drive = Drive(with_speeds=with_speeds)
+        drive.run(0.237, 0.3, 4.0)
+        speeds = [r.dx_m / r.duration_s for r in drive.readings[20:] if r.duration_s]
+        spread[with_speeds] = statistics.pstdev(speeds)
+    assert spread[False] > 0.015
+    assert spread[True] < 0.004
+
+
+def test_a_gap_is_settled_by_the_pose_after_it() -> None:
+    """However long, and wherever the robot went."""
+    drive = Drive()
+    drive.run(0.0, 0.0, 0.1)
+    drive.run(0.3, 0.2, 1.0)
+    drive.run(0.4, -0.5, 2.0, heard=False)
+    drive.run(0.0, 0.0, 0.1)
+    way = drive.out.way_to(drive.board)
+    assert way.way_m < 0.003
+    assert not any(reading.restarted for reading in drive.readings)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda p: BoardPose(p.time_s, p.x_m + 1.0, p.y_m, p.yaw_rad, 3),
+        lambda p: BoardPose(p.time_s, p.x_m, -p.y_m, p.yaw_rad, 3),
+        lambda p: BoardPose(p.time_s, p.x_m, p.y_m, -p.yaw_rad, 3),
+        lambda p: BoardPose(p.time_s, p.x_m, p.y_m + 0.06, p.yaw_rad, 3),
+    ],
+)
+def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) -> None:
+    """The next true one goes on from the last true one."""
+    drive = Drive()
+    drive.run(0.0, 0.0, 0.1)
+    drive.run(0.3, 0.4, 2.0)
+    drive.step(0.3, 0.4, heard=False)
+    assert drive.say(damage(told(drive.board, drive.now))) is None
+    drive.run(0.3, 0.4, 1.0)
+    assert drive.out.way_to(drive.board).way_m < 0.003
+    assert drive.odometry.refused == 1
+
+
+def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
+    """Somebody has said ``enc0``: the robot is where it was."""
+    drive = Drive()
+    drive.run(0.5, 0.2, 4.0)
+    before = drive.out
+    drive.board = Pose()
+    drive.run(0.0, 0.0, 0.2)
+    assert before.way_to(drive.out).way_m < 0.02
+    assert sum(reading.restarted for reading in drive.readings) == 1
+    drive.run(0.3, 0.0, 1.0)
+    assert before.way_to(drive.out).way_m == pytest.approx(0.3, abs=0.03)
+
+
+def test_the_covariance_is_consistent_over_fifty_drives() -> None:
+    """Wheels of wrong sizes that slip: the normalised error squared is 3 on average."""
+    noise = OdometryNoise(wheels=WHEELS)
+    squares = []
+    for seed in range(50):
+        chance = random.Random(seed)
+        scale = [chance.gauss(1.0, noise.wheel_scale) for _ in range(2)]
+        slip = 1.0 - chance.gauss(0.0, noise.wheel_slip)
+        drive, odometry = Drive(), Odometry(OdometrySettings(noise=noise))
+        truth, taken, last = Pose(), 0, None
+        v = w = 0.0
+        for step in range(400):
+            if step % 100 == 0:
+                v, w = chance.uniform(0.1, 0.5), chance.uniform(-0.8, 0.8)
+            drive.step(v, w)
+            rims = [(v - w * 0.2) * PERIOD_S, (v + w * 0.2) * PERIOD_S]
+            true = [
+                rim * wheel * slip + chance.gauss(0.0, noise.wheel_drift * math.sqrt(abs(rim)))
+                for rim, wheel in zip(rims, scale, strict=True)
+            ]
+            way = Pose(sum(true) / 2, 0.0, (true[1] - true[0]) / TRACK_M)
+            if drive.readings:
+                truth = truth.moved(roll(way))
+            for reading in drive.readings[taken:]:
+                for last in odometry.displace(reading, drive.now):  # noqa: B007
+                    pass
+            taken = len(drive.readings)
+        assert last is not None
+        squares.append(normalised(last.pose, truth, last.covariance))
+    assert 1.8 < statistics.mean(squares) < 4.5
+
+
+def normalised(pose: Pose, truth: Pose, c: Covariance) -> float:
+    """The error squared, over its covariance."""
+    e = (
+        pose.x_m - truth.x_m,
+        pose.y_m - truth.y_m,
+        math.remainder(pose.yaw_rad - truth.yaw_rad, math.tau),
+    )
+    rows = [
+        [c.xx, c.xy, c.x_yaw, e[0]],
+        [c.xy, c.yy, c.y_yaw, e[1]],
+        [c.x_yaw, c.y_yaw, c.yaw_yaw, e[2]],
+    ]
+    for n in range(3):
+        for m in range(n + 1, 3):
+            factor = rows[m][n] / rows[n][n]
+            rows[m] = [a - factor * b for a, b in zip(rows[m], rows[n], strict=True)]
+    solved = [0.0, 0.0, 0.0]
+    for n in (2, 1, 0):
+        rest = sum(rows[n][m] * solved[m] for m in range(n + 1, 3))
+        solved[n] = (rows[n][3] - rest) / rows[n][n]
+    return sum(a * b for a, b in zip(e, solved, strict=True))
+
+
+def figure_eight(bench: Bench, speed: float = 0.4, radius_m: float = 0.8) -> None:
+    """Ten metres; refused commands are given again."""
+    rate = speed / radius_m
+    lap_s = math.tau / rate
+    end_s, began = 2 * lap_s, bench.now
+    while bench.now - began < end_s:
+        turn = rate if bench.now - began < lap_s else -rate
+        with contextlib.suppress(CommandRefused):
+            bench.drive(speed, turn)
+        bench.run(0.1)
+    bench.run(1.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2))
+def test_a_figure_eight_with_losses_both_ways_ends_where_it_is(seed: int) -> None:
+    """Ten metres with one character in a thousand lost: within 1 % and 2°."""
+    chance = random.Random(seed)
+    bench = nominal(Simulated(seed=seed, lose_inbound=1e-3))
+    bench.carry = lambda _, data: bytes(byte for byte in data if chance.random() >= 1e-3)
+    figure_eight(bench)
+    off = bench.odometry[-1].pose.way_to(
+        Pose(bench.robot.truth.x_m, bench.robot.truth.y_m, bench.robot.truth.yaw_rad)
+    )
+    assert off.way_m < 0.1
+    assert abs(math.degrees(off.yaw_rad)) < 2.0
+    assert bench.robot.standing
+
+
+def test_joint_states_follow_the_wheels() -> None:
+    """What was rolled is what the encoders count."""
+    bench = nominal()
+    bench.drive_on(0.3, 0.3, 3.0)
+    bench.run(1.5)
+    left, right = WHEELS.wheel_rates(bench.odometry[-1].rolled.over(1.0))
+    radius = bench.robot.settings.wheel_radius_m
+    turned = [math.tau * radius * turns for turns in bench.robot.vehicle.turns]
+    assert (left, right) == pytest.approx(turned, abs=0.005)
+
+
+def test_odometry_goes_out_with_every_pose() -> None:
+    """Fifty times a second, its twist from the wheels."""
+    bench = nominal()
+    bench.drive_on(0.3, 0.2, 2.0)
+    bench.events.clear()
+    bench.drive_on(0.3, 0.2, 1.0)
+    assert len(bench.odometry) == pytest.approx(50, abs=1)
+    twists = [e.twist for e in bench.odometry if e.twist]
+    assert all(abs(twist.vx_mps - 0.3) < 0.02 for twist in twists)
+
+
+# Times
+
+
+def late(chance: random.Random) -> float:
+    """A read comes 0.36 ms late on average, and one in a hundred by up to 20 ms."""
+    stall_s = chance.uniform(0.0, 0.02) if chance.random() < 0.01 else 0.0
+    return 3e-4 + chance.expovariate(1 / 6e-5) + stall_s
+
+
+def within(errors: list[float]) -> float:
+    """Half the narrowest interval that holds 99 % of them."""
+    errors = sorted(errors)
+    most = int(0.99 * len(errors))
+    return min(b - a for a, b in zip(errors, errors[most:], strict=False)) / 2
+
+
+@pytest.mark.parametrize("ppm", [-100.0, 0.0, 100.0])
+@pytest.mark.parametrize(("loss", "imu_s"), [(0.0, 2e-4), (0.005, 2e-4)])
+def test_stamps_are_those_of_the_board(ppm: float, loss: float, imu_s: float) -> None:
+    """Poses within 0.05 ms, and the IMU, whose lines carry no time, within 0.2 ms."""
+    chance = random.Random(f"{ppm} {loss}")
+    clock, imu = TeensyClock(), ImuPairing("m/s^2")
+    phase_s, start_s = chance.random() * 0.01, chance.random() * 50
+    samples = sorted(
+        [(n * 0.02 + 0.0031, "pose") for n in range(20 * 50)]
+        + [(n * 0.01 + phase_s, "imu") for n in range(20 * 100)]
+    )
+    off: dict[str, list[float]] = {"pose": [], "imu": []}
+    arrived = pose_s = -math.inf
+    for true_s, kind in samples:
+        board_s = start_s + true_s * (1.0 + ppm * 1e-6)
+        arrived = max(arrived, true_s + late(chance))
+        if chance.random() < loss:
+            continue
+        if kind == "pose":
+            pose_s = round(board_s, 5)
+            assert clock.see(pose_s, arrived)
+            stamp_s = clock.host_s(pose_s)
+        elif clock.known:
+            stamp_s = min(arrived, clock.host_s(imu.sampled_s(clock.board_s(arrived), pose_s)))
+        if true_s > 4.0:
+            off[kind].append(stamp_s - true_s)
+    assert within(off["pose"]) < 5e-5
+    assert within(off["imu"]) < imu_s
+    assert clock.skew_ppm == pytest.approx(ppm, abs=8.0)
+
+
+def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
+    """A lost digit; but two that agree are those of a board that has restarted."""
+    clock = TeensyClock()
+    assert all(clock.see(100.0 + 0.02 * n, 5.0 + 0.02 * n) for n in range(50))
+    assert not clock.see(10.98, 6.0)
+    assert clock.see(101.02, 6.02)
+    assert not clock.see(0.1, 6.1)
+    assert clock.see(0.12, 6.12)
+    assert clock.restarted
+
+
+def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
+    """Whatever the clock says."""
+    stamped = StampedReadings()
+    stamped.begin()
+    reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    for stamp_s in (1.0, 0.9, 5.0):
+        stamped.add(reading, stamp_s, 2.0)
+    stamps = stamped.stamps(stamped.readings, 2.0, None)
+    assert stamps == sorted(set(stamps))
+    assert stamps[-1] == 2.0
+
+
+def test_a_sample_is_a_gyro_line_and_the_acceleration_behind_it() -> None:
+    """Where either is lost there is none, and the next is whole again."""
+    imu = ImuPairing("g")
+    imu.gyro(Gyro(180.0, 0.0, -180.0), 1.0)
+    reading = imu.acceleration(Acceleration(0.0, 0.0, 1.0), 1.0)
+    assert reading is not None
+    assert reading.angular_velocity == pytest.approx((math.pi, 0.0, -math.pi))
+    assert reading.specific_force == pytest.approx((0.0, 0.0, 9.80665))
+    assert imu.acceleration(Acceleration(0.0, 0.0, 1.0), 1.01) is None
+    imu.gyro(Gyro(0.0, 0.0, 0.0), 1.02)
+    imu.gyro(Gyro(1.0, 0.0, 0.0), 1.03)
+    assert imu.acceleration(Acceleration(0.0, 0.0, 1.0), 1.04) is None
+    imu.gyro(Gyro(1.0, 0.0, 0.0), 1.05)
+    assert imu.acceleration(Acceleration(0.0, 0.0, 1.0), 1.0501) is not None
+
+
+@pytest.mark.parametrize("sums", [True, False])
+def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
+    """With stamps 10 ms apart."""
+    bench = nominal(Simulated(firmware=Firmware(sums=sums)))
+    bench.events.clear()
+    bench.run(3.0)
+    stamps = [estimate.stamp_s for estimate in bench.imu]
+    assert len(stamps) == pytest.approx(300, abs=2)
+    steps = [b - a for a, b in itertools.pairwise(stamps)]
+    assert max(steps) < 0.0115
+    assert min(steps) > 0.0085
+
+
+def test_the_logarithm_leads_to_the_pose() -> None:
+    """The tangents that the odometry tells are those of the plane."""
+    way = Pose(0.3, 0.1, 0.7)
+    assert roll(log_of(way)).way_to(way).way_m < 1e-12
