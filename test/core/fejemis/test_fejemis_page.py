@@ -1,0 +1,203 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Every line of both help lists: a golden line, and what it is used for, or why for nothing."""
+
+import math
+import re
+from dataclasses import dataclass
+
+import pytest
+from fejemis_bench import DRIVE, FRONT, nominal
+from test_fejemis_lines import GOLDEN
+
+from omnibot_driver.core.fejemis.codec import parse
+from omnibot_driver.core.fejemis.configuration import ASKED as CONFIGURED
+from omnibot_driver.core.fejemis.front_wheel import relay_text
+from omnibot_driver.core.fejemis.half import STREAMS
+from omnibot_driver.core.fejemis.machine import lift_line
+from omnibot_driver.core.fejemis.motion_lines import STOP
+from omnibot_driver.core.fejemis.polls import ASKED as POLLED
+from omnibot_driver.core.fejemis.readings import Job
+from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
+from omnibot_driver.simulator.fejemis.help_text import DRIVE_HELP, FRONT_HELP
+
+
+@dataclass(frozen=True)
+class Row:
+    """``golden``: a line as it is sent or heard. ``use``: a topic, service, parameter or key."""
+
+    golden: str
+    use: str
+
+
+NONE = "none: "
+BUS = f"{NONE}set-up of the servo bus, which the steering controller uses"
+DEBUG = f"{NONE}debug print"
+SAID: dict[str, Row] = {
+    "rc": Row("rc 2 0 0", "topic cmd_vel"),
+    "fwl": Row("fwl 10.40", "relayed to drive"),
+    "confs": Row("confs 0.4 0.42", "parameters track, steering_distance"),
+    "stop": Row("stop", "services ~/estop, ~/pause"),
+    "start": Row("start", "services ~/start, ~/estop"),
+    "off": Row("off 10", "service ~/power_off"),
+    "on": Row("on", "service ~/start calls a power off back"),
+    "leave": Row("leave", "when a board is found: what others have subscribed"),
+    "gyroc": Row("gyroc", "service ~/calibrate_gyro"),
+    "acccal2": Row("acccal2", "service ~/calibrate_accelerometer"),
+    "magcal": Row("magcal 1 2 3 1 0 0 0 1 0 0 0 1", "parameter mag_calibration"),
+    "acccal": Row("acccal 0.1 0.2 0.3 1 1 1", "parameter accel_calibration"),
+    "confw": Row("confw 0.08 0.081 20 48 0.41", "parameters wheel_radii, gear, encoder_ticks"),
+    "hcsr": Row("hcsr", "topic range/sonar"),
+    "eew": Row("eew", "service ~/save_configuration"),
+    "eer": Row("eer", "service ~/load_configuration"),
+    "brush": Row("brush 1", "service ~/brush"),
+    "ledb": Row("ledb 255 128 0", "topic led_cmd"),
+    "ledon": Row("ledon 1", "topic led_cmd"),
+    "leds": Row("leds", "topic led_cmd, given back at the end"),
+    "led": Row("led 0 255 128 0", f"{NONE}led_cmd sets all twelve at once, by ledb"),
+    "motv": Row("motv 5.9 .499", "topic lift_cmd"),
+    "irc": Row("irc 40000 13000 41000 12000", "parameter ir_calibration"),
+    "fwoffset": Row("fwoffset 2.5 0", "parameters front_wheel_offset, front_wheel_inverted"),
+    "cssteer": Row("cssteer 1 40 0 0 0 1 1 0.15 0.05", "parameter steering_gains"),
+    "sub": Row("sub fwl 15", "whatever is subscribed"),
+    "enc0": Row("enc0", f"{NONE}~/reset_odometry moves the driver's own origin; see the docs"),
+    "log": Row("log pose 1", DEBUG),
+    "pds": Row("pds", DEBUG),
+    "read": Row("read 1", DEBUG),
+    "help": Row("help", f"{NONE}help"),
+    "setid": Row("setid 90", f"{NONE}setid, as 0 erases the board"),
+    "setname": Row("setname drive", f"{NONE}setid's companion; the name is in diagnostics"),
+    "pwmf": Row("pwmf 15000", f"{NONE}pwmf"),
+    "svp": Row("svp 512 0", BUS),
+    "svv": Row("svv 0 0", BUS),
+    "svat": Row("svat 0", BUS),
+    "svar": Row("svar 0", BUS),
+    "svjt": Row("svjt 0", BUS),
+    "svb": Row("svb 115200", BUS),
+    "svscan": Row("svscan 0", BUS),
+}
+HEARD: dict[str, str] = {
+    "hbt": "identity, ~/state, restarts, diagnostics",
+    "id": "diagnostics id",
+    "ver": "diagnostics ver",
+    "adc": "diagnostics adc",
+    "int": "diagnostics int",
+    "time": "diagnostics time",
+    "amp": "diagnostics amp",
+    "cur": "diagnostics cur",
+    "bat": "topic battery_state",
+    "cvdrive": "diagnostics cvdrive",
+    "cpdrive": "diagnostics cpdrive",
+    "cvsteer": "diagnostics cvsteer",
+    "cpsteer": "parameter steering_gains, diagnostics cpsteer",
+    "confs": "parameters track, steering_distance, diagnostics confs",
+    "conf": "parameters of the wheels, diagnostics conf",
+    "gyro": "topic imu/data_raw",
+    "acc": "topic imu/data_raw",
+    "gyroo": "service ~/calibrate_gyro, diagnostics gyroo",
+    "acco": "service ~/calibrate_accelerometer, diagnostics acco",
+    "mag": "topic imu/mag",
+    "magw": "diagnostics magw",
+    "mago": "parameter mag_calibration, diagnostics mago",
+    "imupose": "topic imu/data",
+    "enc": "diagnostics enc",
+    "pose": "topic odom",
+    "vel": "topic odom",
+    "tofd": "topic range/tof",
+    "tof1": "diagnostics tof1",
+    "sr04": "topic range/sonar",
+    "ir": "topics range/ir1, range/ir2, parameter ir_calibration",
+    "mot": "diagnostics mot",
+    "svp": "diagnostics svp",
+    "svjt": "diagnostics svjt",
+    "fwl": "joint_states, relayed to drive",
+    "fwo": "parameters front_wheel_offset, front_wheel_inverted, diagnostics fwo",
+}
+
+
+def listed(text: str) -> tuple[set[str], set[str]]:
+    """Commands and subscriptions of a help list."""
+    said, heard = set(), set()
+    for line in text.splitlines():
+        if not line.startswith("  "):
+            continue
+        words = line.split()
+        if found := re.search(r"'sub (\w+) N'", line):
+            heard.add(found[1])
+        else:
+            said.add(words[0])
+    return said, heard
+
+
+@pytest.mark.parametrize("text", [DRIVE_HELP, FRONT_HELP], ids=["drive", "front"])
+def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
+    """Said or heard."""
+    said, heard = listed(text)
+    assert said <= SAID.keys()
+    assert heard <= HEARD.keys()
+    assert len(said) > 15
+    assert len(heard) > 15
+
+
+def test_no_row_is_of_something_else() -> None:
+    """Each is in one of the lists, or how these are subscribed."""
+    drive, front = listed(DRIVE_HELP), listed(FRONT_HELP)
+    assert SAID.keys() - {"sub"} <= drive[0] | front[0]
+    assert HEARD.keys() <= drive[1] | front[1]
+
+
+@pytest.mark.parametrize("keyword", HEARD)
+def test_every_message_has_a_golden_line_and_is_asked_for(keyword: str) -> None:
+    """By a subscription, a poll or with the configuration."""
+    golden = [text for text in GOLDEN if text.split()[0] == keyword]
+    assert golden
+    assert parse(golden[0]) is not None
+    asked = {key for streams in STREAMS.values() for key in streams}
+    asked |= {
+        t.decode()[:-1] for table in (CONFIGURED, POLLED) for ts in table.values() for t in ts
+    }
+    assert keyword in asked
+
+
+def said_by_the_driver() -> set[str]:
+    """All lines of a session in which everything is asked for."""
+    written: dict[Written, tuple[float, ...]] = {
+        Written.WHEELS: (0.08, 0.081, 20.0, 48.0, 0.41),
+        Written.STEERING: (0.4, 0.42),
+        Written.FRONT_WHEEL: (2.5, 0.0),
+        Written.INFRARED: (40000.0, 13000.0, 41000.0, 12000.0),
+        Written.MAGNETOMETER: (1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        Written.ACCELEROMETER: (0.1, 0.2, 0.3, 1.0, 1.0, 1.0),
+        Written.STEERING_GAINS: (1.0, 40.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.15, 0.05),
+    }
+    bench = nominal(settings=FejemisSettings(written=written))
+    bench.board.set_brush(True, bench.now)
+    bench.board.set_led(255, 128, 0, bench.now)
+    bench.settle()
+    for job in Job:
+        bench.board.ask(job, None, bench.now)
+        bench.settle()
+        bench.run(6.0 if job is not Job.POWER_OFF else 0.5)
+    bench.estop(True)
+    bench.estop(False)
+    for packets in (bench.board.start(), bench.board.farewell()):
+        bench.written += [(bench.now, channel, data) for channel, data in packets]
+    said = {text for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
+    said |= {relay_text(math.radians(10.4)).decode(), lift_line(6.0, 0.5)[0].decode()}
+    return said
+
+
+def test_every_command_is_said_as_its_golden_line_or_never() -> None:
+    """And ``setid`` is not among them."""
+    said = said_by_the_driver()
+    assert STOP.decode() == SAID["rc"].golden
+    words = {text.split()[0] for text in said}
+    for keyword, row in SAID.items():
+        if row.use.startswith(NONE):
+            assert keyword not in words, keyword
+        elif keyword == "motv":
+            assert any(text.startswith("motv") for text in said)
+        else:
+            assert row.golden in said, row
+    asked = {key for streams in STREAMS.values() for key in streams}
+    assert {text.split()[1] for text in said if text.startswith("sub ")} == asked
