@@ -13,6 +13,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from omnibot_driver.core.mart.moment import Moment
 from omnibot_driver.core.mart.replies import Fail, Ok, Other, Reply
 from omnibot_driver.core.mart.words import (
     CONFLICT,
@@ -34,6 +35,9 @@ QUICKEST_S: Final = 0.1
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
 """A query that was not answered may have been given up too soon: the next is waited for longer."""
+SLOW_S, DISTURBED_S = 0.06, 5.0
+"""A network on which an exchange takes longer, or a datagram is lost or comes twice, may do so
+again: for so long no reply is taken to belong to the last question for certain."""
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Asked at once, whatever reply may still come."""
 
@@ -57,14 +61,14 @@ class Pending:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A reply with what it answers. ``took_s``: from the sending to the arrival; ``doubtful``: it
-    may be the late reply to something else.
+    """A reply with what it answers. ``took_s``: from the sending to the arrival; ``when``: what it
+    tells was so.
     """
 
     request: Request
     reply: Ok | Fail
     took_s: float
-    doubtful: bool = False
+    when: Moment
 
     @property
     def word(self) -> Word:
@@ -89,6 +93,7 @@ class Conversation:
         self._copies_until_s: dict[Form, float] = {}
         self._answers: dict[Word, tuple[str, float]] = {}
         self.trip_s = 0.0
+        self._disturbed_s = -math.inf
 
     def may_ask(self, word: Word, now: float) -> bool:
         """Whether nothing is asked, and no late reply can be taken for its own."""
@@ -108,6 +113,15 @@ class Conversation:
             for each in (self._copies_until_s, self._owed_until_s)
         ]
         return max(until) - word.least_s
+
+    def disturbed(self, now: float) -> bool:
+        """Whether the network has shown lately that it loses, doubles or delays datagrams."""
+        return now < self._disturbed_s + DISTURBED_S
+
+    def owes(self, form: Form, now: float) -> None:
+        """A reply of this form may still be on its way."""
+        until_s = now + self.delay_s
+        self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
 
     def settle(self, now: float) -> None:
         """The server has answered the latest of all: earlier replies are on their way, or lost."""
@@ -142,6 +156,7 @@ class Conversation:
             return None
         if self.pending.word.kind is Kind.QUERY:
             self.trip_s = min(self.delay_s, LOSS * self.trip_s + LOSS_S)
+            self._disturbed_s = now
         return self.give_up(now)
 
     def hear(self, reply: Reply, now: float) -> Answer | None:
@@ -153,13 +168,20 @@ class Conversation:
             self.discarded += 1
             if isinstance(reply, Ok):
                 self._owed_until_s.pop(reply.form, None)
+                self._disturbed_s = now
             return None
         self.pending = None
         took_s = now - pending.sent_s
         if pending.word.kind is Kind.QUERY:
             self.trip_s += SMOOTHING * (took_s - self.trip_s)
-        doubtful = self._owed(pending.word, now) or self._is_copy(pending.word, reply, now)
-        return Answer(pending.request, reply, took_s, doubtful)
+        if pending.word in PRESSING and isinstance(reply, Ok) and took_s > SLOW_S:
+            self._disturbed_s = now
+        doubtful = self._is_copy(pending.word, reply, now) or self._owed(pending.word, now)
+        from_s = pending.sent_s
+        if doubtful or self.disturbed(now):
+            from_s = min(from_s, now - self.delay_s)  # an answer to a question before
+        when = Moment(now - took_s / 2, from_s, now, doubtful)
+        return Answer(pending.request, reply, took_s, when)
 
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Whether another command was answered alike just now; its reply may have come twice."""

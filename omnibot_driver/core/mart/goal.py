@@ -27,6 +27,49 @@ MOST_MOVES: Final = 9
 """A goal that is not reached by then is left as it is."""
 
 
+LEAST_LIKE: Final = 0.35
+"""A move does what was asked, but for that part."""
+SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
+"""How long a move takes, about; half as fast where it is slow."""
+LONGER: Final = 1.4
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """A controlled move that is over: what was asked, what was counted since it began, and how long
+    it lasted. ``quiet_s``: how long a copy of it may have run before it was counted.
+    """
+
+    request: Request
+    way_m: float
+    turned_rad: float
+    lasted_s: float
+    quiet_s: float
+
+    @property
+    def is_straight(self) -> bool:
+        """Else it is a turn on the spot."""
+        return self.request.word in (TF, TB)
+
+    @property
+    def asked(self) -> float:
+        """In m or rad."""
+        number = float(self.request.data.split()[-1])
+        return number * INCH_M if self.is_straight else math.radians(number)
+
+    def may_have_run_twice(self, delay_s: float) -> bool:
+        """Whether a copy of it may have come, on a network that doubles datagrams; the count then
+        tells of the copy alone.
+        """
+        seen = abs(self.way_m if self.is_straight else self.turned_rad)
+        number = float(self.request.data.split()[-1])
+        slow = 2 if b"SLOW" in self.request.data.split() else 1
+        usual_s = SETTLES_S + slow * number * (S_PER_IN if self.is_straight else S_PER_DEG)
+        like = abs(seen - self.asked) <= LEAST_LIKE * self.asked
+        short = self.lasted_s <= LONGER * usual_s + 2 * delay_s
+        return not (like and short and self.quiet_s < usual_s / 2)
+
+
 class Surplus:
     """By how much controlled moves go beyond what was asked, as they were measured.
 

@@ -85,6 +85,7 @@ class Ground:
         self._moved_last = False
         self._copies_stopped_s = -math.inf
         self._moved_by: Request | None = None
+        self._last_move: Request | None = None
         self._started_s = self._begun_s = self._harmful_s = self._halted_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
         self._spin_radps = self._spin_seen_radps = 0.0
@@ -122,8 +123,7 @@ class Ground:
 
     def told(self, now: float) -> OdometryReading:
         """The odometry, predicted to this time."""
-        slowing_s = self._stopping.began_s if self._stopping is not None else None
-        return self.odometry.told(now, blind_since_s=self.blind_since_s, slowing_since_s=slowing_s)
+        return self.odometry.told(now, blind_since_s=self.blind_since_s)
 
     def take(self) -> list[Reading]:
         """What came of the replies since the last call."""
@@ -137,7 +137,7 @@ class Ground:
         self._rescue = False
         self.state, self.motion = State.STILL, Motion.NONE
         self._start = None
-        self.odometry.stands = True
+        self.odometry.stand(now)
         self.commanded = STANDING
         self._fresh = False
         self._polls.press(words.RMRA)
@@ -147,11 +147,17 @@ class Ground:
         self._next_s = -math.inf
 
     @property
+    def _rolled_out(self) -> bool:
+        """Whether all that the last motion has done is counted."""
+        odometry = self.odometry
+        return odometry.wheel.from_s >= self._rested_s and odometry.motion is Motion.NONE
+
+    @property
     def _heading_first(self) -> bool:
         """After RM the last heading comes before the last count, which ends the motion."""
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE
-        return by_reference and odometry.heading_s < self._rested_s
+        return by_reference and odometry.heading.from_s < self._rested_s
 
     def _require(self, word: Word) -> None:
         """Whatever is sent is in the table; anything else is a defect, and is not sent."""
@@ -181,6 +187,11 @@ class Ground:
         if text not in self._told:
             self._told.add(text)
             self._notice(text, halt=False)
+
+    @property
+    def _late_s(self) -> float:
+        """How late a datagram is, about, on the way there."""
+        return min(self._delay_s, self.conversation.trip_s)
 
     @property
     def _delay_s(self) -> float:

@@ -14,6 +14,7 @@ from omnibot_driver.core.commands.orders import EmergencyStop
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
 from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S
+from omnibot_driver.core.mart.moment import Moment
 from omnibot_driver.core.mart.replies import Fail, Ok, Reply, signed
 from omnibot_driver.core.mart.starts import Starts
 from omnibot_driver.core.mart.states import (
@@ -139,11 +140,14 @@ class Pilot(Starts):
 
         SL and SS would hang a server that drives by RM or B; but the last motion was none of these.
         """
-        suspected = self._moved_last and self.odometry.counted_s < self._rested_s
+        suspected = self._moved_last and self.odometry.wheel.from_s < self._rested_s
         if self.state is not State.STILL or not suspected:
             return math.inf
         apart_s = self._halted_s + self._delay_s
-        return max(self._rested_s + COPY_S, self._copies_stopped_s + REPEAT_S, apart_s)
+        silent_s = COPY_S
+        if self.odometry.wheel.told_s >= self._rested_s:  # maybe by a late reply
+            silent_s += 2 * self._delay_s
+        return max(self._rested_s + silent_s, self._copies_stopped_s + REPEAT_S, apart_s)
 
     def hear(self, data: bytes, now: float) -> None:
         """A datagram of the command port."""
@@ -164,7 +168,7 @@ class Pilot(Starts):
         if self._stopping is not None:
             if isinstance(reply, Ok):
                 self.conversation.heard(reply.form, now)
-            if self._stopping.hear(reply, now):
+            if not self._may_be_count(reply, now) and self._stopping.hear(reply, now):
                 self._stopped(now)
             return
         answer = self.conversation.hear(reply, now)
@@ -189,9 +193,8 @@ class Pilot(Starts):
 
     def _answered(self, answer: Answer, now: float) -> None:
         word, reply = answer.word, answer.reply
-        at_s = now - answer.took_s / 2
         if word.kind is Kind.QUERY:
-            self._measured(answer, at_s, now)
+            self._measured(answer, now)
         elif word.kind is Kind.CHECK:
             self._checked(answer, now)
         elif word.kind is Kind.START:
@@ -200,7 +203,7 @@ class Pilot(Starts):
             if isinstance(reply, Fail):
                 self._halt(now, self._obstacle(reply, self.motion))
             elif reply.form is Form.DECIMAL:
-                self.odometry.turned(reply.number, at_s, doubtful=answer.doubtful)
+                self.odometry.turned(reply.number, answer.when)
         elif word.kind is Kind.MOVE:
             self._moved(reply, now)
         elif word is words.SSP:
@@ -221,39 +224,45 @@ class Pilot(Starts):
         elif word.kind is Kind.SERVICE:
             self.state = State.STILL
             self.jobs.missed(word, now)
+        elif word.kind is Kind.CHANGE:
+            self.loop.missed()
         else:
             self._polls.press(word)
 
-    def _measured(self, answer: Answer, at_s: float, now: float) -> None:
+    def _measured(self, answer: Answer, now: float) -> None:
         word, reply = answer.word, answer.reply
         if isinstance(reply, Fail):
             if word is words.ENC:
                 self.health.encoder_failed()
             return
         if word is words.ENC:
-            self._counted(signed(int(reply.number)), at_s, now, doubtful=answer.doubtful)
+            self._counted(signed(int(reply.number)), answer.when, now)
         elif word is words.RMRA:
-            self.odometry.turned(reply.number, at_s, doubtful=answer.doubtful)
-            changed = self.odometry.heading_changed_s == at_s and not answer.doubtful
-            if changed and self.state in (State.REVERSING, State.TURNING):
+            changed = self.odometry.turned(reply.number, answer.when)
+            certain = answer.when.from_s >= self._begun_s and not answer.when.doubtful
+            if changed and certain and self.state in (State.REVERSING, State.TURNING):
                 self.health.heading_changed(self.motion)
         else:
             self.readings += self.health.measured(word, reply, now)
             self.loop.volts = self.health.volts_or(self._settings.nominal_volts)
 
-    def _counted(self, count: int, at_s: float, now: float, *, doubtful: bool) -> None:
-        before = self.odometry.count
-        reading = self.odometry.counted(count, at_s, doubtful=doubtful)
+    def _counted(self, count: int, when: Moment, now: float) -> None:
+        wheel = self.odometry.wheel
+        before = None if wheel.may_begin_anew else wheel.last
+        reading = self.odometry.counted(count, when)
         if reading is None:
             return
         self.health.encoder_answers()
         self.readings.append(reading)
         _speed, rate = self.odometry.speeds
         if self.state is State.STILL:
-            if self._moved_by is not None and self.odometry.motion is not Motion.NONE:
+            rested = when.from_s >= self._rested_s and self.odometry.wheel.certain
+            if self._moved_by is not None and rested and self.odometry.motion is not Motion.NONE:
                 self._surplus.learn(self._moved_by, self.odometry.moved_m, self.odometry.spun_rad)
                 self._moved_by = None
-            self.odometry.rest()
+            if rested and self.odometry.motion is not Motion.NONE:
+                self._doubt_a_copy(now)
+                self.odometry.rest()
             self._watch_stray(before, count, now)
         elif self.state is State.TURNING:
             self._spin_seen_radps = rate

@@ -31,6 +31,10 @@ HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
 """A change of the turn rate takes so long; its lag is no error to be made good."""
 NEW_RADPS: Final = 0.03
+UNEQUAL: Final = 0.04
+"""Of two motors, where nothing but what is commanded tells of a turn."""
+COPIED, MISSED, SLOW_TRIP_S = 0.1, 0.5, 0.03
+"""How probable it is that a change came twice on a slow network, or did not come."""
 LONGEST_STEP_S: Final = 0.2
 
 
@@ -57,7 +61,8 @@ class _Side:
 
 class SpeedLoop:
     """``settings`` may be replaced; ``volts`` is the battery's, as last told; ``trip_s``: what an
-    exchange takes, by which the times of measurements are uncertain.
+    exchange takes, by which the times of measurements are uncertain; ``part``: by which the last
+    change has changed the sides against each other.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -74,6 +79,8 @@ class SpeedLoop:
         self._rate_radps = self._error_rad = 0.0
         self._rate_changed_s = now
         self._measured_s = now
+        self._unsure = 0.0
+        self.part = 0.0
         self._clear(now + SETTLE_S)
 
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
@@ -102,6 +109,11 @@ class SpeedLoop:
         """Of the wheels' speeds, by the units and the learned gains of both motors."""
         right = self._right.units * self._right.gain
         return self._left.units * self._left.gain / right if right else 1.0
+
+    @property
+    def bend(self) -> float:
+        """Standard deviation of ``left_over_right``, as a part."""
+        return math.sqrt(UNEQUAL**2 + self._unsure)
 
     @property
     def balance(self) -> float:
@@ -169,10 +181,16 @@ class SpeedLoop:
 
     def changed(self, right: int, left: int, now: float) -> None:
         """That was sent; it is taken for obeyed, and the measurement tells if it was not."""
+        self.part = abs(right) / max(1, self._right.units) + abs(left) / max(1, self._left.units)
+        self._unsure += (COPIED if self.trip_s > SLOW_TRIP_S else 0.0) * self.part**2
         self._right.units = min(MOST_UNITS, max(0, self._right.units + right))
         self._left.units = min(MOST_UNITS, max(0, self._left.units + left))
         if max(abs(right), abs(left)) >= LARGE_UNITS:
             self._clear(now + SETTLE_S)
+
+    def missed(self) -> None:
+        """The last change was not answered: it was obeyed, or not."""
+        self._unsure += MISSED * self.part**2
 
     @property
     def _per_unit_mps(self) -> float:

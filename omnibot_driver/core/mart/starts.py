@@ -10,8 +10,8 @@ from typing import Final
 from omnibot_driver.core.commands.orders import EmergencyStop, GoTo
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
-from omnibot_driver.core.mart.goal import Move, next_move
 from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S
+from omnibot_driver.core.mart.moves import Moves
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.states import (
     HALTS,
@@ -22,7 +22,6 @@ from omnibot_driver.core.mart.states import (
     Motion,
     State,
 )
-from omnibot_driver.core.mart.stops import Stops
 from omnibot_driver.core.mart.words import Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
@@ -36,7 +35,7 @@ SLOW_UNITS: Final = 20
 """Of B SLOW, R SLOW and L SLOW."""
 
 
-class Starts(Stops):
+class Starts(Moves):
     """The part of the pilot that starts, and adjusts."""
 
     def _act(self, now: float) -> Packets:
@@ -48,6 +47,9 @@ class Starts(Stops):
 
     def _adjust(self, now: float) -> Packets:
         """One change of the motors' units, where the measured speed asks for one."""
+        if self.state is State.DRIVING and not self.odometry.heading.is_known:
+            self._polls.press(words.RMRA)
+            return NO_PACKETS
         self._fresh = False
         _, twist = self._wish(now)
         change = self.loop.change(abs(twist.vx_mps), twist.yaw_rate_radps, now)
@@ -61,12 +63,14 @@ class Starts(Stops):
         self.loop.changed(right, left, now)
         if self.state is State.DRIVING:
             return self._ask(words.RMCS.request(right, left), now)
+        self._predict_turn()
+        self.odometry.guess_changed(self.loop.part, self._late_s)
         return self._ask(words.CS.request(-right, -left), now)
 
     def _act_still(self, now: float) -> Packets:
         if self._rescue:
             return self._begin(words.MCR.request("SLOW", 1), now)
-        if self.odometry.counted_s < self._rested_s:
+        if not self._rolled_out:
             return NO_PACKETS  # how it rolled out is counted before the count begins anew
         if isinstance(self._wanted, EmergencyStop) and now - self._estop_said_s >= ESTOP_REPEAT_S:
             self._estop_said_s = now
@@ -84,7 +88,7 @@ class Starts(Stops):
             return NO_PACKETS
         if packets := self._prepare_spin(start, now):
             return packets
-        if self.odometry.counted_s < self._harmful_s + self._delay_s:
+        if self.odometry.wheel.from_s < self._harmful_s + self._delay_s:
             return NO_PACKETS  # a late copy of a move would have the port now
         if now < self._halted_s + self._delay_s:
             return NO_PACKETS  # a late copy of a stop would end what begins
@@ -145,7 +149,7 @@ class Starts(Stops):
         self._require(word)
         self.state = State.CHECKING
         if word is words.CHECK:
-            self.odometry.zeroed()
+            self.odometry.wheel.may_begin_anew = True
         return self._ask(self.imu.request, now)
 
     def _checked(self, answer: Answer, now: float) -> None:
@@ -181,7 +185,7 @@ class Starts(Stops):
         self.odometry.forget_speeds()
         self.odometry.begin(self.motion, now)
         if start.word.kind is Kind.MOVE:
-            self._moved_by = start
+            self._moved_by = self._last_move = start
             self.state = State.MOVING
             self.commanded = None
         elif self.motion is Motion.REFERENCE:
@@ -206,6 +210,7 @@ class Starts(Stops):
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:
             self.odometry.left_over_right = self.loop.left_over_right
+            self.odometry.bend = self.loop.bend
         elif self.motion in (Motion.SPIN, Motion.TURN):
             self.odometry.left_over_right = -self.loop.balance
         else:
@@ -220,7 +225,7 @@ class Starts(Stops):
         self.health.heading_changes = 0
         self.state = WHILE[self.motion]
         self._begun_s = now
-        self.odometry.heading_changed_s = now
+        self.odometry.started(now)
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
 
@@ -239,36 +244,6 @@ class Starts(Stops):
         if word in (words.R, words.L) and reply.reason == words.UNSUPPORTED:
             self._custom_refused = True
         self._halt(now, f"{word.text} failed ({reply.reason or 'no reason given'}): {why}")
-
-    def _next_goal_move(self, order: GoTo, now: float) -> Request | None:
-        if self._move is None:
-            self._move = Move(order.place)
-        request = next_move(self._move, self.odometry.pose, self._settings, self._surplus)
-        if request is None:
-            self._move.given_up = True  # it is over: whoever pushes the robot away keeps it there
-            return None
-        if request.word in NEEDS_IMU and not self.imu.fresh(now):
-            return request
-        self._move.said += 1
-        return request
-
-    def _moved(self, reply: Ok | Fail, now: float) -> None:
-        """A controlled move is over, by its own reply."""
-        motion = self.motion
-        if motion is Motion.STRAIGHT:
-            self.odometry.finish_straight()
-        self.jobs.moved(reply, now)
-        self._rest(now)
-        if isinstance(reply, Fail):
-            if self._move is not None:
-                self._move.given_up = True
-            self._notice(
-                f"controlled move ended: {reply.reason or 'fail'}; the goal is discarded; clear the"
-                " cause, then send it again",
-                halt=True,
-            )
-            if reply.reason == words.IMU_LOST:
-                self.imu.lost()
 
     def _job(self, now: float) -> Packets:
         request = self.jobs.next(now, stands=self.proof.proved)

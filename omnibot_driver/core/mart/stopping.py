@@ -3,12 +3,14 @@
 """Stopping one motion: what is said until the server has answered it. The stop never waits.
 
 The right word goes out at once, over whatever else was asked, and again until it is answered. A
-start may still be on its way, and be overtaken. So a reply counts only where one of those that came
-must answer a stop that was sent when no copy of the start could come any more. The stop port comes
+start may still be on its way, and be overtaken. So a reply counts only where it must answer a stop
+that was sent when no copy of the start could come any more, and a bare ``ok`` only where none is
+owed to the start; a repeated stop brings a plainer one. The stop port comes
 last, alone: right behind SM or SRM it would race with them, and hang a port. Knows words, replies
 and times; not why it is stopped.
 """
 
+import math
 from typing import Final
 
 from omnibot_driver.core.mart.replies import Fail, Ok, Reply
@@ -16,8 +18,6 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion
 from omnibot_driver.core.mart.words import NO_MOTION, NOT_IN_MOTION, Form, Word
 
 REPEAT_S: Final = 0.3
-LEAST_S: Final = 0.12
-"""No motion is stopped sooner: an earlier reply is another's."""
 ROUNDS: Final = 3
 """So often it is said before the stop port is."""
 STOP_PORT_TIMES: Final = 3
@@ -57,20 +57,19 @@ class Stopping:
         self._delay_s = delay_s
         self._said_s = now
         self._sure_from_s = started_s + delay_s
-        self._needed, self._owed = 1, owed
-        self._heard = 0
+        self._unsure_until_s = -math.inf
+        self._owed = owed > 0
         self._rounds = 0
         self._negative: set[str] = set()
         longest_s = max((word.takes_s for word in HALTS[motion]), default=0.0)
-        self._silent_from_s = now + longest_s + 2 * delay_s
-        if move is not None:
-            self._silent_from_s = now + 3.0 + 2 * delay_s
+        self._patience_s = (3.0 if move is not None else longest_s) + 2 * delay_s
+        self._silent_from_s = now + self._patience_s
 
     def due(self, now: float) -> tuple[Word, ...]:
         """What to say now."""
         if now < self.wake_at:
             return ()
-        silent = self._rounds >= ROUNDS and now >= self._silent_from_s and not self._heard
+        silent = self._rounds >= ROUNDS and now >= self._silent_from_s
         if silent and now <= self._said_s + self._delay_s:
             self.wake_at = self._said_s + self._delay_s + 0.01
             return ()
@@ -81,7 +80,7 @@ class Stopping:
         self._rounds += 1
         self._said_s = now
         if now < self._sure_from_s:
-            self._needed += 1
+            self._unsure_until_s = now + 2 * self._delay_s
         return HALTS[self.motion]
 
     def asks_name(self, now: float) -> bool:
@@ -103,17 +102,17 @@ class Stopping:
             return False  # the stop port may have left the server unable to begin or end anything
         if not self._is_answer(reply):
             return False
-        if now < self.began_s + LEAST_S and isinstance(reply, Ok) and self._owed:
-            self._owed -= 1
+        self._silent_from_s = now + self._patience_s
+        none = isinstance(reply, Fail) and reply.reason in (NO_MOTION, NOT_IN_MOTION)
+        if isinstance(reply, Ok) and self._owed and reply.form is Form.NOTHING:
             return False
-        if isinstance(reply, Fail) and reply.reason in (NO_MOTION, NOT_IN_MOTION):
-            self._negative.add(reply.reason)
-        elif isinstance(reply, Ok | Fail):
+        if isinstance(reply, Ok | Fail) and not none:
             self.result = reply
-        self._heard += 1
-        if self.motion is Motion.UNKNOWN:
-            return len(self._negative) == len(HALTS[Motion.UNKNOWN])
-        return self._heard >= self._needed + self._owed
+        if now < self._unsure_until_s:
+            return False
+        if none and isinstance(reply, Fail):
+            self._negative.add(reply.reason)
+        return self.motion is not Motion.UNKNOWN or len(self._negative) == len(HALTS[self.motion])
 
     def _is_answer(self, reply: Reply) -> bool:
         words = HALTS[self.motion]

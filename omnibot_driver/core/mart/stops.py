@@ -15,7 +15,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.ground import STANDING, Ground
 from omnibot_driver.core.mart.odometry import SLOWING_S
-from omnibot_driver.core.mart.replies import Fail, Ok
+from omnibot_driver.core.mart.replies import Fail, Ok, Reply
 from omnibot_driver.core.mart.speed_loop import turn_is_on_the_spot
 from omnibot_driver.core.mart.states import (
     HALTS,
@@ -36,6 +36,8 @@ NO_START_S: Final = 1.5
 """A wheel that is driven turns by then."""
 SPIN_RATIO: Final = 0.35
 """A turn on the spot keeps its speed; one that is commanded so much otherwise starts anew."""
+SPIN_RAD, SPIN_PART = 0.15, 0.4
+"""What a stop tells of a turn on the spot is that near to what was counted and commanded."""
 LOST_REPEAT_S: Final = 1.0
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 """A slower command stands still."""
@@ -107,12 +109,12 @@ class Stops(Ground):
             return ""
         odometry = self.odometry
         blind_s = BLIND_S + TRIPS * self.conversation.trip_s
-        if self._heading_is_told and now - max(odometry.heading_s, self._begun_s) > blind_s:
+        if self._heading_is_told and now - max(odometry.heading.told_s, self._begun_s) > blind_s:
             return "the relative heading is not answered while the robot drives"
-        if now - max(odometry.counted_s, self._begun_s) > blind_s:
+        if now - max(odometry.wheel.told_s, self._begun_s) > blind_s:
             return "the encoder is not answered while the robot drives"
         if (
-            odometry.counted_s - self._begun_s > NO_START_S
+            odometry.wheel.told_s - self._begun_s > NO_START_S
             and abs(odometry.speeds[0]) + abs(odometry.speeds[1]) < 1e-3
         ):
             return "the robot is driven and does not move"
@@ -129,7 +131,7 @@ class Stops(Ground):
     def _frozen_s(self) -> float:
         """For how long of this motion the headings that came have been the same."""
         odometry = self.odometry
-        return odometry.heading_s - max(odometry.heading_changed_s, self._begun_s)
+        return odometry.heading.told_s - max(odometry.heading.changed_s, self._begun_s)
 
     def _halt(self, now: float, why: str = "") -> None:
         """Stop what is, or may be, under way."""
@@ -140,6 +142,7 @@ class Stops(Ground):
         owed = int(pending is not None and any(form in answers for form in pending.word.forms))
         self.conversation.give_up(now)
         move = self._start if self.motion in (Motion.STRAIGHT, Motion.TURN) else None
+        self.odometry.stopping(now)
         self._stopping = Stopping(
             self.motion,
             now,
@@ -176,6 +179,8 @@ class Stops(Ground):
         self._moved_by = None  # it was cut short
         self.conversation.settle(now)
         assert stopping is not None
+        if Form.INTEGER in ANSWERS.get(stopping.motion, ()):
+            self.conversation.owes(Form.INTEGER, now)
         result, motion = stopping.result, stopping.motion
         if motion is Motion.SPIN and isinstance(result, Ok) and result.form is Form.INTEGER:
             self._spin_over(result.number, stopping.began_s, now)
@@ -189,16 +194,32 @@ class Stops(Ground):
             self.greeted = True
         self._rest(now)
 
+    def _may_be_count(self, reply: Reply, now: float) -> bool:
+        """Whether a number that comes while a turn on the spot is stopped is no answer to the stop:
+        it is not the angle that the robot can have turned, so the encoder has told it before.
+        """
+        stopping = self._stopping
+        assert stopping is not None
+        if stopping.motion is not Motion.SPIN or not isinstance(reply, Ok):
+            return False
+        if reply.form is not Form.INTEGER:
+            return False
+        odometry, trip_s = self.odometry, self.conversation.trip_s
+        spun_rad = odometry.spun_rad
+        unseen_s = max(0.0, stopping.began_s - max(odometry.wheel.told_s, self._started_s))
+        expected_rad = spun_rad + self._spin_radps * unseen_s
+        if abs(reply.number) <= 1 and abs(expected_rad) > SPIN_RAD:
+            return True  # MCSTAT, or a sonar
+        told_rad = math.radians(reply.number) * self._settings.heading_sign
+        most_rad = SPIN_RAD + SPIN_PART * abs(expected_rad) + abs(self._spin_radps) * 2 * trip_s
+        return abs(told_rad - expected_rad) > most_rad
+
     def _spin_over(self, degrees: float, stopped_s: float, now: float) -> None:
         odometry = self.odometry
-        uncounted_s = max(0.0, stopped_s - odometry.counted_s) + SLOWING_S
+        uncounted_s = max(0.0, stopped_s - odometry.wheel.told_s) + SLOWING_S
         rolled_rad = self._spin_seen_radps * uncounted_s
         spun_rad = odometry.spun_rad
-        unseen_s = max(0.0, stopped_s - max(odometry.counted_s, self._started_s))
-        expected_rad = spun_rad + self._spin_radps * unseen_s
-        if abs(math.radians(degrees) - expected_rad) > 0.3 + 0.4 * abs(expected_rad):
-            return
-        self.odometry.spin_told(degrees)
+        odometry.spin_told(degrees)
         seconds = now - self._begun_s
         if seconds > 1.0 and self._spin_units and abs(spun_rad) > 0.3:
             whole_rad = abs(spun_rad + rolled_rad)

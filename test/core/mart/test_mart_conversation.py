@@ -2,12 +2,15 @@
 
 """Replies, and which request each belongs to. Texts as the running server was seen to send them."""
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver.core.mart import Fail, Form, MartDecoder, MartSettings, Ok, Other, parse, words
 from omnibot_driver.core.mart.conversation import Conversation
+from omnibot_driver.core.mart.moment import Moment
 from omnibot_driver.core.mart.odometry import MartOdometry
 from omnibot_driver.core.mart.replies import signed
 from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, MAY_SAY, Motion, State, may_say
@@ -62,7 +65,7 @@ def test_a_reply_answers_the_pending_request() -> None:
     answer = talk.hear(parse(b"ok 123"), 1.01)
     assert answer is not None
     assert (answer.word, answer.took_s) == (words.ENC, pytest.approx(0.01))
-    assert not answer.doubtful
+    assert not answer.when.doubtful
     assert talk.pending is None
 
 
@@ -124,7 +127,7 @@ def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
     talk.ask(words.ENC.request(), 2.1)
     answer = talk.hear(parse(b"ok 7"), 2.2)
     assert answer is not None
-    assert answer.doubtful
+    assert answer.when.doubtful
     assert talk.may_ask(words.SRC, 2.9)
 
 
@@ -168,11 +171,22 @@ def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> Non
 
 
 def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
-    """Both are a bare ok."""
+    """Both are a bare ok, which may come twice; the second stop is answered otherwise."""
     stop = stopping(Motion.REFERENCE, owed=1)
     stop.due(10.0)
     assert not stop.hear(parse(b"ok"), 10.05)
-    assert stop.hear(parse(b"ok"), 10.5)
+    assert not stop.hear(parse(b"ok"), 10.2)
+    assert stop.hear(parse(b"fail no motion in progress"), 10.5)
+
+
+def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
+    """It answers a stop that the start has overtaken; no copy of it is later than 0.6 s."""
+    stop = stopping(Motion.REVERSE, started_s=9.9)
+    assert stop.due(10.0) == (words.SM,)
+    assert stop.due(10.3) == (words.SM,)
+    for late_s in (10.1, 10.35, 10.59):
+        assert not stop.hear(parse(b"fail no motion"), late_s)
+    assert stop.hear(parse(b"fail no motion"), 10.61)
 
 
 def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
@@ -191,13 +205,68 @@ def test_a_count_below_zero_may_come_without_its_sign() -> None:
     assert [signed(n) for n in (0, 5, -5, 4294967295, 4294966872)] == [0, 5, -5, -1, -424]
 
 
+def at(at_s: float, spread_s: float = 0.01) -> Moment:
+    return Moment(at_s, at_s - spread_s / 2, at_s + spread_s / 2)
+
+
 def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
-    """Neither there nor back."""
+    """And the way goes on from the one before."""
     odometry = MartOdometry(MartSettings())
     odometry.begin(Motion.REFERENCE, 0.0)
     for count, at_s in ((0, 0.1), (50, 0.2), (4_000_000, 0.3), (100, 0.4), (150, 0.5)):
-        odometry.counted(count, at_s, doubtful=False)
-    assert odometry.pose.x_m == pytest.approx(100 * 0.0004)
+        odometry.counted(count, at(at_s))
+    assert odometry.pose.x_m == pytest.approx(150 * 0.0004)
+
+
+def test_a_count_from_before_the_motion_moves_nothing() -> None:
+    """A late reply, and the count of a server to which the start did not come."""
+    odometry = MartOdometry(MartSettings())
+    odometry.counted(0, at(0.5))
+    odometry.begin(Motion.REFERENCE, 1.0)
+    odometry.counted(1000, at(3.0))
+    odometry.stand(4.0)
+    odometry.counted(1000, at(4.5))
+    odometry.rest()
+    way_m = odometry.pose.x_m
+    odometry.begin(Motion.REFERENCE, 5.0)
+    assert odometry.counted(990, at(5.1, 0.3)) is None
+    odometry.counted(1000, at(6.0))
+    assert odometry.pose.x_m == way_m
+
+
+@pytest.mark.parametrize("stale", [300, 0, -1])
+def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
+    """On a network of which it is known that it delays and doubles."""
+    odometry = MartOdometry(MartSettings())
+    odometry.counted(0, at(0.5))
+    odometry.begin(Motion.REFERENCE, 1.0)
+    for count, at_s in ((200, 2.0), (400, 2.5), (stale, 2.6), (500, 2.8)):
+        odometry.counted(count, at(at_s, 0.3))
+    assert odometry.pose.x_m == pytest.approx(500 * 0.0004)
+
+
+def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
+    """A late count was taken for the angle."""
+    odometry = MartOdometry(MartSettings())
+    odometry.counted(0, at(0.5))
+    odometry.begin(Motion.SPIN, 1.0)
+    odometry.counted(400, at(3.0))
+    odometry.spin_told(3.0)
+    odometry.counted(420, at(4.0))
+    odometry.rest()
+    assert odometry.pose.yaw_rad == pytest.approx(420 * 0.0004 * 2 / 0.4)
+
+
+def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
+    """RM sets it to zero, and was late."""
+    odometry = MartOdometry(MartSettings())
+    odometry.turned(-50.0, at(0.5))
+    odometry.begin(Motion.REFERENCE, 1.0)
+    assert not odometry.turned(-50.0, at(1.5))
+    assert not odometry.heading.is_known
+    odometry.turned(0.1, at(1.8))
+    odometry.turned(10.1, at(2.8))
+    assert odometry.heading.turned_rad(2.8, stands=True) == pytest.approx(math.radians(10.0))
 
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])

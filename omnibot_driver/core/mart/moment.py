@@ -1,0 +1,22 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""When something that was told was so, as far as the network lets it be known. Values only."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """``at_s``: probably; ``from_s``, ``until_s``: between these. ``doubtful``: what was told may
+    be the answer to another question.
+    """
+
+    at_s: float
+    from_s: float
+    until_s: float
+    doubtful: bool = False
+
+    @property
+    def spread_s(self) -> float:
+        """How uncertain it is."""
+        return self.until_s - self.from_s

@@ -1,0 +1,66 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Controlled moves, one after the other to a goal, and what is known of one that is over.
+
+Knows goals and moves; not when they may be said. Time is an argument.
+"""
+
+from omnibot_driver.core.commands.orders import GoTo
+from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.goal import Done, Move, next_move
+from omnibot_driver.core.mart.replies import Fail, Ok
+from omnibot_driver.core.mart.states import NEEDS_IMU, Motion
+from omnibot_driver.core.mart.stops import Stops
+from omnibot_driver.core.mart.words import Request
+
+
+class Moves(Stops):
+    """The part of the pilot that leads to a goal."""
+
+    def _next_goal_move(self, order: GoTo, now: float) -> Request | None:
+        if self._move is None:
+            self._move = Move(order.place)
+        request = next_move(self._move, self.odometry.pose, self._settings, self._surplus)
+        if request is None:
+            self._move.given_up = True  # it is over: whoever pushes the robot away keeps it there
+            return None
+        if request.word in NEEDS_IMU and not self.imu.fresh(now):
+            return request
+        self._move.said += 1
+        return request
+
+    def _moved(self, reply: Ok | Fail, now: float) -> None:
+        """A controlled move is over, by its own reply."""
+        motion = self.motion
+        if motion is Motion.STRAIGHT:
+            self.odometry.finish_straight()
+        self.jobs.moved(reply, now)
+        self._rest(now)
+        if isinstance(reply, Fail):
+            if self._move is not None:
+                self._move.given_up = True
+            self._notice(
+                f"controlled move ended: {reply.reason or 'fail'}; the goal is discarded; clear the"
+                " cause, then send it again",
+                halt=True,
+            )
+            if reply.reason == words.IMU_LOST:
+                self.imu.lost()
+
+    def _doubt_a_copy(self, now: float) -> None:
+        """A copy of a controlled move may have run behind it, and the count begun anew."""
+        move, self._last_move = self._last_move, None
+        if move is None or not self.conversation.disturbed(now):
+            return
+        odometry = self.odometry
+        done = Done(
+            move,
+            odometry.moved_m,
+            odometry.spun_rad,
+            lasted_s=self._rested_s - self._started_s,
+            quiet_s=now - self._rested_s + self._delay_s,
+        )
+        if done.may_have_run_twice(self._delay_s):
+            odometry.doubt.add(
+                *((done.asked**2, 0.0) if done.is_straight else (0.0, done.asked**2))
+            )

@@ -1,0 +1,131 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How far the right wheel has turned, by a count that begins anew with each motion.
+
+A reply may be that to an earlier question, and another number than the count. So a count that does
+not fit is left out; one that comes again and again is taken, as one that tells no way. Knows counts
+and times; no metres per count but the one given. Time is an argument.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.mart.moment import Moment
+
+DOUBT_M, DOUBT_MPS = 0.03, 0.3
+"""A doubtful count is as near as that to what was expected."""
+MOST_M, MOST_MPS = 0.3, 2.0
+"""No wheel goes farther between two counts: one of them is false."""
+STRAY_COUNTS: Final = 3
+"""A robot that stands is counted no farther."""
+UNCERTAIN_S: Final = 0.1
+"""A reply of which no more is known may be one to an earlier question."""
+ODD_TIMES: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """``wheel_m``: since the last count, in ``seconds``. ``lost``: what else the robot has done
+    between is not known. ``unsure``: it may be zero as well.
+    """
+
+    wheel_m: float
+    seconds: float
+    lost: bool = False
+    unsure: bool = False
+
+
+class WheelCount:
+    """``last``: None where nothing was counted; ``told_s``: when, ``from_s``: at the earliest;
+    ``certain``: it is no answer to another question.
+    """
+
+    def __init__(self) -> None:
+        self.last: int | None = None
+        self.told_s = self.from_s = -math.inf
+        self.certain = False
+        self.may_begin_anew = False
+        """The next count may be from zero on, by the check of the IMU."""
+        self._raw: int | None = None
+        self._before: int | None = None
+        self._begins = self._confirmed = self._same = self._unseen = False
+        self._odd = 0
+
+    def begin(self) -> None:
+        """A motion has begun, and the count with it, if the start has come."""
+        self._before, self.last = self.last, 0
+        self.may_begin_anew = self._begins = True
+        self.certain = self._confirmed = self._same = False
+
+    def started(self) -> None:
+        """The server has answered that it has."""
+        self._confirmed = True
+
+    def connect(self) -> None:
+        """The server was not heard for long: it may have gone on, or have begun anew."""
+        self.may_begin_anew = self._unseen = True
+
+    def rest(self) -> None:
+        """The motion is over."""
+        self.last, self._begins = self._raw, False
+
+    def tell(
+        self,
+        count: int,
+        when: Moment,
+        metres_per_count: float,
+        expected_mps: float,
+        stood_s: float,
+        *,
+        rests: bool,
+    ) -> Step | None:
+        """None for a count that is not believed. ``expected_mps``: of the wheel; ``stood_s``: since
+        when the robot stands; ``rests``: without a motion since.
+        """
+        before, before_s = self.last, self.told_s
+        self.certain = count == before or not when.doubtful
+        if before is None:
+            self._take(count, when)
+            return Step(0.0, 0.0)
+        seconds = max(when.at_s - before_s, 1e-4)
+        if (self.may_begin_anew or rests) and abs(count) <= abs(count - before):
+            before = 0
+        unsure = bool(self._begins and self._before and abs(count - self._before) <= 1)
+        if unsure and (not self._confirmed or self._same or math.isinf(stood_s)):
+            self._same = True  # as before the start, which was lost
+            self._raw, self.told_s, self.from_s = count, when.at_s, when.from_s
+            return Step(0.0, seconds)
+        lost = bool(self._unseen and not before and self.last)
+        wheel_m = (count - before) * metres_per_count
+        moved_s = max(0.0, min(when.at_s, stood_s) - before_s)
+        if abs(wheel_m) > MOST_M + MOST_MPS * seconds:
+            return self._odd_one(count, when, Step(0.0, seconds, lost=True))
+        if not rests and self._falls_back(count, when):
+            return self._odd_one(count, when, Step(wheel_m, seconds, lost=True))
+        most_m = DOUBT_M + DOUBT_MPS * (moved_s + when.spread_s)
+        if when.doubtful and not self._begins and abs(wheel_m - expected_mps * moved_s) > most_m:
+            return None
+        self._take(count, when)
+        return Step(wheel_m, seconds, lost, unsure)
+
+    def _odd_one(self, count: int, when: Moment, step: Step) -> Step | None:
+        """One that has come too often to be chance is so, whatever it was."""
+        self._odd += 1
+        if self._odd < ODD_TIMES:
+            return None
+        self._take(count, when)
+        return step
+
+    def _falls_back(self, count: int, when: Moment) -> bool:
+        """Whether it is less than before in this motion: of an earlier time, or another number."""
+        before = self.last or 0
+        if abs(before) <= STRAY_COUNTS or not (when.doubtful or when.spread_s >= UNCERTAIN_S):
+            return False
+        return abs(count) < abs(before) - STRAY_COUNTS or count * before < 0
+
+    def _take(self, count: int, when: Moment) -> None:
+        self.last = self._raw = count
+        self.told_s, self.from_s = when.at_s, when.from_s
+        self.may_begin_anew = self._begins = self._unseen = False
+        self._odd = 0
