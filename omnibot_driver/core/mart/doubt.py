@@ -47,6 +47,7 @@ class Doubt:
         """The frame begins here."""
         self._walk = Covariance()
         self._levers = [(0.0, 0.0, 0.0)] * 4
+        self._bend_before_rad = 0.0
 
     def moved(
         self,
@@ -88,6 +89,15 @@ class Doubt:
             (x - dy_m * yaw + own_x, y + dx_m * yaw + own_y, yaw + own_yaw)
             for (x, y, yaw), (own_x, own_y, own_yaw) in zip(self._levers, own, strict=True)
         ]
+
+    def begin(self) -> None:
+        """A motion has begun."""
+        self._bend_before_rad = self._levers[2][2]
+
+    def heading_told(self) -> None:
+        """What was guessed of the turn of this motion is known now; where it led is not."""
+        x_m, y_m, _ = self._levers[2]
+        self._levers[2] = x_m, y_m, self._bend_before_rad
 
     def add(self, m2: float, rad2: float) -> None:
         """An error of the place, whichever way, and of the heading."""

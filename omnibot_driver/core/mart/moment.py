@@ -3,6 +3,10 @@
 """When something that was told was so, as far as the network lets it be known. Values only."""
 
 from dataclasses import dataclass
+from typing import Final
+
+UNCERTAIN_S: Final = 0.1
+"""A reply of which no more is known may be one to an earlier question."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,3 +24,8 @@ class Moment:
     def spread_s(self) -> float:
         """How uncertain it is."""
         return self.until_s - self.from_s
+
+    @property
+    def is_uncertain(self) -> bool:
+        """Whether it may be of an earlier time, or another number."""
+        return self.doubtful or self.spread_s >= UNCERTAIN_S

@@ -56,6 +56,7 @@ class Reckoning:
         self._way_m = self._yaw_rad = self._motion_rad = 0.0
         self.spun_rad = self.moved_m = 0.0
         self.told_rad: float | None = None
+        self._guessed = False
         self.spread_s = CLOCK_S
         self.reset()
 
@@ -87,9 +88,10 @@ class Reckoning:
         self.slowing_since_s = None
         self.left_over_right, self.bend = None, UNEQUAL
         self.wheel.begin()
+        self.doubt.begin()
         self.heading.begin(now, anew=motion is Motion.REFERENCE)
         self._motion_rad = self.spun_rad = self.moved_m = 0.0
-        self.told_rad = None
+        self.told_rad, self._guessed = None, False
 
     def started(self, now: float) -> None:
         """The server has answered that it has."""
@@ -159,7 +161,7 @@ class Reckoning:
             self.doubt.add(step.wheel_m**2, turn_rad**2)
         if not step.seconds or (step.lost and not step.wheel_m):
             return NOTHING_MEASURED
-        turn_rad = self._turn_rad(step.wheel_m, when.at_s)
+        turn_rad = self._turn_rad(step.wheel_m, when.at_s, step.seconds)
         way_m = 0.0 if self.on_the_spot else step.wheel_m - turn_rad * settings.track_m / 2
         self._move(way_m, turn_rad, step.seconds, step.wheel_m)
         return DisplacementReading(way_m, 0.0, turn_rad, "body", max(step.seconds, LEAST_S), 0)
@@ -168,7 +170,7 @@ class Reckoning:
     def on_the_spot(self) -> bool:
         return self.motion in (Motion.SPIN, Motion.TURN)
 
-    def _turn_rad(self, wheel_m: float, at_s: float) -> float:
+    def _turn_rad(self, wheel_m: float, at_s: float, seconds: float) -> float:
         """Since the last count."""
         turned_rad = self.heading.turned_rad(at_s, stands=self.stands)
         told_rad = turned_rad - self._motion_rad
@@ -178,7 +180,8 @@ class Reckoning:
         ratio = self.left_over_right
         if not self.on_the_spot:
             if ratio is None:
-                return told_rad
+                return told_rad - self._correct_guess(told_rad, seconds)
+            self._guessed = True
             return wheel_m * (1.0 - ratio) / self._settings.track_m
         turn_rad = wheel_m * (1.0 - (-1.0 if ratio is None else ratio)) / self._settings.track_m
         told = abs(told_rad - turn_rad) < TOLD_RAD + TOLD_PART * abs(turn_rad)
@@ -186,6 +189,19 @@ class Reckoning:
             turn_rad = told_rad
         self.spun_rad += turn_rad
         return turn_rad if self.told_rad is None else 0.0  # what was told has it
+
+    def _correct_guess(self, told_rad: float, seconds: float) -> float:
+        """What was guessed of the turn of this motion, and is told from now on, is put right at
+        once: it is no motion. By how much.
+        """
+        if not self._guessed:
+            return 0.0
+        self._guessed = False
+        self.doubt.heading_told()
+        wrong_rad = told_rad - self.heading.rate_radps * seconds
+        self._correct_yaw(wrong_rad)
+        self._motion_rad += wrong_rad
+        return wrong_rad
 
     def spin_told(self, degrees: float) -> None:
         """What the server has measured of a turn on the spot that is over, in the board's sign."""

@@ -15,11 +15,13 @@ from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
-"""Of a robot that is not heard, as far as a doubtful heading is believed."""
+"""Of a robot that is not heard, as far as an uncertain heading is believed."""
 OLD_RAD: Final = 0.01
 """A first heading of RM that is so near to the last one before is that one."""
 AHEAD_S: Final = 0.3
 """It is predicted so far, to the time of a count."""
+ODD_TIMES: Final = 3
+"""What has come so often is so."""
 SPREADS: Final = 4
 """The turn rate is that of so many times the uncertainty of a reply."""
 
@@ -35,6 +37,7 @@ class RelativeHeading:
         self._angle_rad: float | None = None
         self._before_rad = 0.0
         self._turned_rad = 0.0
+        self._odd = 0
         self._track: deque[tuple[float, float]] = deque(maxlen=40)
 
     @property
@@ -69,8 +72,10 @@ class RelativeHeading:
         moved_s = max(0.0, min(at_s, stood_s) - before_s)
         late_s = moved_s + when.spread_s
         most_rad = DOUBT_RAD + min(ACCELERATION_RADPS2 * late_s**2 / 2, MOST_RADPS * late_s)
-        if when.doubtful and abs(turn_rad - self.rate_radps * moved_s) > most_rad:
-            return False
+        if when.is_uncertain and abs(turn_rad - self.rate_radps * moved_s) > most_rad:
+            self._odd += 1
+            if self._odd < ODD_TIMES:
+                return False
         self._turned_rad += turn_rad
         if not (when.doubtful and turn_rad):
             self.from_s = when.from_s
@@ -80,6 +85,7 @@ class RelativeHeading:
         return bool(turn_rad)
 
     def _take(self, angle_rad: float, when: Moment) -> None:
+        self._odd = 0
         self._angle_rad, self.told_s = angle_rad, when.at_s
         self._track.append((when.at_s, self._turned_rad))
         self.rate_radps = 0.0

@@ -19,8 +19,6 @@ MOST_M, MOST_MPS = 0.3, 2.0
 """No wheel goes farther between two counts: one of them is false."""
 STRAY_COUNTS: Final = 3
 """A robot that stands is counted no farther."""
-UNCERTAIN_S: Final = 0.1
-"""A reply of which no more is known may be one to an earlier question."""
 ODD_TIMES: Final = 3
 
 
@@ -120,7 +118,7 @@ class WheelCount:
     def _falls_back(self, count: int, when: Moment) -> bool:
         """Whether it is less than before in this motion: of an earlier time, or another number."""
         before = self.last or 0
-        if abs(before) <= STRAY_COUNTS or not (when.doubtful or when.spread_s >= UNCERTAIN_S):
+        if abs(before) <= STRAY_COUNTS or not when.is_uncertain:
             return False
         return abs(count) < abs(before) - STRAY_COUNTS or count * before < 0
 
