@@ -66,8 +66,8 @@ ENDS: dict[str, Callable[[AnyBench], object]] = {
     "stopped meanwhile": lambda bench: bench.run(0.6),
     "e-stop": lambda bench: bench.estop(True),
     "port was lost": lambda bench: bench.close(),
-    "fell silent": lambda bench: (setattr(bench, "speaks", False), bench.run(5.0)),
-    "did not run": lambda bench: (bench.session.stood_still(3.0, bench.now), bench.settle()),
+    "check its power and cable": lambda bench: (setattr(bench, "speaks", False), bench.run(5.0)),
+    "the driver stalled": lambda bench: (bench.session.stood_still(3.0, bench.now), bench.settle()),
 }
 
 

@@ -128,7 +128,7 @@ def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success
     assert "until ~/start" in answer.message
-    with pytest.raises(CommandRefused, match="being paused; the service ~/start"):
+    with pytest.raises(CommandRefused, match="being paused; call ~/start"):
         bench.drive(0.4)
     bench.hears = True
     bench.run(3.0)

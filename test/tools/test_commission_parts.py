@@ -273,7 +273,7 @@ def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
 
 
 def test_a_drift_is_of_its_time_alone() -> None:
-    """And none where nothing was heard, nor of a robot that stood."""
+    """And none where no data from the board, nor of a robot that stood."""
     stamps = np.arange(0.0, 4.0, 0.04)
     twist = np.zeros((100, 3))
     twist[50:, 0] = 0.2

@@ -131,6 +131,6 @@ def test_an_estop_that_nobody_may_have_heard_says_so(bench: Bench) -> None:
     assert estop(bench, True) == "e-stop latched"
     bench.speaks = False
     bench.run(2.0)
-    assert "nobody knows" in estop(bench, True)
+    assert "unconfirmed" in estop(bench, True)
     bench.close()
     assert "not open" in estop(bench, True)

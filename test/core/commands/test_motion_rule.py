@@ -140,7 +140,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(ben
     bench.drive(0.5)
     bench.run(0.06)
     assert bench.written[-1][1] == STOP
-    with pytest.raises(CommandRefused, match="nothing was heard"):
+    with pytest.raises(CommandRefused, match="no data from the board"):
         bench.drive(0.5)
     bench.run(0.4)
     assert bench.still()

@@ -161,7 +161,7 @@ def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it(
     bench.run(8.0)
     assert bench.still()
     (said,) = (text for text in bench.notices if "unconfirmed" in text)
-    assert "no odometry frames come" in said
+    assert "no odometry frames from the board" in said
 
 
 def test_the_log_says_that_a_robot_moves_where_displacements_show_it() -> None:

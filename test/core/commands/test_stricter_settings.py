@@ -35,7 +35,7 @@ def test_what_was_commanded_under_looser_ones_ends(
     start = len(bench.written)
     bench.configure(**changed)
     assert bench.written_since(start) == STOP
-    assert bench.notices[-1].startswith("the robot is stopped, as its limits are stricter now")
+    assert bench.notices[-1].startswith("robot stopped because a limit was lowered")
     bench.run(0.4)
     assert bench.written[-1][1] == STOP
     assert bench.still()

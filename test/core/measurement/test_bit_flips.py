@@ -158,7 +158,7 @@ def test_what_is_refused_is_counted_and_told() -> None:
     drive.arm(DELTA, 0, 6)
     drive.run(1.0)
     assert drive.bench.session.refused.displacements == 1
-    (notice,) = [text for text in drive.bench.notices if "refused" in text]
+    (notice,) = [text for text in drive.bench.notices if "rejected" in text]
     assert notice.startswith("implausible readings rejected: 1 ")
     assert "1 odometry" in notice
 

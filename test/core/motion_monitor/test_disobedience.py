@@ -238,7 +238,7 @@ def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
     bench.go_to(-0.5, 0.0, 0.0)
     bench.board.grip(0.4, 0.0, 0.0)
     bench.run(2.0)
-    assert "drives away" in bench.notices[0]
+    assert "moving away" in bench.notices[0]
     assert bench.session.figures(bench.now).commands.trips == 1
 
 
