@@ -2,7 +2,7 @@
 
 """Writes what the documents take from the code: `make docs` runs it, a test compares.
 
-Each text is a function of the code alone, so whoever changes the code sees what to commit.
+Each text is a function of the code alone, so a test shows what to commit after a change.
 """
 
 import textwrap
