@@ -23,7 +23,7 @@ RECORDED: Final = ("imu_rpy", "step")
 
 
 def locate(file: str) -> Path:
-    """Where this file is, ``~`` resolved. Raises ParameterError for a home that nobody has."""
+    """Where this file is, ``~`` resolved. Raises ParameterError for an unknown home folder."""
     try:
         return Path(file).expanduser()
     except RuntimeError as error:
@@ -57,7 +57,7 @@ def names(path: Path) -> list[str]:
 def save(path: Path, values: Mapping[str, Any]) -> None:
     """Put these values into the file and leave the others. Raises ParameterError or OSError.
 
-    Whoever reads it meanwhile, or loses power, has the old file or the new one. Comments in it do
+    A reader, or a power failure, meanwhile finds the old file or the new one. Comments in it do
     not survive; a symbolic link does.
     """
     content = {**_read(path), **values}

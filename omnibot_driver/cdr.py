@@ -1,7 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
 """Measurements as the bytes that rclpy would make of their messages, without making messages; and
-velocity commands likewise from their bytes.
+velocity commands from their bytes.
 
 CDR, as DDS serialises, aligns every number to its own size, as a C struct does on a 64-bit machine:
 so Python's ``struct`` with native alignment writes it. Strings are a length and bytes with a NUL,

@@ -139,7 +139,7 @@ def _run(ending: Ending, args: list[str]) -> None:
                 executor.spin_once()
         except ExternalShutdownException:
             ending.begin()
-        except BaseException as error:  # SystemExit as well: else nobody would be served any more
+        except BaseException as error:  # SystemExit too: without the executor no callback would run
             driver.report_defect(error)
 
     spinner = threading.Thread(target=spin, name="omnibot-executor", daemon=True)
@@ -161,7 +161,7 @@ def _set_deadline() -> None:
             text = "omnibot_driver hung during shutdown and is terminated"
             print(text, file=sys.stderr, flush=True)
             time.sleep(0.1)  # until that is copied
-        finally:  # also when nobody takes what is printed
+        finally:  # also when no program reads the output
             os._exit(1)
 
     deadline = threading.Timer(LONGEST_END_S, give_up)

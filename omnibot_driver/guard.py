@@ -113,5 +113,5 @@ def words(argument: str) -> Words:
 
 if __name__ == "__main__":
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
-        signal.signal(number, signal.SIG_IGN)  # whoever ends the driver so need not ask its guard
+        signal.signal(number, signal.SIG_IGN)  # these signals end the driver, not its guard
     watch(words(sys.argv[1]), words(sys.argv[2]))

@@ -3,7 +3,7 @@
 """Keeps a guard beside an open port: the driver's side of `guard.py`.
 
 It starts the process, beats for it, replaces it when it dies, and sends it away. It knows no
-threads and no board; whoever uses it calls ``beat`` from the thread whose life matters.
+threads and no board; its user calls ``beat`` from the thread that must stay alive.
 """
 
 import contextlib
@@ -29,7 +29,8 @@ MOST_DYING: Final = 3
 """While so many killed guards are not gone yet, no other one is started."""
 LEAVES_WITHIN_S: Final = 0.5
 DIES_WITHIN_S: Final = 1.0
-"""One that is killed and does not is in an uninterruptible sleep; nobody waits for that."""
+"""One that is killed and does not is in an uninterruptible sleep; the driver does not wait for
+that."""
 SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + 1.5
 """On a busy computer a process takes its time to start, and what it says is the stop."""
 
@@ -136,7 +137,7 @@ class Keeper:
 
     def _start(self) -> None:
         self._ahead = 0
-        # By its bare name: whoever kills all that is called omnibot_driver does not hit the guard.
+        # By its bare name: `pkill omnibot_driver` must not hit the guard.
         folder, name = os.path.split(guard.__file__)
         command = [sys.executable, "-I", "-S", name]
         try:

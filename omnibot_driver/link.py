@@ -5,8 +5,8 @@
 The *reader* opens the port, waits for bytes, hands them to the session and delivers what comes of
 them at once, on its own thread: no timer and no other thread stand between the wire and the
 listener. The *pacer* sleeps until something is due (a repeated command, a timeout, a retry), so the
-watchdog depends on nobody's executor. It is also the one whose heartbeat the guard hears. They and
-every caller go through one lock. What the pacer and callers have to tell is delivered by the
+watchdog does not depend on an executor. It is also the one whose heartbeat the guard hears. They
+and every caller go through one lock. What the pacer and callers have to tell is delivered by the
 *teller*, so a slow listener delays neither; all of it leaves in the order of that lock.
 """
 
@@ -133,7 +133,7 @@ class Link:
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads, close the port. Harmless to repeat.
 
-        Whether the robot was told to stand still; ``stands``: whether it was seen to.
+        Whether Stop was sent; ``stands``: whether the robot was seen to stand.
         """
         told = False
         with self._shared.lock:
@@ -146,7 +146,7 @@ class Link:
                     told = self._shared.write_error is None and not self._shared.port.missing
                     self._shared.stood = told and self._session.stands
                     self._shared.port.interrupt()
-                    self._shared.port = None  # nobody adds to the last words
+                    self._shared.port = None  # nothing may follow the last words
             self._shared.closing.set()
             self._shared.changed.notify_all()
         *serving, teller = self._threads

@@ -90,7 +90,7 @@ class OmniBotDriver(Node):
     def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
         """Without events: the executor looks at each of them before it takes a command.
 
-        Whoever subscribes with another quality of service is told so on their own side.
+        A subscriber with an incompatible quality of service sees a warning on its own side only.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)
@@ -222,7 +222,7 @@ class OmniBotDriver(Node):
         session.command_pose(messages.goal_pose(goal, frame), now)
 
     def _look_around(self) -> None:
-        """What the middleware says nothing of. Each is told once."""
+        """Mistakes that the middleware does not report. Each is logged once."""
         for look in list(self._looks):
             if warning := look():
                 self.get_logger().warning(warning)

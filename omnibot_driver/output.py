@@ -3,7 +3,7 @@
 """Log lines that never block the process. Knows descriptors; must not know what is printed.
 
 rclpy writes log lines while it holds the interpreter: a terminal that is stopped by ctrl-S, or a
-pipe that nobody reads, would freeze every thread, the watchdog included, and the robot would go on
+pipe without a reader, would freeze every thread, the watchdog included, and the robot would go on
 with its last command. So what is printed goes through a pipe that would rather lose a line.
 """
 

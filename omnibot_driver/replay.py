@@ -87,11 +87,11 @@ class Replay:
     def command(
         self, action: Callable[[Session, T, float], None], wish: T, _sent_ns: Sequence[int]
     ) -> None:
-        """``call``; nobody is moved by it."""
+        """Run ``call``. It moves no robot."""
         self.call(lambda session, now: action(session, wish, now))
 
     def close(self, _on_exit: OnExit) -> bool:
-        """End the thread; harmless to repeat. There is no robot to be told anything."""
+        """End the thread. A second call does nothing. There is no robot to stop."""
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join(JOIN_TIMEOUT_S)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The services under the node's name. Those that wait for the board block nobody else."""
+"""The services under the node's name. Those that wait for the board block no other callback."""
 
 import threading
 from collections.abc import Callable
@@ -99,14 +99,14 @@ class Services:
         return response
 
     async def _save(self, file: Path, bias: list[float], response: Trigger.Response) -> None:
-        """On a thread of its own: a disk may take its time, and nobody else is to wait for it."""
+        """Runs on its own thread, since a slow disk must not delay other callbacks."""
         answer = Future()
 
         def save() -> None:
             try:
                 calibration.save(file, {"gyro_bias": bias})
                 answer.set_result("")
-            except Exception as error:  # whoever asked is owed an answer
+            except Exception as error:  # the caller must get an answer
                 answer.set_result(str(error))
             if self._node.executor is not None:
                 self._node.executor.wake()

@@ -3,7 +3,7 @@
 """Did this process stand still? SIGSTOP, a swapped-out or suspended host, a thread that hangs.
 
 While it did, its watchdog did too, and commands went on arriving for it. So when it runs again,
-nothing that was sent meanwhile is a command any more. This module is told the time and whether the
+nothing that was sent meanwhile is still a command. This module gets the time and whether the
 watchdog's thread runs; it knows no threads and no commands. Its time is ``boot_time_s``.
 """
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``/tf`` where tf2_ros is installed; elsewhere a warning, and a robot that drives all the same."""
+"""``/tf`` where tf2_ros is installed; elsewhere a warning, and the robot drives without it."""
 
 from collections.abc import Callable
 from typing import Any, Final

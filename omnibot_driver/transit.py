@@ -11,7 +11,7 @@ Clocks step. Ours is looked at twice, as time of day and as a steady clock: a st
 day that our senders share (one host, or NTP everywhere) shows in the second alone, a step of ours
 in the first alone, and the smaller delay counts. A sender whose clock is set back by itself seems
 to be late from then on. When all of its messages have been late for ``HEALS_AFTER_S``, the smallest
-difference among those counts. A delay that lasts as long cannot be told from that.
+difference among those counts. A delay that lasts as long looks the same.
 
 Middleware numbers the messages of each sender. It does not say who sent one, but a number that is
 not above a sender's last one is another sender's. This module reads no clock and knows no ROS.
@@ -85,7 +85,7 @@ class Delay:
 
 
 class Transit:
-    """The messages of one topic, whoever sends them."""
+    """The messages of one topic, from all senders."""
 
     def __init__(self) -> None:
         self._senders: list[_Sender] = []
@@ -93,7 +93,7 @@ class Transit:
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
         """How long this message was under way; one above ``longest_s`` counts as late.
 
-        The first of each sender was under way for no time, as far as can be told.
+        The first of each sender is taken to have no delay.
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
         at_s = (arrival.steady_ns - waited_ns) / 1e9

@@ -86,7 +86,7 @@ class Recorder:
         path = folder / lois_ecu_records.file_name(kind, time.time())
         try:
             saved = lois_ecu_records.save(reading, path, partial(self._is_current, token))
-        except Exception as error:  # whoever asked is owed an answer
+        except Exception as error:  # the caller must get an answer
             self._end(token, False, f"the {NAMES[kind]} came, but is not saved: {error}")
             return
         if saved:

@@ -156,7 +156,7 @@ class MartTopics:
                 directory.mkdir(parents=True, exist_ok=True)
                 path.write_text(done.content.decode("latin-1"), encoding="utf-8")
                 answer.set_result("")
-            except Exception as error:  # whoever asked is owed an answer
+            except Exception as error:  # the caller must get an answer
                 answer.set_result(str(error))
             if self._node.executor is not None:
                 self._node.executor.wake()

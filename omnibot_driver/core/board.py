@@ -104,7 +104,7 @@ class Board(Protocol):
 
     @property
     def figures(self) -> BoardFigures:
-        """For whoever looks after the line."""
+        """Advice for the person who maintains the line."""
         return BoardFigures()
 
     @property
@@ -130,7 +130,7 @@ class Board(Protocol):
         """What these bytes complete, in the order of the line; ``mode`` follows."""
 
     def flush(self, now: float) -> list[Reading]:
-        """The line is closed: what can still be told from what was held."""
+        """The line is closed: return what the held bytes still prove."""
         return []
 
     def silence(self) -> None:

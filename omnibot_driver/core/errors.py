@@ -20,7 +20,7 @@ class RequestRefused(OmniBotError):
 
 
 class CommandRefused(OmniBotError):
-    """A motion command that will not be carried out. It counts as no command at all."""
+    """A motion command that will not be carried out. It has no effect."""
 
 
 class LinkError(OmniBotError):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a session tells whoever listens: values only."""
+"""Events that a session returns: values only."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ class StateChanged:
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Something a user should be told, in a sentence."""
+    """A notice for the user, as a sentence."""
 
     text: str
 

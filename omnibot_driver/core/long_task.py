@@ -2,7 +2,7 @@
 
 """What a board is asked for and takes long to do, such as a record: one at a time.
 
-It ends when whoever carries it out says so, with a failure when its time is over, and at once when
+It ends when the board or its task says so, with a failure when its time is over, and at once when
 the robot is stopped, the e-stop is latched, or the board is lost. Knows times and sentences, not
 what is done.
 """

@@ -29,7 +29,7 @@ class ImuReading:
 class DisplacementReading:
     """Motion during the last ``duration_s``; ``lost`` frames of this kind are missing before it.
 
-    ``duration_s`` is None where nobody knows it: the first after a pause holds all motion since.
+    ``duration_s`` is None where it is unknown: the first after a pause holds all motion since.
     ``restarted``: the board's counters seem to begin anew here, and its earth frame with them.
     ``measured``: not so where the board is blind, and it is taken from what was commanded.
     """
@@ -107,9 +107,9 @@ class ResetReading:
 
 @dataclass(frozen=True, slots=True)
 class NoticeReading:
-    """Something that a user should be told; ``halt``: the robot is to be driven no further.
+    """A notice for the user; ``halt``: the robot is to be driven no further.
 
-    Without a text what is to be told has been told before.
+    An empty text: the user has been told before.
     """
 
     text: str

@@ -75,12 +75,12 @@ class Reporter:
         )
 
     def notify(self, sentences: Sequence[str]) -> None:
-        """Something a user should be told, sentence by sentence."""
+        """Notices for the user, sentence by sentence."""
         if sentences:
             self.events += map(Notice, sentences)
 
     def look_for_news(self, now: float) -> None:
-        """What a user should be told of by what was counted and seen."""
+        """Notices that follow from counters and observations."""
         self.news_at = now + NEWS_EVERY_S
         notices, measuring, advice = self._notices, self._measurement, self._board.advice
         news = notices.counted(

@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What stops the robot at once, whoever commands it: the e-stop, and what its board shows.
+"""What stops the robot at once, whatever the source of its commands: the e-stop, and what its board
+shows.
 
 A board that restarts, is paused or is not heard, and a stall of this process, end the command that
 is carried out. Composes what is measured, commanded and wanted of the board, where one of these has
@@ -35,7 +36,7 @@ BUTTON_HELD: Final = (
 
 
 class SafetyStops:
-    """What is to be told of each goes to ``reporter``."""
+    """Reports go to ``reporter``."""
 
     def __init__(
         self,

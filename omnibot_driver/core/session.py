@@ -3,7 +3,7 @@
 """One connection to one board, whole: bytes and wishes in; measurements, answers and bytes out.
 
 The shell around it calls an input, then takes ``take_output`` to the port and ``take_events`` to
-whoever listens, and calls ``tick`` when ``wake_at`` has come. Not thread-safe, reads no clock, does
+its caller, and calls ``tick`` when ``wake_at`` has come. Not thread-safe, reads no clock, does
 not log: whatever a user should hear of is an event.
 
 It knows in which order its parts have their turn, and keeps next to nothing itself: ``liveness``
@@ -47,7 +47,7 @@ class Session:
     """``run``: whether the board is to be started whenever it is there; ``axis_signs``: 1 or -1 for
     x, y and yaw where the board's body axes are not REP-103's, for commands and odometry alike;
     ``control``: where the board's switch stands, which no board tells; None where it has none;
-    ``obeys``: whether the robot can be expected to do what it is told here, which a recorded one
+    ``obeys``: whether the robot can be expected to follow commands, which a recorded one
     was not.
     """
 
@@ -99,7 +99,7 @@ class Session:
 
     @property
     def refused(self) -> Refused:
-        """What the wire said and nobody was told."""
+        """Readings rejected as implausible."""
         return self._measurement.refused
 
     def figures(self, now: float) -> SessionFigures:
@@ -141,7 +141,7 @@ class Session:
     def opened(self, now: float, *, missing: str = "") -> None:
         """The port is open. ``missing``: which of several lines are not, in a sentence.
 
-        A robot that hears only a part of what it is told is stopped, and not driven.
+        A robot that receives only a part of its commands is stopped, and not driven.
         """
         self._board.connect()
         self._commanding.begin(now)
@@ -173,8 +173,9 @@ class Session:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """``receive``, but for what can wait until these are told: ``process`` is to follow.
 
-        Whoever commands in between is as one who came before the bytes. That must not be where they
-        change the mode, so there nothing waits; nor does it where anything else is asked for.
+        A command that arrives in between is handled as if it came before the bytes. That must not
+        be where they change the mode, so there nothing waits; nor does it where anything else is
+        asked for.
         """
         self._liveness.came_at = now
         before = self._board.mode

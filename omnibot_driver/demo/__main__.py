@@ -152,7 +152,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except DemoFailed as error:
         print(f"\ndemo: {error}", file=sys.stderr)
         return 1
-    except BrokenPipeError:  # nobody wants to read any more
+    except BrokenPipeError:  # the reader has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     return 0

@@ -120,7 +120,7 @@ COMMANDS: Final = (
         "max_angular_acceleration",
         0.0,
         "rad/s²",
-        "Likewise, for the yaw rate.",
+        "The same for the yaw rate.",
         low=0.0,
         high=1000.0,
     ),

@@ -24,7 +24,7 @@ from omnibot_driver.transports.wake_up import WakeUp
 SCHEME: Final = "udp://"
 LARGEST: Final = 65_536
 NOBODY: Final = (errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.EHOSTDOWN)
-"""What the network says of a datagram that reached nobody."""
+"""Errors that the network reports for a datagram without a receiver."""
 
 
 class UdpPorts:

@@ -30,7 +30,7 @@ class ImuEstimate:
 
 
 class BiasCorrector:
-    """``calibration`` is for whoever asks for one."""
+    """``calibration`` is for explicit requests."""
 
     def __init__(self, board: Board, correction: ImuCorrection) -> None:
         self._board = board
@@ -65,7 +65,7 @@ class BiasCorrector:
 
     @property
     def figures(self) -> ImuFigures:
-        """For whoever looks after the sensor."""
+        """Advice for the person who maintains the sensor."""
         return ImuFigures(
             bias_radps=self.calibration.bias,
             gravity_mps2=self.calibration.gravity_mps2,

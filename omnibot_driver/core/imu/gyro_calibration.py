@@ -2,10 +2,10 @@
 
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-A gyro at rest reads its bias and noise. Whether the robot is at rest is told by three witnesses:
+A gyro at rest reads its bias and noise. Three sources tell whether the robot is at rest:
 the wheels (displacements that add up to nothing), the gyro (readings that hardly vary) and the
-accelerometer (likewise). A steady turn without wheels is seen by none of them, so what comes out
-must also be a bias that the sensor may have. By the way the length of gravity is found.
+accelerometer (the same test). A steady turn without wheels is seen by none of them, so what comes
+out must also be a bias that the sensor may have. By the way the length of gravity is found.
 
 This module knows readings and times. It reads no clock, and does not know when one should measure.
 """
@@ -20,7 +20,7 @@ from omnibot_driver.core.requests import RequestDone
 
 MEASURE_S: Final = 2.0
 BLOCK_S: Final = 1.0
-"""Length of a look at a robot that nobody asked to stand still."""
+"""Length of an observation that was not requested."""
 GAP_S: Final = 0.2
 """After a longer time without readings a look begins anew."""
 ANSWER_WITHIN_S: Final = 4.0
@@ -90,7 +90,7 @@ class Look:
 
 
 class GyroCalibration:
-    """``bias`` is what the gyro reads at rest, in rad/s; ``refine``: whether standstills mend it.
+    """``bias`` is what the gyro reads at rest, in rad/s; ``refine``: whether standstills refine it.
 
     ``answers`` has a RequestDone for every measurement that came to an end.
     """

@@ -3,7 +3,7 @@
 """The LOIS ECU: its lines as readings, orders as its lines.
 
 ``wrote`` must be called with whatever goes out: the odometry rests on it, since the board tells
-little of where its wheels turn. What the board says is told in ``translation``, how settings reach
+little of where its wheels turn. ``translation`` explains what the board sends, how settings reach
 it in ``opening``, why set-points look as they do in ``outbound``.
 """
 

@@ -243,7 +243,7 @@ class _Spikes:
         return was_single, False
 
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
-        """As far as can be told from values that move by themselves. What ends at the end of the
+        """As far as values show it that vary anyway. What ends at the end of the
         scale was knocked."""
         slack = OUT_OF_PROPORTION * self._restless
         bit = topmost if value < END_OF_SCALE * topmost else 0.0

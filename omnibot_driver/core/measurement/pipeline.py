@@ -3,8 +3,8 @@
 """From readings to measurements: stamped, checked, integrated, corrected, counted.
 
 Composes the board's clock, plausibility, odometry and the IMU. Knows no commands and no modes.
-Readings of the IMU are measured with the read that brings them (``hear``), so that nobody waits for
-what else is made of it (``flush``).
+Readings of the IMU are measured with the read that brings them (``hear``), so that no reader waits
+for what else is made of it (``flush``).
 """
 
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ Measured = tuple[Reading, Sequence[Estimate]]
 
 
 class MeasurementPipeline:
-    """Everything between what a board says and what is told of it."""
+    """Everything between a board's readings and the published measurements."""
 
     def __init__(self, board: Board, settings: SessionSettings, axis_signs: Signs) -> None:
         self.odometry = Odometry(settings.odometry, axis_signs)
@@ -64,7 +64,7 @@ class MeasurementPipeline:
 
     @property
     def refused(self) -> Refused:
-        """What the wire said and nobody was told."""
+        """Readings rejected as implausible."""
         checked = self._outliers
         return Refused(
             checked.refused_imu, checked.refused_displacements, self.odometry.refused_poses

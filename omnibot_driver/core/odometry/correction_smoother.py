@@ -40,7 +40,7 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Likewise, but what goes beyond the room is followed later."""
+        """The same, but what exceeds the limit is applied later."""
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)
         self.move(chord.times(linear, linear, angular), room_m, room_rad)

@@ -5,7 +5,7 @@
 * What the wheels do not tell: the slip of every metre (a random walk), and wheels that are larger
   or smaller than believed or slip all the time (the same error in every turn of a wheel, so it
   grows with the way itself, and a way back undoes it).
-* ``gap`` is the motion that nobody reported; a pose of the board tells it after all.
+* ``gap`` is unreported motion; a later pose of the board reveals it.
 * What is known to be wrong and still being put right counts in full.
 
 Knows covariances and the wheels' geometry; no time, no frames, no board.
@@ -33,7 +33,7 @@ class OdometryNoise:
     ``wheel_drift``: standard deviation in m of a random walk after 1 m of rim; ``wheel_scale``: of
     a wheel's relative size error; ``wheel_slip``: the mean part of the way that slip takes from all
     wheels alike; ``wheels``: their geometry, at a radius of 1 m; ``unheard_mps2``,
-    ``unheard_radps2``: acceleration of a robot that nobody hears.
+    ``unheard_radps2``: acceleration of a robot during a gap.
     """
 
     wheel_drift: float = 0.0035
@@ -151,7 +151,7 @@ class Uncertainty:
             self.gap = self.gap.carried(dx_m, dy_m)
 
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
-        """Nobody reported the motion of this time; the speeds before and after it are known.
+        """The motion of this time was not reported; the speeds before and after it are known.
 
         A robot that speeds up and brakes again meanwhile is a quarter of a·t² away from the even
         way, and never further than its speed allows.

@@ -31,7 +31,7 @@ POSE_DUE_S: Final = 0.24
 WELL_KNOWN_RAD: Final = 0.15
 """Standard deviation of a heading that open gaps have made uncertain."""
 UNKNOWN_S: Final = 0.5
-"""Time in which a robot rolls out: what may be unreported where nobody knows how long it was."""
+"""Time in which a robot rolls out: motion that may be unreported after a gap of unknown length."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,7 +163,7 @@ class Odometry:
     def in_board_frame(self, place: Pose) -> Pose | None:
         """A place in the odometry frame as the board would call it, by the shorter turn from here.
 
-        None while it cannot be told: no pose of the board says where the frames lie.
+        None while it is unknown: no pose of the board says where the frames lie.
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None
@@ -295,7 +295,7 @@ class Odometry:
         self._move(tangent, seconds, min(seconds, max(0.0, stamped_s)))
 
     def _bridge_until_pose(self, lost: int) -> None:
-        """Displacements are missing that the pose includes; nobody knows what comes after it."""
+        """Displacements are missing that the pose includes; what follows is unknown."""
         if lost and self._bridge.last is not None:
             tangent, period_s = self._bridge.last
             self._track.miss((lost + 1) * period_s)

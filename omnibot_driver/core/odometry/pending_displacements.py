@@ -51,7 +51,7 @@ class PendingDisplacements:
         return sum(reading.duration_s or 0.0 for reading, _ in self._waiting)
 
     def unheard_s(self, last_stamp_s: float | None) -> float:
-        """Time before the first, since the last stamp, in which nobody reported any motion."""
+        """Time between the last stamp and the first displacement, without a report."""
         if not self._waiting:
             return 0.0
         reading, stamp_s = self._waiting[0]

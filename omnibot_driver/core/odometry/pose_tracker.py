@@ -2,9 +2,9 @@
 
 """The robot's way in the odometry frame: where it is, what is given out, how far that may be off.
 
-Composes the follower and the uncertainty. It is told tangents in the board's body axes, of the size
-that the board takes them for; what it tells is in REP-103's axes and of true size. Knows times; not
-which of the board's words to believe.
+Composes the follower and the uncertainty. Its input are tangents in the board's body axes, of the
+size that the board takes them for; what it tells is in REP-103's axes and of true size. Knows
+times; not which of the board's words to believe.
 """
 
 from typing import Final
@@ -62,7 +62,7 @@ class PoseTracker:
         move(chord, self._fastest_mps * stamped_s, self._fastest_radps * stamped_s)
 
     def miss(self, duration_s: float) -> None:
-        """Nobody reported the motion of this time."""
+        """The motion of this time was not reported."""
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:

@@ -2,7 +2,7 @@
 
 """The OmniBot board as a ``core.board.Board``: its bytes as readings, requests as its bytes.
 
-Source: the board's manual ver. 0.3. What the board says is told in ``translation``, what it is
+Source: the board's manual ver. 0.3. ``translation`` explains what the board sends, what it is
 ordered to do in ``command_encoder``.
 """
 

@@ -4,7 +4,7 @@
 
 Velocity and wheel commands are in the firmware's own unit, which ``linear_scale`` and
 ``angular_scale`` translate (70 and 500 are the vendor's, found by hand). Commanded poses are taken
-to have the unit of those that are sent, mm and mrad; nobody has verified it.
+to have the unit of those that are sent, mm and mrad; this is not verified.
 """
 
 from collections.abc import Sequence

@@ -36,7 +36,7 @@ HEADER_BYTE: Final = 7.5
 HEADER_IN_PLACE: Final = 4.0
 """A frame that gained bytes, though a header stands where it would end without them."""
 BAD_RUN: Final = 6.0
-"""A run of bytes that nobody explains begins: a burst was lost, or noise."""
+"""A run of unexplained bytes begins: a burst was lost, or noise."""
 BAD_TAIL: Final = 2.5
 """... right after a whole frame, with no header of its own: a burst seldom begins just there."""
 UNKNOWN_START: Final = 1.0
@@ -108,7 +108,7 @@ class Context(NamedTuple):
     """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 
     def damaged(self) -> "Context":
-        """Nobody knows how much was lost."""
+        """How much was lost is unknown."""
         return Context(self.imu, deltas=self.deltas, shaken=self.shaken)
 
 

@@ -108,7 +108,7 @@ class FrameDecoder:
         return found
 
     def flush(self, now: float) -> list[Frame]:
-        """The line is closed, or was silent: what can still be told from what is held."""
+        """The line is closed, or was silent: return what the held bytes still prove."""
         self.last_arrival_s = now
         found: list[Frame] = []
         self.skipped = []

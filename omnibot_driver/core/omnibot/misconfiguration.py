@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings that what the board sends contradicts: the user is told, nothing is switched by itself.
+"""Settings that contradict the board's data: reported to the user, never changed.
 
 Poses that make sense only in the other byte order; deltas that lead to the next pose only in the
 other frame, or come at another rate. This module knows what the wire says in each setting; not how

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How frames and letters are put on a line that loses bytes, to a receiver that nobody knows.
+"""How frames and letters are put on a line that loses bytes, to a receiver with unknown firmware.
 
 The frames are the manual's; this module decides what stands before them, and which of two
 neighbouring values a word takes. It knows bytes, not what is commanded, nor when.

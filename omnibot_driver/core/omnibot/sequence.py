@@ -16,7 +16,7 @@ WRAP: Final = 256
 
 LATE_S: Final = 0.5
 """Arrival may differ so much from the board's count: beyond, the count did not simply go on. A full
-buffer of the host's (4096 bytes, 2.4 s) that lacks one byte in ten is told 0.24 s wrong; this is
+buffer of the host's (4096 bytes, 2.4 s) that lacks one byte in ten is stamped 0.24 s wrong; this is
 twice as much."""
 EARLY_S: Final = 0.2
 """A count from zero may be so much ahead of the time since the last delta, which was told as

@@ -18,7 +18,7 @@ from omnibot_driver.core.board import RateName
 from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
 
 RECENT_S: Final = 10.0
-"""What happened is told for so long."""
+"""How long an event is shown."""
 RATE_TOLERANCE: Final = 0.05
 STUCK_READINGS: Final = 100
 LATE_S: Final = 0.005

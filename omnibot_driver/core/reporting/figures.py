@@ -29,7 +29,7 @@ class LinkFigures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandFigures:
-    """``source``: the topic that commands, ``age_s`` old by now; None while nobody does.
+    """``source``: the topic that commands, ``age_s`` old by now; None while there is none.
 
     ``monitored``: whether a robot that does not move as commanded is stopped;
     ``trips``: how often the motion monitor has stopped the robot; ``interlock``: what motion is

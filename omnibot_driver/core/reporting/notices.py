@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user is told of the stream: seldom, or once, in sentences that say what to do.
+"""Notices about the stream: rate-limited, or given once. Each says what to do.
 
 Knows counts, times and words; not where they come from.
 """
@@ -12,7 +12,7 @@ from omnibot_driver.core.board import Mode
 from omnibot_driver.core.measurement.outlier_filter import Refused
 
 NEWS_S: Final = 10.0
-"""What is counted is told no more often than this."""
+"""Counters are reported no more often than this."""
 HEADING_ASSUMED: Final = (
     "no valid pose from the board; the driver assumes that its heading was 0 at first"
 )
@@ -44,7 +44,7 @@ class ThrottledNotice:
         self._told_at = -math.inf
 
     def since_told(self, count: int, now: float) -> int:
-        """0 while there is nothing new, or something was told just before."""
+        """0 while there is nothing new, or the last report was a moment ago."""
         if count == self._told or now - self._told_at < NEWS_S:
             return 0
         new, self._told, self._told_at = count - self._told, count, now
@@ -81,7 +81,7 @@ class Notices:
         return news
 
     def once(self, sentence: str) -> list[str]:
-        """Unless it was told before."""
+        """Unless it was reported before."""
         if sentence in self._told:
             return []
         self._told.add(sentence)

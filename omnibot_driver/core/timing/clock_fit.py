@@ -15,9 +15,10 @@ line runs in the middle of all bounds: a timer that keeps the reads from cutting
 seconds deceives by half of what it hides at the most. Without them, or if they contradict
 (then reads were late), the line is laid under the latest points as close as it goes: an edge of
 their lower convex hull, under those of cut samples alone if there are any, which have not waited.
-Likewise where every block had one.
+The same where every block had one.
 
-Knows ticks and times, in s of the host's steady clock; not what is sampled, nor how ticks are told.
+Knows ticks and times, in s of the host's steady clock; not what is sampled, nor how ticks are
+counted.
 """
 
 import math

@@ -59,7 +59,7 @@ class DeviceClock:
     def restart(self) -> None:
         """What the board does from here on has nothing to do with what it did before.
 
-        Stamps go forward all the same.
+        Stamps still increase.
         """
         self._stamped_tick: int | None = None
         self._displaced_tick: int | None = None

@@ -30,7 +30,7 @@ _JOIN_S = 5.0
 class RunningBoard(ABC, Generic[B]):
     """Runs a board between `start` and `stop`; `lines` are what its packets go through.
 
-    `dropped` counts bytes that nobody read in time. From other threads touch `board` under `lock`
+    `dropped` counts bytes that were not read in time. From other threads touch `board` under `lock`
     only. `stop`, `check` and `wait_for` raise RuntimeError when the board's thread died.
     """
 

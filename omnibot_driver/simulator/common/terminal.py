@@ -18,7 +18,7 @@ from omnibot_driver.simulator.common.running import UNREAD_LIMIT
 class Terminal:
     """A new pseudo-terminal; the driver's end is at ``address``, ours is ``descriptor``.
 
-    It outlives the programs that open it. Bytes that nobody reads are lost like those of a UART
+    It outlives the programs that open it. Bytes that are not read are lost, like those of a UART
     once the kernel's buffer is full. ``link`` names a symbolic link to be made for the terminal and
     removed on closing.
 

@@ -182,7 +182,7 @@ class SimulatedBoard:
 
     @property
     def driven(self) -> bool:
-        """Whether the motors have been told to turn, and not to stop since."""
+        """Whether the motors turn by the last command."""
         return self._goal is not None or self._targets != _ALL_ZERO
 
     @property

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the wheels are told (manual, Control equation), in encoder counts per control tick.
+"""The wheels' set-points (manual, Control equation), in encoder counts per control tick.
 
-Knows scales, signs and the kinematics. Must not know modes, nor when a wheel is told.
+Knows scales, signs and the kinematics. Must not know modes, nor when a wheel receives one.
 """
 
 from omnibot_driver.simulator.omnibot.chassis import Wheels, rims_from_body

@@ -147,7 +147,7 @@ class World:
         ]
 
     def _loads(self) -> Wheels:
-        """Efforts that the slope and whoever pushes add at the rims."""
+        """Efforts that a slope and people who push add at the rims."""
         x, y, turning = self.force
         if self._slope_pwm:
             x += self._slope_pwm * cos(self._pose.yaw_rad)

@@ -70,7 +70,7 @@ def _calibrate(
         interruption.check()
         try:
             save(result, output, robot.table)
-        finally:  # what was measured is told, whatever becomes of the file
+        finally:  # report the result even when the file cannot be written
             console.table(f"calibrate {arguments.subcommand}: {robot.driver}", result.findings)
         for note in result.notes:
             console.say(note)

@@ -2,7 +2,7 @@
 
 """The running driver as a ROS node: found, its parameters, its services. Must not know motions.
 
-Everything runs in the caller's thread: whoever waits, spins.
+Everything runs in the caller's thread, which spins while it waits.
 """
 
 import time
@@ -112,7 +112,7 @@ class Client:
         self.parameters.update(values)
 
     def apply(self, values: Mapping[str, Value]) -> None:
-        """Likewise, those that may change while the driver runs."""
+        """The same for those that may change while the driver runs."""
         changeable = {
             name: value for name, value in values.items() if not self.table.by_name[name].fixed
         }

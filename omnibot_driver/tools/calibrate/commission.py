@@ -3,7 +3,8 @@
 """``calibrate commission``: a guided walk that finds which way round everything is.
 
 What the board's data can tell is taken from them; a person is asked for the rest, which is what the
-wheels really do, and to hold the robot. An answer that cannot be is told, and asked for again.
+wheels really do, and to hold the robot. An impossible answer is explained, and the question
+repeated.
 """
 
 import argparse

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The conversation with whoever stands beside the robot: questions, progress, the table.
+"""The dialogue with the user beside the robot: questions, progress, the table.
 
 ``read`` is what answers; tests answer themselves.
 """
@@ -25,7 +25,8 @@ PLAIN_WIDTH: Final = 100
 
 
 class Console:
-    """``yes``: yes to every question; figures are still asked for, nobody else knows them."""
+    """``yes``: yes to every question; figures are still asked for, since only the user knows
+    them."""
 
     def __init__(
         self, *, yes: bool = False, read: Callable[[str], str] = input, file: object = None
@@ -89,7 +90,7 @@ class Console:
         return meant
 
     def wait(self, request: str) -> None:
-        """Until whoever is there has done what no program can."""
+        """Wait until the user has done what no program can do."""
         self._answer(f"{request} [Enter] ")
 
     @contextmanager

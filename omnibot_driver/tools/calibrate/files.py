@@ -64,7 +64,7 @@ def save(result: Result, output: Path, table: Table) -> None:
 
 
 def draw(result: Result, output: Path, picture: Path) -> None:
-    """The picture; raises ToolError, which says that the result is saved all the same."""
+    """The picture; raises ToolError, which says that the result is saved nevertheless."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure

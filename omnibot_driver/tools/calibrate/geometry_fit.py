@@ -30,7 +30,7 @@ UNKNOWN: Final = 0.2
 @dataclass(frozen=True, slots=True)
 class Reading:
     """``path``: (n, 3) poses of the odometry, the last one at rest; ``end``: (3,) where the robot
-    truly ended, seen from where it began, in m, m and unwrapped rad, NaN where nobody measured;
+    truly ended, seen from where it began, in m, m and unwrapped rad, NaN where it was not measured;
     ``sigma``: (3,) of the measurement.
     """
 

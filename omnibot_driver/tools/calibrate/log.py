@@ -52,7 +52,7 @@ class Commands:
 
 @dataclass(slots=True)
 class Log:
-    """Rows as they come; columns for whoever calculates."""
+    """Rows in order of arrival; columns for calculations."""
 
     imu_rows: list[Row] = field(default_factory=list)
     odometry_rows: list[Row] = field(default_factory=list)

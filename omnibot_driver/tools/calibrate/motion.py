@@ -27,7 +27,7 @@ LOOK_S: Final = 1.0
 SLOW_LOOK_S: Final = 3.0
 """Where the odometry is predicted from rare measurements."""
 OBEYED_PART: Final = 0.2
-"""A robot that does less than this part of what it is told does not move."""
+"""A robot that does less than this part of its command counts as standing."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
 """Slower commands may be lost in friction: m/s and rad/s, rad/s of a wheel."""
@@ -95,7 +95,7 @@ class Bounds:
 
 
 class Obedience:
-    """Whether the robot does what it is told, roughly, second by second."""
+    """Whether the robot roughly follows its commands, second by second."""
 
     def __init__(self, topic: Topic, parameters: Mapping[str, object]) -> None:
         """``parameters``: the driver's, which tell what its board has."""
@@ -106,7 +106,7 @@ class Obedience:
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
 
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
-        """Raises ToolError once the robot has not moved for a while in which it was told to.
+        """Raises ToolError once the robot has not moved for a while although it was commanded to.
 
         ``seconds`` since the last look; ``measured`` has the units of ``command``.
         """

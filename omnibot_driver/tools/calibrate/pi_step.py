@@ -75,7 +75,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 class _Bench:
-    """The robot as it records; ``show`` is told how many records are done."""
+    """The robot while it records; ``show`` gets the number of finished records."""
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:
         self.robot, self._show, self._responses, self._done = robot, show, responses, 0

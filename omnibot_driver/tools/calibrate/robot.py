@@ -99,7 +99,7 @@ class Robot(Listener):
         show: Callable[[float], object] = lambda _part: None,
         states: Sequence[str] = ("nominal",),
     ) -> Log:
-        """Hear the robot for so long and command nothing. ``show`` is told the part done."""
+        """Listen for this time without commands. ``show`` gets the part done."""
         self._begin(states)
         began_s = now_s = time.monotonic()
         while now_s < began_s + seconds:
@@ -121,7 +121,7 @@ class Robot(Listener):
     ) -> Log:
         """Move as the law says, within the bounds, then stand still; what was heard meanwhile.
 
-        ``show`` is told the seconds. Raises ToolError, with the robot told to stand still, on
+        ``show`` gets the seconds. Raises ToolError, with the robot stopped still, on
         whatever is not as it should be: e-stop, lost data, another commander, no motion. Without
         ``obeys`` the last of these is what is to be found out. Where it is how fast or which way
         the robot moves, the driver's motion monitor must not stop it: ``monitored`` is false.

@@ -68,7 +68,7 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
         raise Contradiction(
             f"wheel {name} was commanded and wheel {WHEELS[turned[0]]} was seen to turn. By the"
             " manual A is front right, B front left, C at the back: if another side may be the"
-            " front, look from there; if none is, no parameter mends the order of the wheels"
+            " front, look from there; if none is, no parameter corrects the order of the wheels"
         )
     return seen[wheel]
 

@@ -31,7 +31,7 @@ CORRECTED_WITH: Final = 5
 @dataclass(frozen=True, slots=True)
 class Speed:
     """One steady speed along an axis (0, 1, 2: x, y, yaw): asked for by ``counts``, measured in
-    m/s or rad/s; ``gyro`` likewise about the vertical, NaN where the robot did not turn.
+    m/s or rad/s; ``gyro`` is the yaw rate, NaN where the robot did not turn.
     """
 
     axis: int

@@ -54,7 +54,7 @@ def second_order(parameters: Array, time_s: Array) -> Array:
     """
     omega, damping, zero_s, delay_s = parameters
     root = np.sqrt(complex(damping * damping - 1.0))
-    root = root if abs(root) > 1e-4 else 1e-4  # two equal poles are told as two close ones
+    root = root if abs(root) > 1e-4 else 1e-4  # two equal poles are written as two close ones
     poles = omega * (-damping + root), omega * (-damping - root)
     after_s = np.maximum(0.0, time_s - delay_s)
     turned = after_s.astype(complex)

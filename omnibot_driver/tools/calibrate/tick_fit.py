@@ -23,7 +23,7 @@ Column = NDArray[np.float64]
 
 FEWEST_TICKS: Final = 30
 SIGMA: Final = 0.1
-"""Relative noise of one time that is expected; what is found is told with the result."""
+"""Relative noise of one time that is expected; what is found is part of the result."""
 SHORTEST_S: Final = 0.005
 LONGEST_S: Final = 5.0
 """Of a time constant."""

@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"monitor: {error}", file=sys.stderr)
     except KeyboardInterrupt:
         print("monitor: interrupted before the driver was found", file=sys.stderr)
-    except BrokenPipeError:  # nobody wants to read any more
+    except BrokenPipeError:  # the reader has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 1
 

@@ -131,7 +131,7 @@ class Monitor(App[None]):
 
     def _come_back(self) -> None:
         """To the screen, which SIGSTOP has not left: else keys would have two readers from now on,
-        one of which nobody ends.
+        of which each runs until its own end.
         """
         with self.suspend():
             pass
@@ -200,7 +200,7 @@ class Monitor(App[None]):
         return action not in self._lacks and super().check_action(action, parameters)
 
     def on_app_blur(self) -> None:
-        """Whoever looks elsewhere does not steer."""
+        """Keys do not steer while the terminal is not in focus."""
         if self._robot.dead_man:
             self._robot.dead_man.stop()
 

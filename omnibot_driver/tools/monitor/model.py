@@ -22,7 +22,7 @@ IMU_TOPIC: Final = "imu/data_raw"
 ODOM_TOPIC: Final = "odom"
 DIAGNOSTICS_TOPIC: Final = "/diagnostics"
 COMMAND_LIVES_S: Final = 0.5
-"""As the driver's ``cmd_vel_timeout``: an older one moves nobody."""
+"""As the driver's ``cmd_vel_timeout``: the driver ignores older ones."""
 SILENT_S: Final = 3.0
 """Diagnostics come every second: after three without, they and the driver are history."""
 STEP_M: Final = 0.02

@@ -18,7 +18,7 @@ REPEAT_S: Final = 0.3
 ASLEEP_S: Final = 0.5
 """Who has not been asked for so long was suspended: keys that waited were meant for then."""
 DEAF_S: Final = 0.3
-"""So long nobody steers after that; what waited is read within it."""
+"""For this time the keys do not steer; what waited is read within it."""
 ZEROS: Final = 5
 """So many commands to stand still, and then none: others may want to drive."""
 LEVELS: Final = 10

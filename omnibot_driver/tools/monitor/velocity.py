@@ -24,9 +24,9 @@ ACKNOWLEDGED_WITHIN_S: Final = 0.5
 
 
 class VelocityTopic:
-    """In the type that the driver, or whoever takes it in its place, subscribes.
+    """In the type that the driver, or a node in its place, subscribes.
 
-    A topic cannot have two types in one process, so everything of ours follows. ``heard`` is told
+    A topic cannot have two types in one process, so everything of ours follows. ``heard`` gets
     of each command; without a dead man nothing is published.
     """
 

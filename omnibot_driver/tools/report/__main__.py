@@ -111,7 +111,7 @@ def _report(wanted: argparse.Namespace) -> int:
         raise ToolError(f"{folder} cannot be written: {error}") from error
     try:
         print(f"{page.text(findings)}\n\n{written}", flush=True)
-    except BrokenPipeError:  # nobody wants to read on; the files are written
+    except BrokenPipeError:  # the reader has gone; the files are written
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return WRONG if any(finding.level is Level.BAD for finding in findings) else 0
 

@@ -70,7 +70,8 @@ def _messages(
     storage = reader.storage
     try:
         if isinstance(storage, McapReader) and not storage.chunks:
-            # Without an index ``messages`` insists on the order of time, which nobody promises.
+            # Without an index ``messages`` requires ascending times, which a bag does not
+            # guarantee.
             yield from storage.messages_scan(wanted)
         else:
             yield from reader.messages(wanted)

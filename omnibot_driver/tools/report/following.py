@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the robot did what it was told: commands against what was measured."""
+"""Whether the robot followed its commands: commanded against measured motion."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -122,7 +122,7 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Commands that are none, cease, are followed or not; motion that nobody told."""
+    """Commands that are none, cease, are followed or not; motion without a command."""
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
         yield Finding(
             Level.NOTE,

@@ -39,7 +39,8 @@ def _all(log: Log) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Recording",
-            f"No message of {', '.join(others)}: gaps and stops cannot be told from pauses.",
+            f"No message of {', '.join(others)}: gaps and stops cannot be distinguished from"
+            " pauses.",
             "Record all topics: ros2 bag record --all.",
         )
     yield from events.judge(log)

@@ -103,7 +103,7 @@ def _subscribe(node: Node, recorder: Recorder, topic: str, role: str, kind: str)
     latched = role in EVENTS and role != DIAGNOSTICS
     qos = QoSProfile(
         depth=DEPTH,
-        # Whoever commands may offer less than reliable; what asks for less hears both.
+        # A commander may offer less than reliable; what asks for less hears both.
         reliability=ReliabilityPolicy.BEST_EFFORT
         if role in COMMANDS
         else ReliabilityPolicy.RELIABLE,
