@@ -28,7 +28,7 @@ END = b"\n"
 BYE = b"!"
 """The driver has stopped the robot itself; the guard may leave."""
 LIMIT_S = 0.5
-"""Without a heartbeat for so long the driver hangs."""
+"""After this time without a heartbeat the driver is taken to hang."""
 TIMES = 20
 PACE_S = 0.05
 

@@ -24,9 +24,9 @@ BEAT_S: Final = 0.1
 RESTART_S: Final = 1.0
 """A guard that dies at once is not started more often than this."""
 HANGS_AFTER: Final = 50
-"""A guard that has not read so many beats would not stop the robot either."""
+"""A guard that has missed this many beats would not stop the robot either."""
 MOST_DYING: Final = 3
-"""While so many killed guards are not gone yet, no other one is started."""
+"""Number of killed guards that have not ended yet, above which no other is started."""
 LEAVES_WITHIN_S: Final = 0.5
 DIES_WITHIN_S: Final = 1.0
 """One that is killed and does not is in an uninterruptible sleep; the driver does not wait for

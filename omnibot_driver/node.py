@@ -74,7 +74,7 @@ class OmniBotDriver(Node):
         )
         self._create_inputs()
         self._publishing.extras = self._profile.extras(self, self._link, self._values)
-        if isinstance(self._link, Link):  # a recording is no link to be judged
+        if isinstance(self._link, Link):  # a recording has no link to judge
             self._diagnostics = Diagnostics(
                 self,
                 self._link,

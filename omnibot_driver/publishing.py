@@ -223,6 +223,6 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Each thing once until the board is understood again: a port that flaps is no news."""
+        """Each thing once until the board is understood again: a flapping port is reported once."""
         told, self._told = self._told, self._told | {text}
         return text not in told

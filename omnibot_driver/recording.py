@@ -25,7 +25,8 @@ RAW_NAME: Final = "/raw_rx"
 class Recording:
     """Of one bag, a folder or a single .mcap or .db3 file: a topic for each channel.
 
-    ``speed``: so many times faster, infinity for as fast as can be; ``delay_s``: until it begins.
+    ``speed``: factor of the playback speed, infinity for as fast as can be; ``delay_s``: until it
+    begins.
     """
 
     path: Path

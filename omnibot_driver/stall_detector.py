@@ -12,8 +12,8 @@ import time
 from typing import Final
 
 STANDSTILL_S: Final = 0.4
-"""A thread that ought to pass ten times a second has not for so long. It is less than the guard's
-limit: whenever the guard steps in, this is noticed as well."""
+"""A thread that should pass ten times a second has not passed for this time. It is less than the
+guard's limit: whenever the guard steps in, this is noticed as well."""
 SETTLE_S: Final = 0.25
 """What comes so soon after a standstill had been waiting, whatever the sender's clock says. What
 was sent so soon after it may have been sent a little before: a sender's clock is known roughly."""

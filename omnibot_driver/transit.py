@@ -29,12 +29,12 @@ LONGEST_SILENCE_S: Final = 2.0
 LARGEST_DRIFT: Final = 5e-4
 """Of two clocks: a crystal is off by a tenth of this, NTP corrects a clock at most at this rate."""
 CLOCK_RETREATS: Final = 10.0
-"""A message that seems to be early is so many times less likely to be a sender's than one that is
+"""Factor by which an early message is less likely to be a sender's than one that is
 late by as much."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
-"""Of so many messages one was hardly delayed. The first of a sender may all have been: then those
-that come sooner seem to have been sent later than they were."""
+"""Number of messages of which one was hardly delayed. The first of a sender may all have been: then
+those that come sooner seem to have been sent later than they were."""
 
 Differences = tuple[float, float]
 """Our clock less a sender's when its message came in, in s: by the time of day, and steady."""

@@ -142,7 +142,7 @@ class Board(Protocol):
         return math.inf
 
     def due(self, now: float) -> Packets:
-        """What keeps the board talking, and is no command: subscriptions, polls, relays.
+        """What keeps the board talking and is not a command: subscriptions, polls, relays.
 
         It counts as written.
         """

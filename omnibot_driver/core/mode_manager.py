@@ -19,15 +19,15 @@ from omnibot_driver.core.requests import OnExit, Request, RequestDone
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
-"""Longer than the second between two notices: so much data without a notice means that P, or R,
-was lost."""
+"""Longer than the second between two notices: data for this time without a notice means that P, or
+R, was lost."""
 FLOWING_S: Final = 0.1
 """Data comes every 10 ms; a longer time without any does not count as data."""
 IN_FLIGHT_S: Final = 0.1
 """A notice that comes sooner than this after a letter may have been sent before it was obeyed; and
 one that is followed by data within this time does not show that the board is paused."""
 LAST_STOPS: Final = 3
-"""So many at once when the port is about to be closed: one may be lost."""
+"""Number of copies sent at once when the port is about to be closed: one may be lost."""
 ANSWER_WITHIN_S: Final = 4.5
 RESET_WITHIN_S: Final = 9.5
 

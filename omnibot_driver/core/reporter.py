@@ -94,7 +94,7 @@ class Reporter:
         self.notify(news)
 
     def silent(self, silence_s: float, *, bytes_came: bool) -> None:
-        """Nothing was understood for so long, which is no wonder while a line is missing."""
+        """No data was understood for this time, which is expected while a line is missing."""
         if self.missing:
             return
         self.notify(

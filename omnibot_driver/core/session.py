@@ -231,7 +231,7 @@ class Session:
         self._task.tick(now)
 
     def stood_still(self, seconds: float, now: float) -> None:
-        """This process, or its watchdog, did not run for so long: no command is current."""
+        """This process, or its watchdog, stalled for this time: no command is current."""
         if self._mode_manager.phase is not CLOSED:
             self._safety.stalled(seconds, now)
 
@@ -256,7 +256,7 @@ class Session:
         """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""
         if reason := self._interlocks.why_not_request():
             raise RequestRefused(reason)
-        self.process(now)  # what came before is no answer
+        self.process(now)  # what came before is not an answer
         self._mode_manager.request(request, token, now)
         if request is Request.START:
             self._commanding.interlock.start()

@@ -18,10 +18,10 @@ class Traits:
     ImuReading to the next, one for each tick of the board's clock; None for a board without an
     IMU, whose readings are stamped by their arrival. ``authorities``: who may command motion;
     ``requests``: what else can be asked of it; ``wheels``: names of those that ``wheel_cmd`` turns,
-    in its order; ``unheard_s``: a robot that is not heard for so long is driven no further;
+    in its order; ``unheard_s``: after this time without data a robot is not driven any further;
     ``silence_s``: after it a board that says nothing is not known to be there; ``own_odometry``:
     OdometryReadings say where the robot is, and displacements only whether it obeys;
-    ``stands_after_s``: a robot whose displacements show no motion for so long stands;
+    ``stands_after_s``: a robot whose displacements show no motion for this time stands;
     ``baudrate``: whether the speed of its line is to be set;
     ``calibrates_gyro``: it takes the bias off itself, so its profile has ``~/calibrate_gyro``;
     ``unproved_s``: how long Stop is repeated at most while that is not seen;

@@ -30,7 +30,7 @@ ROW_EVERY_S: Final = 1.0
 
 
 def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
-    """Drive for so long, or until asked to end.
+    """Drive for this time, or until asked to end.
 
     Raises ParameterError where there is no such board, DemoFailed, and ImportError without ROS.
     """

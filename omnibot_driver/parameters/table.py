@@ -141,7 +141,7 @@ def table(
     }
     common = {row.name for rows in COMMON.values() for row in rows}
     if unknown := {*without, *changes} - common:
-        raise ValueError(f"these are no common parameters: {', '.join(sorted(unknown))}")
+        raise ValueError(f"these are not common parameters: {', '.join(sorted(unknown))}")
     if kept := sorted({*without} - DISPENSABLE):
         raise ValueError(
             f"the board {board} must not be without {', '.join(kept)}: the driver reads them on"

@@ -125,7 +125,7 @@ def test_what_is_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[st
     """A folder without one, a text, files that are broken."""
     (tmp_path / "folder").mkdir()
     assert "neither metadata.yaml nor" in refused(tmp_path / "folder", capsys)
-    for name, says in (("a.txt", "is no bag"), ("a.mcap", "reindex"), ("a.db3", "reindex")):
+    for name, says in (("a.txt", "is not a bag"), ("a.mcap", "reindex"), ("a.db3", "reindex")):
         (tmp_path / name).write_text("nothing of the kind")
         assert says in refused(tmp_path / name, capsys)
 

@@ -110,7 +110,7 @@ def test_channels_are_told_apart_in_the_order_of_the_board(stack: ExitStack) -> 
         ("sim://?imu_only", "there is no option 'imu-only'"),
         ("sim://?ang=30", "there is no option 'ang=30'"),
         ("sim://?angle=wide", "invalid float value: 'wide'"),
-        ("sim://?lose=2", "'2' is no probability: give a number from 0 to 1"),
+        ("sim://?lose=2", "'2' is not a probability; give a number from 0 to 1"),
         ("sim://angle", "'angle' must come after a question mark"),
     ],
 )

@@ -17,11 +17,11 @@ from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.packets import Packets
 
 STOPPING_S: Final = 1.0
-"""Stop is wanted for at least so long..."""
+"""The least time for which Stop is wanted..."""
 UNPROVED_S: Final = 5.0
-"""... and for so long at most while nothing shows that the robot stands."""
+"""... and the longest, while nothing shows that the robot stands."""
 ROUNDING_S: Final = 1e-6
-"""So much later it is over for certain, however the times are rounded."""
+"""After this margin it is over for certain, however the times are rounded."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,7 +23,7 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""No controller that drives to a goal overshoots by so much."""
+"""No controller that drives to a goal overshoots by this much."""
 
 
 class Authority(Enum):
@@ -43,7 +43,7 @@ class Setpoint(Protocol):
 
     @property
     def is_zero(self) -> bool:
-        """Whether it is a wish to stand still, which never waits and is no ramp's business."""
+        """Whether it commands standstill, which never waits and is never ramped."""
 
     @property
     def settled(self) -> bool:

@@ -22,7 +22,7 @@ AT_LEAST: Final = 2
 """Displacements, where one is as long: one alone may be damaged, or be from before the wheels
 turned."""
 PROOFS: Final = 2.0
-"""Wait for so many times what has to be seen."""
+"""Factor on the time in which a standstill has to be seen."""
 RAREST_S: Final = 1.0
 """A longer displacement is that of a gap."""
 UNDER_WAY_S: Final = 0.05

@@ -139,7 +139,7 @@ class GyroCalibration:
             self._conclude()
 
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
-        """The wheels told so much."""
+        """Motion that the wheels reported."""
         self._look.displaced(dx_m, dy_m, dyaw_rad)
 
     def _conclude(self) -> None:

@@ -34,7 +34,7 @@ Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
 OUT_OF_PROPORTION: Final = 3.0
-"""A leap is so many times larger than any step of the last while."""
+"""Ratio of a spike to the largest recent step."""
 CALMING: Final = 0.95
 """What a reading leaves of the largest step before it: after 20 of them a third."""
 STILL: Final = 0.08
@@ -193,7 +193,7 @@ class OutlierFilter:
 class _Spikes:
     """Finds single leaps in a row of values, each in units of what it may change by at once.
 
-    ``left``: what may be left of a leap that is over, as a part of it; ``knocked``: so many of the
+    ``left``: what may be left of a leap that is over, as a part of it; ``knocked``: the number of
     first values may leap in a knock and be back; the rest never can.
     """
 

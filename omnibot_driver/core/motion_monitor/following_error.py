@@ -23,7 +23,7 @@ ones."""
 
 
 class FollowingError:
-    """``slack_mps``, ``slack_radps``: what is no error on top of the envelope.
+    """``slack_mps``, ``slack_radps``: what is not an error on top of the envelope.
 
     ``outside``: whether the robot was outside of the envelope by the last displacement.
     """
@@ -58,7 +58,7 @@ class FollowingError:
         *,
         heading_known: bool,
     ) -> None:
-        """``motion`` from ``begun_s`` on, for so long.
+        """``motion`` from ``begun_s`` on, for this time.
 
         Where the heading is not known, only the length of the linear velocity counts.
         """

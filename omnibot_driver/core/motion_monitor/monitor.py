@@ -22,7 +22,7 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""A robot whose last set-point was so long ago is not driven any more."""
+"""After this time without a set-point a robot is not driven any more."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
@@ -32,9 +32,9 @@ MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""A robot that has stood for so long has obeyed: what it does next is something else."""
+"""A robot that has stood for this time has obeyed: later motion has another cause."""
 STOPS_S: Final = 5.0
-"""A stop is repeated for so long by itself while the robot moves."""
+"""How long a stop is repeated by itself while the robot moves."""
 
 REFUSED_IN_A_ROW: Final = 4
 COSINE_60: Final = 0.5
@@ -131,7 +131,7 @@ class MotionMonitor:
     def check(
         self, motion: BodyTwist, seconds: float, stamp_s: float, *, heading_known: bool
     ) -> Fault | None:
-        """What the displacement that ended at ``stamp_s`` shows: ``motion`` for so long.
+        """What the displacement that ended at ``stamp_s`` shows: ``motion`` for this time.
 
         Where the heading is not known, only the length of the linear velocity counts.
         """
@@ -154,7 +154,7 @@ class MotionMonitor:
         return self._blocked(motion, seconds, heading_known=heading_known)
 
     def _blame(self, fault: Fault, now: float) -> Fault:
-        """The robot is going to be stopped: how it rolls out is no other fault."""
+        """The robot is going to be stopped: how it rolls out is not another fault."""
         self._error.reset()
         self._history.add(None, now)
         return fault

@@ -25,7 +25,7 @@ HELD_S: Final = 0.3
 FADING_S: Final = 0.2
 """Time constant afterwards; a robot whose own is 0.35 s stays within it."""
 FADED_S: Final = 1.1
-"""What was replaced so long ago explains nothing: 2 % are left."""
+"""After this time a replaced set-point explains nothing: 2 % are left."""
 UNKNOWN_S: Final = 0.8
 """Motion of which nothing is known is over by then."""
 HISTORY_S: Final = 3.0

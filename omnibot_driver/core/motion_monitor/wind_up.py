@@ -41,7 +41,8 @@ class WindUp:
         """Lost in a first long displacement, until the next one; None: not held in the last one."""
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Move outside of the envelope by so much, for so long: whether that is explained."""
+        """Whether motion outside of the envelope, by this amount and for this time, is
+        explained."""
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds
         explained = outside_m < self.way_m

@@ -288,7 +288,7 @@ class Odometry:
         return OdometryEstimate(stamp_s, follower.pose, twist, covariance, track.rolled, rolling)
 
     def _cross(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
-        """Motion that was not told, taken to be this one; the stamps leave so much time for it."""
+        """Unreported motion, taken to be this one; the stamps leave this time for it."""
         if self._board is not None:
             self._board = self._board.moved(roll(tangent))
         self._belief.bridged(roll(tangent))

@@ -65,7 +65,7 @@ class PoseGate:
         self.proved, self.doubted, self._unproved_s = board, None, 0.0
 
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
-        """From the last pose that was believed, at these speeds, and so many seconds more."""
+        """From the last pose that was believed, at these speeds, and this many seconds more."""
         if self.proved is None:
             return False
         way = self.proved.way_to(told)

@@ -48,19 +48,19 @@ BAD_HEADER: Final = 0.5
 GAP: Final = 5.0
 """The line was idle within a frame, though the board sends each without a pause..."""
 BAD_TEXT: Final = 4.0
-"""A whole text within such a run: nine given letters are no chance."""
+"""A whole text within such a run: nine given letters are not a coincidence."""
 KNOWN_GAP: Final = 11.0
 """... and so far the pauses of this line have always stood between frames. Too much to believe the
 frame; not enough to forget that it may be the pause that deceives."""
 CUT_SHORT: Final = 6.0
 """The line was closed within a frame."""
 ENDS_IN_NOISE: Final = 2.0
-"""The line falls silent within a bad run, though it does so behind frames, ten bytes or so long."""
+"""The line falls silent within a bad run, though it does so behind frames, for about ten bytes."""
 
-# What the board sends. An IMU frame that is no look-alike adds up to 6.5 at the most, a delta or a
+# What the board sends. A true IMU frame adds up to 6.5 at most, a delta or a
 # pose to 4.5.
 LEAPS: Final = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
-"""So many words far from the ones before them. One makes a frame odd, a shock moves several."""
+"""Number of words far from the ones before them. One makes a frame odd, a shock moves several."""
 AFTERSHOCK: Final = 1.5
 """All that can be said against an IMU frame after one that was odd already: a shock rings."""
 WEIGHTLESS: Final = 2.5
@@ -89,7 +89,7 @@ FARTHEST_POSE: Final = 1e7
 LONGEST_STEP: Final = 2000.0
 """Between two poses: 10 m/s, or 10 rad/s, for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""As many IMU frames as come to so many deltas, without any, and none is expected."""
+"""This many IMU frames without a delta, and none is expected."""
 
 
 class Context(NamedTuple):

@@ -6,8 +6,8 @@ The protocol has no checksum and its header words are the commonest readings of 
 a header alone proves nothing. A frame is believed for what stands around it, in two ways:
 
 * *In step* (the byte before it ended a believed frame) a frame comes out with its last byte while
-  nothing speaks against it: what follows in hand begins like a frame, its content is no leap, the
-  line was not idle within it, and its last byte is not one that the next header may have lent.
+  nothing speaks against it: what follows in hand begins like a frame, its content is not a spike,
+  the line was not idle within it, and its last byte is not one that the next header may have lent.
 * *In doubt* all readings of the bytes in hand compete (``trellis``), priced by all the evidence
   (``cost_model``). A frame of the cheapest reading comes out when every reading without it is
   clearly dearer; where two are close, nothing is said. A doubt waits for ``DOUBT_BYTES``.
@@ -43,7 +43,8 @@ SPOKEN_AGAINST: Final = 3.0
 DOUBT_BYTES: Final = 170
 """100 ms of the nominal stream."""
 FRAMES_TO_SETTLE: Final = 3
-"""So many sure frames behind a doubtful one, and nothing more will be learnt about it."""
+"""Number of certain frames behind a doubtful one after which nothing more will be learnt about
+it."""
 
 
 @dataclass(slots=True)
@@ -53,7 +54,7 @@ class DecoderStatistics:
     frames: int = 0
     discarded_bytes: int = 0
     faults: int = 0
-    """How often bytes in step were no frames."""
+    """How often bytes in step were not frames."""
 
 
 class FrameDecoder:
@@ -214,7 +215,7 @@ class FrameDecoder:
         return False
 
     def _take(self, walk: Walk, count: int, after: Context, found: list[Frame]) -> None:
-        """Believe the first so many of these frames."""
+        """Accept the first of these frames, this many."""
         if not count:
             return
         self.statistics.frames += count
@@ -286,7 +287,7 @@ class FrameDecoder:
             yield piece, sure
 
     def _drop(self, count: int) -> None:
-        """The first bytes held are no frames."""
+        """The first held bytes are not frames."""
         if not count:
             return
         self.statistics.discarded_bytes += count

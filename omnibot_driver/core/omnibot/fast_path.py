@@ -81,7 +81,7 @@ class Walk:
         self.ends.append(end)
 
     def known_after(self, count: int, expectation: Expectation) -> Context:
-        """What was known after so many frames."""
+        """What was known after this many frames."""
         at, fields = next(known for known in reversed(self.known) if known[0] <= count)
         context = Context._make(fields)
         for frame in self.frames[at:count]:

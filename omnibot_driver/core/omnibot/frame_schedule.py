@@ -54,7 +54,7 @@ class FrameSchedule:
         self._imus = self._lost = 0
 
     def hear(self, kind: Kind, skipped: int) -> int:
-        """A frame came in after so many bytes that made none: how many IMU frames they were.
+        """How many IMU frames the bytes before this frame were, which made none.
 
         With those that a pose came after, but not beyond a delta: its SEQ counts what is before it.
         """
@@ -75,7 +75,7 @@ class FrameSchedule:
         return lost
 
     def hear_imus(self, count: int) -> None:
-        """So many IMU frames came in, with nothing between them."""
+        """This many IMU frames arrived, with nothing between them."""
         self._imus += count
         if self._imus >= self._imus_alone:
             self._cycle, self._next = IMU_ONLY, 0

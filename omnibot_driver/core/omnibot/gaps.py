@@ -25,7 +25,7 @@ BYTE_S: Final = 10 / 115200
 TICK_BYTES: Final = 14 + 9 + 15
 """All that one tick can bring. More at once after a pause means that we were late, not the line."""
 PAUSES_TO_TRUST: Final = 16
-"""So many pauses that stood where they should, and they are taken for the line's own."""
+"""Number of pauses in the expected places after which they are taken for the line's own."""
 
 _FIRST: Final = attrgetter("first")
 
@@ -34,7 +34,7 @@ class InterFrameGaps:
     """``gaps``: those within the bytes held.
 
     ``sharp``: as a rule, the first byte that comes after a pause begins a frame; ``between``: as a
-    rule, a frame begins somewhere in what comes after it. ``certain``: both have held for so long
+    rule, a frame begins somewhere in what comes after it. ``certain``: both have held for this time
     that once more changes nothing. ``at_pace``: the last bytes came without a pause.
     ``byte_s``: how long the line takes for a byte.
     """
@@ -52,7 +52,7 @@ class InterFrameGaps:
         self._sharp = self._between = 0
 
     def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
-        """So many bytes arrived now, to be held from this place on, so long after the last."""
+        """Bytes arrived now, to be held from this place on, this time after the last."""
         idle_s = pause_s - arrived * self._byte_s
         self.at_pace = idle_s < PACE_S
         if idle_s > GAP_S and arrived <= TICK_BYTES:

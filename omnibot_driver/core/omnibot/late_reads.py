@@ -34,9 +34,9 @@ HALF_TICK_S: Final = TICK_S / 2
 GAP_S: Final = 4e-3
 """No frame is sent with such a pause in it."""
 NEAR_S: Final = 2e-3
-"""Lost bytes make a board's frames late by whole ticks, give or take so much."""
+"""Lost bytes make a board's frames late by whole ticks, within this tolerance."""
 INTO_TICK_S: Final = 1e-3
-"""What follows an IMU frame in its tick begins so much later, give or take as much."""
+"""Delay of what follows an IMU frame in its tick, and its tolerance."""
 PUNCTUAL_S: Final = 1e-3
 """The delays of a punctual reader differ by less, also those of a USB adapter."""
 PACE_S: Final = 2e-4

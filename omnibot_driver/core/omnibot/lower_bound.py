@@ -24,7 +24,7 @@ _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)
 
 
 def least_costs(data: bytes) -> list[float]:
-    """For each node of the lattice: at least so much from there to the end, while more may follow.
+    """For each node of the lattice: the least cost from there to the end, while more may follow.
 
     Along an edge it grows by the edge's price at the most.
     """

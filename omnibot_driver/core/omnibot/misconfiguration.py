@@ -18,19 +18,20 @@ from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, TICK_S, USUAL,
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 SURE: Final = 10
-"""So many poses that speak against a setting, and none for it: two seconds."""
+"""Number of poses against a setting, and none for it: two seconds."""
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
 """Of a coordinate in mm or mrad that is not 0: beyond, it is other bytes misread."""
 MOST_DELTAS: Final = 10
-"""So many deltas from one pose to the next, one of which was lost; more belong to no two poses."""
+"""Number of deltas from one pose to the next, one of which was lost; more belong to no two
+poses."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
-"""One frame leads so far away from the pose, and so many times further than the other."""
+"""How far one frame leads away from the pose, and its ratio to the other."""
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""So many deltas in a row, and for so long, that came at another rate than the settings have."""
+"""Number and duration of deltas in a row that came at another rate than the settings have."""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}
@@ -59,7 +60,7 @@ class MisconfigurationChecks:
             self._moved.clear()
 
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
-        """A delta came in at ``now``, and so many IMU frames since the one before.
+        """A delta arrived at ``now``, with this many IMU frames since the one before.
 
         The IMU frames, of which some may be lost, tell the period; arrival times confirm it.
         """

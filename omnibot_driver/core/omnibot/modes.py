@@ -73,7 +73,7 @@ class ModeTracker:
             self.apply(Happening.HEARD_MOTION)
 
     def hear_imus(self, count: int) -> None:
-        """So many IMU frames, and the limits are are to come."""
+        """This many IMU frames, and no more than are expected."""
         self.imus_to_come -= count
         if not self.imus_to_come:
             self.apply(Happening.HEARD_IMU_ALONE)

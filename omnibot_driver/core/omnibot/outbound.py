@@ -9,8 +9,8 @@ The argument. A control frame has no checksum, and the board's parser is unknown
 counts seven bytes after ``FF FE``, however long they take. If a frame lost a byte, that parser
 takes the missing one from whatever comes next.
 
-1. *Zeros stand before everything.* A zero is no letter and no header, and seven of them end any
-   frame that was begun. So a Stop, an emergency stop or a letter that was cut is completed by
+1. *Zeros stand before everything.* A zero is neither a letter nor a header, and seven of them end
+any frame that was begun. So a Stop, an emergency stop or a letter that was cut is completed by
    zeros: it stays a Stop, or becomes a frame in mode 0, which is none. A letter is never
    swallowed by a frame that was begun, and a header never stands behind an ``FF``. The eighth zero
    makes up for one that is lost. Before a motion frame four are enough: only one that lost five
@@ -60,7 +60,7 @@ def transmission(*parts: bytes) -> bytes:
 
 
 def harmless(counts: tuple[float, float, float]) -> Words:
-    """The nearest words, within ``MAX_WORD``, whose bytes are no letter and make no header."""
+    """The nearest words, within ``MAX_WORD``, whose bytes contain neither a letter nor a header."""
     a, b, c = counts
     words = nearest(a, b, c)
     if not _HARMFUL(_WORDS(*words)):

@@ -16,7 +16,7 @@ POSE_PERIOD_S: Final = 0.2
 DELTA_PERIODS_S: Final = (0.01, 0.02, 0.04, 0.05, 0.1, 0.2)
 """Whole ticks, a whole number of them to a pose."""
 DELTAS_MISSING: Final = 6
-"""When so many are, the board is in IMU-only mode."""
+"""Number of them after which the board is in IMU-only mode."""
 FEWEST_ALONE: Final = 25
 """IMU frames that tell of it at least, should the board send deltas less often than it is said."""
 

@@ -15,11 +15,11 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Arrival may differ so much from the board's count: beyond, the count did not simply go on. A full
+"""How far arrival may differ from the board's count: beyond, the count did not simply go on. A full
 buffer of the host's (4096 bytes, 2.4 s) that lacks one byte in ten is stamped 0.24 s wrong; this is
 twice as much."""
 EARLY_S: Final = 0.2
-"""A count from zero may be so much ahead of the time since the last delta, which was told as
+"""How far a count from zero may be ahead of the time since the last delta, which was told as
 late. To restart takes longer."""
 
 
@@ -66,7 +66,7 @@ class Sequence:
         self._reconnected, self._pose = True, None
 
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
-        """A delta with this count came in, and so many IMU frames since the one before."""
+        """A delta with this count arrived, with this many IMU frames since the one before."""
         self._take_back(count, now)
         period_s, per_pose = self._period_s, self._per_pose
         before, self._delta = self._delta, count

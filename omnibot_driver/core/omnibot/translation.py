@@ -65,7 +65,7 @@ class Translation:
         self.heard_s = -math.inf
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
-        """Of frames that one read brought, each after so many bytes that made none.
+        """Frames that one read brought, each after a number of bytes that made none.
 
         What a read brings at once did not come at once: each frame has a time of its own.
         """

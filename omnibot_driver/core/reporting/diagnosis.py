@@ -26,7 +26,7 @@ LATE_S: Final = 0.005
 LARGEST_SKEW_PPM: Final = 115.0
 """More than two crystals differ by."""
 SKEW_KNOWN_S: Final = 75.0
-"""Arrivals count for so long; a skew that lasts less may be that of a computer that was busy."""
+"""How long arrivals count; a skew that lasts less may be that of a computer that was busy."""
 
 BUSY_SHARE: Final = 0.1
 """Of the time that the reader waits for the processor."""

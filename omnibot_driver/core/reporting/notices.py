@@ -107,7 +107,7 @@ class Notices:
 
 
 def why_silent(silence_s: float, *, bytes_came: bool, baudrate: bool) -> str:
-    """Why nothing was understood for so long, and what to do."""
+    """Why no data was understood for this time, and what to do."""
     if bytes_came:
         return (
             f"no valid data for {silence_s:g} s; check"

@@ -16,7 +16,7 @@ SMALLEST_STEP_S: Final = 1e-6
 
 
 class ArrivalClock:
-    """A stamp is never later than the arrival, but where the one before it was no earlier."""
+    """A stamp is never later than the arrival, except where the one before it was not earlier."""
 
     skew_ppm = 0.0
 

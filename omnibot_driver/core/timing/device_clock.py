@@ -33,7 +33,7 @@ from omnibot_driver.core.timing.clock_fit import ClockFit, Point
 LARGEST_LOSS_TICKS: Final = 25
 """If more are missing that no counter has told, then nothing that was known holds any more."""
 BEAT_READS: Final = 12
-"""Among so many reads one is little delayed: a 16 ms adapter's cuts recur after five."""
+"""Number of reads of which one is little delayed: a 16 ms adapter's cuts recur after five."""
 CALM: Final = 0.45
 """Part of a period, less than half of it: two reads in a row that came so near the line leave no
 doubt about their ticks."""
@@ -70,7 +70,7 @@ class DeviceClock:
         self._calm: ClockFit | None = None
         """The line, if the last read was near it and cut no sample."""
         self._single_reads = 0
-        """The last so many brought one sample each, so none waited for another."""
+        """The last reads brought one sample each, so none waited for another."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
         self._seen_at = -math.inf
         """When a new tick was seen last. Soon after a late one come those that waited with it."""
@@ -236,7 +236,7 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """The line's time, but no jump backwards, and forwards only little by little.
 
-        ``room_s``: by so much it may go forward and leave as much to each that comes after it.
+        ``room_s``: how far it may go forward and leave as much to each that comes after it.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

@@ -16,7 +16,7 @@ from random import Random
 class NetworkFaults:
     """What happens to each datagram, either way.
 
-    lose, duplicate: chances. delay_s: each copy is on its way for up to so long, evenly
+    lose, duplicate: chances. delay_s: each copy is delayed by up to this time, evenly
     distributed, so that later ones may overtake it.
     """
 

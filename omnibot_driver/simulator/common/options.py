@@ -120,14 +120,16 @@ def _add_rate(parser: argparse.ArgumentParser, name: str, effect: str) -> None:
 def _chance(text: str) -> float:
     chance = _number(text)
     if not 0.0 <= chance <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no probability: give a number from 0 to 1")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a probability; give a number from 0 to 1"
+        )
     return chance
 
 
 def _delay(text: str) -> float:
     delay_s = _number(text)
     if not 0.0 <= delay_s <= 60.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no delay: give seconds from 0 to 60")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a delay; give seconds from 0 to 60")
     return delay_s
 
 

@@ -69,13 +69,15 @@ def _make_link(link: Path, target: str) -> None:
     if link.is_symlink():
         if link.exists() and not os.path.realpath(link).startswith("/dev/pts/"):
             raise FileExistsError(
-                f"{link} already leads to {os.path.realpath(link)}, which is no pseudo-terminal; "
+                f"{link} already leads to {os.path.realpath(link)}, which is not a"
+                " pseudo-terminal; "
                 "choose another name for the simulator's link or remove it first"
             )
         link.unlink()
     elif link.exists():
         raise FileExistsError(
-            f"{link} exists and is no symbolic link; choose another name for the simulator's link "
+            f"{link} exists and is not a symbolic link; choose another name for the simulator's"
+            " link "
             "or remove it first"
         )
     try:

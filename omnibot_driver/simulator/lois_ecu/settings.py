@@ -43,7 +43,7 @@ class Quirks:
     torque_comes_as_rpm: the answer to 0x17 has the number 0x04.
     record_waits_for_one_more: headings are sent when sample n + 1 is there.
     large_records_never_end: more than 1024 samples do not fit.
-    lenient_hex: a payload that is no number is obeyed if its checksum is right.
+    lenient_hex: a payload that is not a number is obeyed if its checksum is right.
     limits_rpm: beyond 50 RPM it drives 50.
     fast_control: each 91 ms instead of 200 ms, with the same coefficients.
     slow_timer: one count of 100 us takes 100.7 us, so each speed is told 0.7 % too high.

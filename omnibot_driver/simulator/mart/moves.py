@@ -23,7 +23,7 @@ PATIENCE_SAMPLES = 50
 PROBE_S = 0.5
 WRITES_S = 0.005
 LINEAR_S = REFERENCE_S = 0.015
-"""Setting up the motor board takes so long."""
+"""Duration of the set-up of the motor board."""
 
 
 def start_linear(server: "MartServer", word: str, *, backward: bool) -> None:

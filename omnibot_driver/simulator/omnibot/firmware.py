@@ -165,7 +165,7 @@ class SimulatedBoard:
         return BoardPose(*(1000 * value for value in self._odometry.pose))
 
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Be held by somebody: tilted so much, and turned to the left so fast."""
+        """Be held by hand: tilted by this angle, and turned to the left at this rate."""
         self._world.held = Held(roll_rad, pitch_rad, yaw_rate)
 
     def push(self, x_pwm: float = 0.0, y_pwm: float = 0.0, turning_pwm: float = 0.0) -> None:

@@ -41,7 +41,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         choices=get_args(FramingName),
         default="counting",
         help="how the firmware finds control frames: it counts bytes after FF FE, for ever "
-        "(counting, the default); the same, and FF FF FE is no header (naive); the same, and a "
+        "(counting, the default); the same, and FF FF FE is not a header (naive); the same, and a "
         "pause of 5 ms ends half a frame (idle_gap); it searches the last 9 bytes (window)",
     )
     parser.add_argument(
@@ -97,6 +97,6 @@ def _ticks(text: str) -> float:
     ticks = seconds / TICK_S
     if not 0.999 < ticks < 1000.5 or abs(ticks - round(ticks)) > 1e-6:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is no period of the board: give a multiple of {TICK_S:g} up to 10"
+            f"{text!r} is not a period of the board; give a multiple of {TICK_S:g} up to 10"
         )
     return seconds

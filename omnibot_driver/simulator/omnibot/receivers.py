@@ -53,7 +53,7 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """As `counting`, but the byte after an FF is gone unless it is FE; FF FF FE is no header."""
+    """As `counting`, but the byte after an FF is gone unless it is FE; FF FF FE is not a header."""
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         return b"", None, True
     return counting(held, byte, pause_s)

@@ -45,7 +45,8 @@ def picture_file(given: str | None, subcommand: str) -> Path:
         path = path / f"calibrate_{subcommand}.png"
     if path.suffix.lower() not in PICTURES:
         raise ToolError(
-            f"--plot {given} is no folder, nor a picture this tool can draw: let it end in"
+            f"--plot {given} is neither a folder nor a picture that this tool can draw; let it end"
+            " in"
             f" {', '.join(PICTURES)}"
         )
     _require_writable(path)

@@ -24,7 +24,7 @@ from omnibot_driver.tools.needs import ToolError
 WHEELS_ALIKE: Final = 0.01
 """Relative standard deviation of one wheel's radius from the mean, as wheels are made."""
 UNKNOWN: Final = 0.2
-"""Sizes further from the believed ones are no sizes but a mistake."""
+"""Sizes further from the expected ones are mistakes."""
 
 
 @dataclass(frozen=True, slots=True)

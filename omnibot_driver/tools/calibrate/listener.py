@@ -24,7 +24,7 @@ from omnibot_driver.tools.needs import ToolError
 
 IMU, ODOMETRY = TOPICS = "imu/data_raw", "odom"
 LOST_S: Final = 0.3
-"""A robot that is not heard for so long is driven no further."""
+"""After this time without data from it a robot is not driven any further."""
 AT_ONCE: Final = 100
 """Messages that may wait to be read."""
 LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)

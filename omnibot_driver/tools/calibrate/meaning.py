@@ -99,7 +99,7 @@ def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
 
 
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
-    """Whether the same command goes the same way in the body's axes after a turn by so much.
+    """Whether the same command goes the same way in the body's axes after a turn by this angle.
 
     In the wrong one of the frames "earth" and "body" its direction has turned as well. Raises
     ToolError where it has done neither.

@@ -85,7 +85,7 @@ class Bounds:
         )
 
     def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:
-        """The command after so long on the straight way to what is wanted."""
+        """The command after this time on the straight way to the wanted one."""
         if topic == "wheel_cmd":
             a, b, c = _step(now, wanted, self.acceleration * seconds)
             return a, b, c
@@ -136,7 +136,7 @@ class Obedience:
 
 
 def steady(command: Vector3, seconds: float) -> Law:
-    """The same command for so long."""
+    """The same command for this time."""
     return lambda now_s, _pose: command if now_s < seconds else None
 
 

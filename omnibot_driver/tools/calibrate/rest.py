@@ -129,7 +129,7 @@ def still(bias_radps: Column) -> Callable[[Log], None]:
 
 
 def _within(readings: Column, size: int) -> Column:
-    """Standard deviation of one reading within blocks of so many, axis by axis."""
+    """Standard deviation of one reading within blocks of this length, axis by axis."""
     blocks = _blocks(readings, size)
     return np.asarray(np.sqrt(blocks.var(axis=1, ddof=1).mean(axis=0)))
 

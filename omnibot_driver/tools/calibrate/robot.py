@@ -41,7 +41,7 @@ ASKED_WITHIN_S: Final = 0.6
 """A record is asked for more than once in this time, as lines are lost."""
 STOPPING_S: Final = 3.0
 STOOD_S: Final = 0.3
-"""Standing for so long is standing still."""
+"""A robot that stands for this time stands still."""
 STANDING: Final = 0.01
 """m/s and rad/s: slower is standing."""
 UNRULY: Final = (
@@ -65,7 +65,7 @@ def connect(
         try:
             node = Node("calibrate", namespace=namespace.rstrip("/"), context=context)
         except InvalidNamespaceException as error:
-            raise ToolError(f"'{namespace}' is no namespace: {error}") from error
+            raise ToolError(f"'{namespace}' is not a namespace: {error}") from error
         try:
             yield Robot(node, context, interruption)
         finally:

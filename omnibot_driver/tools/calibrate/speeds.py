@@ -25,7 +25,7 @@ FEWEST: Final = 5
 LEAST_SIGMA: Final = 1e-4
 """m and rad: no odometry is better, in m/s and rad/s after a second."""
 CORRECTED_WITH: Final = 5
-"""Steps of the odometry over which a correction is spread: so many are one piece of news."""
+"""Steps of the odometry over which a correction is spread: together they are one measurement."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,7 +34,7 @@ ROUNDS: Final = 4
 SOONER: Final = range(-20, 3)
 """Ticks by which an onset may be sooner than it seems; a late command has a later one."""
 UNLIKE: Final = 3.0
-"""So many times the usual misfit is something else than noise."""
+"""Factor of the usual misfit above which it is not noise."""
 
 
 LOOK_S: Final = np.arange(0.0, 2.0, 1e-3)

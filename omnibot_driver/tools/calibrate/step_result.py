@@ -17,7 +17,7 @@ QUANTUM_RADPS: Final = 0.05
 MANY: Final = 1.5
 """Quanta. A computer that held commands up made 2, and a delay that was 4 ms too long."""
 UNEXPLAINED: Final = 1.2
-"""So many times the second order's residuals tell that no motor fits."""
+"""Factor of the second order's residuals above which no motor fits."""
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:

@@ -69,7 +69,7 @@ def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
         type=float,
         default=10.0,
         metavar="S",
-        help="wait so long for the driver, inf for ever (default: %(default)g)",
+        help="wait this many seconds for the driver, inf for ever (default: %(default)g)",
     )
     ours, ros = split_ros_arguments(arguments)
     options = parser.parse_args(ours)

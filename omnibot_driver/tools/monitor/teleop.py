@@ -12,15 +12,16 @@ from typing import Final
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 FIRST_S: Final = 0.6
-"""A key pressed anew moves the robot so long: most keyboards repeat after 0.25 s to 0.6 s."""
+"""A newly pressed key moves the robot for this time: most keyboards repeat after 0.25 s to 0.6
+s."""
 REPEAT_S: Final = 0.3
 """After a repetition: several of them may get lost or be late."""
 ASLEEP_S: Final = 0.5
-"""Who has not been asked for so long was suspended: keys that waited were meant for then."""
+"""After this time without a call the program was suspended; older keys are dropped."""
 DEAF_S: Final = 0.3
 """For this time the keys do not steer; what waited is read within it."""
 ZEROS: Final = 5
-"""So many commands to stand still, and then none: others may want to drive."""
+"""Number of commands to stand still, and then none: others may want to drive."""
 LEVELS: Final = 10
 NOTHING: Final = ("", -math.inf)
 HALT: Final = BodyTwist(0.0, 0.0, 0.0)

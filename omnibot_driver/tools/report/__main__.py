@@ -34,7 +34,7 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
         "--live",
         type=float,
         metavar="SECONDS",
-        help="instead of a bag, listen to a running driver for so long, or until ctrl-C",
+        help="instead of a bag, listen to a running driver for this time, or until ctrl-C",
     )
     parser.add_argument("--namespace", metavar="NAME", help="of the robot, where there are several")
     parser.add_argument(

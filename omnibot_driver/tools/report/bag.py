@@ -95,10 +95,10 @@ def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
             troubles.append("the bag was never finished (metadata.yaml is missing)")
         else:
             raise ToolError(
-                f"{path} is no bag: it has neither metadata.yaml nor a .mcap or .db3 file"
+                f"{path} is not a bag: it has neither metadata.yaml nor a .mcap or .db3 file"
             )
     elif path.suffix not in STORAGES:
-        raise ToolError(f"{path} is no bag: give the folder of a bag, or its .mcap or .db3 file")
+        raise ToolError(f"{path} is not a bag: give the folder of a bag, or its .mcap or .db3 file")
     readers: list[Reader] = []
     for file in files:
         try:

@@ -75,7 +75,7 @@ def line(axes: Axes, times_s: Array, values: Array, colour: str, label: str, **m
 
 
 def dots(axes: Axes, times_s: Array, values: Array, colour: str, label: str) -> None:
-    """Where they are too many, every so many of them, and the extremes."""
+    """Where they are too many, every n-th of them, and the extremes."""
     every = -(-len(times_s) // POINTS) or 1
     extremes_s, extremes = envelope(times_s, values)
     times_s = np.concatenate([times_s[::every], extremes_s])

@@ -16,7 +16,7 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""A driver that has published no /diagnostics for so long is not there."""
+"""After this time without /diagnostics the driver is taken to be absent."""
 
 
 def judge(log: Log) -> Iterator[Finding]:
@@ -126,7 +126,7 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
 
 
 def _told_elsewhere(status: Status) -> bool:
-    """The e-stop, what it refuses, and the pause are no trouble; nor the first seconds."""
+    """The e-stop, what it refuses, and the pause are not troubles; nor the first seconds."""
     if status.name.endswith("Commands"):
         return "e-stop" in status.message
     return status.name.endswith("E-stop") or (

@@ -32,7 +32,7 @@ Progress = Callable[[int, int], None]
 def listen(
     seconds: float, namespace: str | None, progress: Progress, asked_to_end: Callable[[], bool]
 ) -> Log:
-    """Everything that one robot says for so long. Raises ToolError where there is none."""
+    """Everything that one robot publishes in this time. Raises ToolError where there is none."""
     rclpy.init(
         args=["--ros-args", "--disable-external-lib-logs"],
         signal_handler_options=SignalHandlerOptions.NO,

@@ -21,7 +21,7 @@ LONG_GAP_S: Final = 0.5
 MANY_LOST: Final = 0.01
 RATE_TOLERANCE: Final = 0.05
 UNEVEN: Final = 0.1
-"""Standard deviation of the steps, in periods, above which stamps are no sampling times."""
+"""Standard deviation of the steps, in periods, above which stamps are not sampling times."""
 LATE_S: Final = 0.005
 EARLY_S: Final = 0.001
 OTHER_CLOCK_S: Final = 1.0

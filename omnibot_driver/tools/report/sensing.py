@@ -21,7 +21,7 @@ from omnibot_driver.tools.report.travel import SHORT_GAP_S, moving, steps
 SLIGHT_ERROR: Final = 0.03
 """Of gravity."""
 REST_S: Final = 0.5
-"""Away from all motion by so much, the robot is at rest."""
+"""Distance in time from all motion at which the robot is at rest."""
 LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
 TURNING_RADPS: Final = 0.1

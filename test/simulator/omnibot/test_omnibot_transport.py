@@ -38,7 +38,7 @@ def test_a_board_boots_and_obeys() -> None:
     [
         ("sim://?wheels=4", "there is no option 'wheels=4'"),
         ("sim://?imu", "there is no option 'imu'"),
-        ("sim://?lose=2", "'2' is no probability: give a number from 0 to 1"),
+        ("sim://?lose=2", "'2' is not a probability; give a number from 0 to 1"),
         ("sim://?seed=first", "invalid int value: 'first'"),
         ("sim://?imu_only=maybe", "--imu-only: ignored explicit argument 'maybe'"),
         ("sim://imu_only", "'imu_only' must come after a question mark"),
