@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pseudo-terminals with nobody behind them, and what tests do to them."""
+"""Pseudo-terminals without a program at the other end, and what tests do to them."""
 
 import contextlib
 import os
@@ -14,7 +14,7 @@ PATIENCE_S = 20.0
 def fill(descriptor: int, words: bytes = b"x") -> None:
     """With these, until the kernel takes no more, not even after moving it to the next buffer.
 
-    The descriptor must not block. When the kernel moves it nobody says, hence the pauses.
+    The descriptor must not block. The kernel does not report when it moves it, hence the pauses.
     """
     taken, full = 0, 0
     while full < 5:
@@ -27,7 +27,7 @@ def fill(descriptor: int, words: bytes = b"x") -> None:
 
 
 class Terminal:
-    """A pseudo-terminal with nobody behind it who reads."""
+    """A pseudo-terminal without a reader at the other end."""
 
     def __init__(self) -> None:
         self.far, self._near = os.openpty()

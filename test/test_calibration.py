@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The calibration file: whole or not at all, and nobody else's names are touched."""
+"""The calibration file: whole or not at all, and other names stay."""
 
 import stat
 from pathlib import Path
@@ -89,7 +89,7 @@ def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
 
 
 def test_others_may_read_the_file(tmp_path: Path) -> None:
-    """It is no secret, though it begins as one."""
+    """It is readable for others, although mkstemp makes it private."""
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": BIAS})
     assert stat.S_IMODE(path.stat().st_mode) == 0o644

@@ -136,7 +136,7 @@ def test_a_difference_is_found_at_start(
 
 
 def test_the_orientation_that_is_none_is_the_messages_default() -> None:
-    """A quaternion that nobody fills in is no turn, in rclpy too."""
+    """A default quaternion is the identity, in rclpy too."""
     nothing = Quaternion()
     assert (nothing.x, nothing.y, nothing.z, nothing.w) == cdr.NO_TURN
 

@@ -109,7 +109,7 @@ def alive(keeper: Keeper, seconds: float) -> float:
 
 
 def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
-    """Beat as the driver does until it holds; what is to be told meanwhile."""
+    """Beat as the driver does until the condition holds; returns the messages."""
     told, end = "", time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end
@@ -195,7 +195,7 @@ def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
 
 
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
-    """What waits there is old commands; nobody reads until the guard has gone."""
+    """Old commands wait there; they are read only after the guard has gone."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     line.fill()
     keeper.end(stopped=False)
@@ -210,7 +210,7 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
     started(process.pid)
     line.hang_up()
     keeper.end(stopped=False)
-    assert process.returncode == 0  # nobody had to kill it
+    assert process.returncode == 0  # it was not killed
 
 
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
@@ -244,7 +244,7 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
 
 
 def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
-    """Stopped, it would not stop the robot; nobody waits until its pipe is full."""
+    """A stopped guard would not stop the robot; the driver does not wait until its pipe is full."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     started(first)
@@ -261,7 +261,7 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
 def test_a_guard_that_does_not_die_never_holds_up_a_beat(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As in an uninterruptible sleep. It is replaced, nobody waits for it, and it is reaped."""
+    """As in an uninterruptible sleep. It is replaced at once, and reaped later."""
     monkeypatch.setattr("subprocess.Popen.wait", lambda *_: pytest.fail("a beat waits"))
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
@@ -282,7 +282,7 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
 
 
 def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a host where nothing can be killed, starting more of them helps nobody."""
+    """On a host where nothing can be killed, more guards would not help."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     stopped: set[int] = set()
     with monkeypatch.context() as undying:
@@ -394,7 +394,7 @@ def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line
 
 
 def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> None:
-    """Each stop is a datagram; those that nobody took end nothing."""
+    """Each stop is a datagram; lost ones do not end the guard."""
     host = socket.socket(type=socket.SOCK_DGRAM)
     host.bind(("127.0.0.1", 0))
     address = host.getsockname()

@@ -45,7 +45,7 @@ def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> Non
 
 
 def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyBoard) -> None:
-    """The pacer repeats and stops, also while whoever commanded hangs."""
+    """The pacer repeats and stops, also while the commanding callback hangs."""
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
@@ -135,7 +135,7 @@ def test_every_read_and_every_write_can_be_listened_to(board: PtyBoard) -> None:
 def test_an_estop_is_written_before_the_call_returns(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever presses it and is answered need not wait for another thread."""
+    """The answer does not wait for another thread."""
     written: list[bytes] = []
     write = SerialPort.write
     monkeypatch.setattr(
@@ -189,7 +189,7 @@ def obeyed(command: Callable[[], None]) -> bool:
 def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever holds the lock keeps the pacer from passing; what is sent later is obeyed."""
+    """A thread with the lock keeps the pacer from passing; what is sent later is obeyed."""
     monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
@@ -226,7 +226,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
 
 
 def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No thread misses a beat by the steady clock; the robot is stopped all the same."""
+    """No thread misses a beat by the steady clock; the robot is still stopped."""
     suspended_s = 0.0
     monkeypatch.setattr(
         "omnibot_driver.shared_session.boot_time_s",
@@ -327,7 +327,7 @@ def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard
 
 
 def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) -> None:
-    """Whoever reads the log sees why."""
+    """The log says why."""
     listener, ours = Listener(), session()
     link = link_to(
         board.path, listener, ours, refused=lambda text: listener.deliver([Notice(text)])

@@ -64,7 +64,7 @@ def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) 
 
 
 def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
-    """Whoever pressed it is told; it is the first to be written once there is room."""
+    """The answer says so; it is the first to be written once there is room."""
     link, _ours = at_rest(terminal)
     assert not link.blocked
     terminal.fill()

@@ -69,7 +69,7 @@ def command(link: Link) -> None:
 
 
 class Lines:
-    """Both lines of a board that nobody simulates, and a link to them; ``sense`` by a name."""
+    """Both lines of a board without a simulator, and a link to them; ``sense`` by a name."""
 
     def __init__(self, folder: Path, board: LineBoard | None = None) -> None:
         self.drive, self.sense = Terminal(), Terminal()

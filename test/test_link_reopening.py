@@ -92,7 +92,7 @@ def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
 
 
 def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_farewell_too() -> None:
-    """The robot may still be driving by what it was told before the port was lost."""
+    """The robot may still follow a command from before the port was lost."""
     listener, started = Listener(), threading.Event()
     closer = threading.Thread(target=lambda: link.close("stop"))
 

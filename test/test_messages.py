@@ -42,7 +42,7 @@ def test_a_stamp_has_an_age_by_the_clock_that_gave_it(sec: int, nanosec: int, ag
 
 
 def test_a_zero_stamp_is_no_stamp() -> None:
-    """Whoever leaves it out is as young as the message."""
+    """A command without a stamp is as old as its message."""
     assert messages.age(Time(), 1_700_000_000 * 10**9) == 0.0
 
 
@@ -100,7 +100,7 @@ def publisher(name: str, kind: str) -> SimpleNamespace:
 
 
 def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
-    """Whichever of the two is ours; nobody is named for nothing."""
+    """For both types; only the wrong publisher is named."""
     teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
     assert messages.type_conflict([teleop], stamped=False) == ""
     assert messages.type_conflict([nav], stamped=True) == ""
@@ -152,7 +152,7 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
 
 
 def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> None:
-    """The first displacement after a pause holds all motion since, nobody knows how fast."""
+    """The first displacement after a pause holds all motion since, at an unknown speed."""
     message = messages.odometry_message(
         OdometryEstimate(0.0, Pose(), None, Covariance()), STAMP, SETTINGS
     )

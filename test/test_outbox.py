@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Deliveries of several threads: in order, one at a time, and nobody waits who must not."""
+"""Deliveries of several threads: in order, one at a time, and without waits for other threads."""
 
 import random
 import threading
@@ -114,7 +114,7 @@ def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
 
 
 def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
-    """The next ones leave with whoever comes next."""
+    """The next thread delivers the rest."""
     outbox = Outbox()
     left: list[int] = []
 

@@ -19,7 +19,7 @@ PATIENCE_S = 20.0
 
 
 def taken(pipe: int) -> None:
-    """Wait until nothing is left in it, which nobody tells."""
+    """Wait until it is empty; no event reports that."""
     end = time.monotonic() + PATIENCE_S
     while fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)) != struct.pack("i", 0):
         assert time.monotonic() < end
@@ -70,7 +70,7 @@ def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -
 import os, sys
 from omnibot_driver.output import UnblockedOutput
 with UnblockedOutput():
-    print("to nobody", file=sys.stderr)
+    print("without a reader", file=sys.stderr)
     port = os.open("/dev/null", os.O_RDWR)
 sys.exit(port <= 2)
 """

@@ -59,7 +59,7 @@ def test_both_ends_of_a_range_are_allowed_and_nothing_beyond(parameter: Paramete
 
 @pytest.mark.parametrize("parameter", CHOICES, ids=name_of)
 def test_each_choice_is_allowed_and_the_message_lists_them(parameter: Parameter) -> None:
-    """Nobody has to look them up."""
+    """The message lists them."""
     for choice in parameter.choices:
         assert parameter.check(choice) == choice
     with pytest.raises(ParameterError) as caught:
@@ -109,7 +109,7 @@ def test_a_value_of_another_type_is_refused(parameter: Parameter, wrong: object)
     ],
 )
 def test_types_are_told_in_the_words_of_ros(name: str, wrong: object, words: str) -> None:
-    """Those of ``ros2 param describe``; who wrote no for a word is told what became of it."""
+    """Those of ``ros2 param describe``; the message explains what YAML made of the word no."""
     with pytest.raises(ParameterError) as caught:
         PARAMETERS.by_name[name].check(wrong)
     message = str(caught.value)
@@ -141,7 +141,7 @@ def test_any_value_is_either_taken_in_the_right_type_or_refused(
 
 @pytest.mark.parametrize("wrong", [[1, 0, 1], [1, 2, 1], [1, 1, 0.5]])
 def test_axis_signs_are_nothing_but_ones(wrong: list[float]) -> None:
-    """A sign is no factor."""
+    """Only signs are accepted, not factors."""
     with pytest.raises(ParameterError, match="each 1 or -1"):
         PARAMETERS.by_name["axis_signs"].check(wrong)
 

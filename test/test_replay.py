@@ -157,7 +157,7 @@ def test_time_passes_as_it_did() -> None:
 
 
 def test_a_recorded_robot_is_not_blamed_for_moving() -> None:
-    """Nobody here has told it to, and nobody is sent to switch it off."""
+    """It has no command here, and no message asks to switch it off."""
     heard = play(Tape(simulated(600)))
     assert [event for event in heard.events if isinstance(event, Notice)] == [ENDED]
 
@@ -220,7 +220,7 @@ def test_a_recording_that_breaks_off_says_so() -> None:
 
 
 def test_an_empty_recording_ends_at_once() -> None:
-    """Nothing was recorded, nothing is told."""
+    """Nothing was recorded, so nothing is published."""
     heard = play(Tape([]))
     assert heard.events == [ENDED]
     assert heard.reports == []

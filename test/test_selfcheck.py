@@ -39,7 +39,7 @@ def test_a_link_leads_to_the_adapter(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("latency", ["1\n", "5\n", "", "soon\n"])
 def test_a_short_timer_or_one_that_says_nothing_is_left_alone(tmp_path: Path, latency: str) -> None:
-    """Nobody is bothered."""
+    """No warning appears."""
     assert selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", latency)) == ""
 
 

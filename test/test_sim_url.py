@@ -34,7 +34,7 @@ def test_a_robot_drives_without_a_port_and_without_another_process() -> None:
 
 
 def test_a_board_that_ends_with_the_driver_needs_no_guard() -> None:
-    """Nobody is warned of a robot that would go on."""
+    """No warning of a robot that would go on."""
     listener, ours = Listener(), session()
     link = link_to("sim://?running", listener, ours)
     link.start()

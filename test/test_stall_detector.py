@@ -36,7 +36,7 @@ def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
 
 
 def test_a_standstill_is_told_once_with_its_length() -> None:
-    """Whichever thread runs first afterwards; the next standstill is told again."""
+    """The first thread that runs afterwards reports it; the next stall is reported again."""
     standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     assert standstill.begun(103.0) == pytest.approx(3.0)

@@ -75,7 +75,7 @@ pauses_s = st.floats(0.001, 30.0)
 def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apart(
     sender_s: float, receiver_s: float, messages: list[tuple[float, float, bool]]
 ) -> None:
-    """On the way or in our own queue; what is told is never more than the true delay."""
+    """On the way or in our own queue; the reported delay never exceeds the true one."""
     receiver, sender, now_s = Receiver(receiver_s), Sender(sender_s), 100.0
     for pause_s, late_s, waits in messages:
         now_s += pause_s
@@ -129,7 +129,7 @@ def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, share
 def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
     step_s: float, jitter_s: float
 ) -> None:
-    """It cannot be told from a network that has become slow; that would have been told."""
+    """It looks like a network that has become slow, which would have been reported."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for _ in range(100):
         now_s += 0.1

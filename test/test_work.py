@@ -2,8 +2,8 @@
 
 """How much Python is called for each tick of the nominal stream: a guard that counts, not times.
 
-A bound is a little above what was counted when it was set. Whoever makes the path longer raises it,
-and says in docs/internals/performance.md what for.
+A bound is a little above what was counted when it was set. A change that makes the path longer
+raises it, and says in docs/internals/performance.md what for.
 """
 
 import gc
@@ -44,7 +44,7 @@ def calls(work: Callable[[], object]) -> int:
         count += event == "call"
 
     before = sys.getprofile()
-    gc.disable()  # Hypothesis is called when it runs, and is no part of the work
+    gc.disable()  # Hypothesis is called when it runs, and is not part of the work
     sys.setprofile(see)
     try:
         work()

@@ -59,7 +59,7 @@ def trust(data: bytes) -> list[Frame]:
 
 
 def trust_all(blocks: Sequence[bytes]) -> int:
-    """Nobody keeps the frames, as with ``decode``: to keep them all costs half as much again."""
+    """The frames are not kept, as with ``decode``: to keep them all costs half as much again."""
     return sum(len(trust(block)) for block in blocks)
 
 

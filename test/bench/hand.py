@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commands two robots in turn, 40 times a second each, for so many seconds.
+"""Commands two robots in turn, 40 times a second each, for a number of seconds.
 
 Arguments: seconds, namespaces. Prints one JSON array per namespace: pairs of the steady clock's
 time in s at which a command was published, and its forward speed in the board's units.

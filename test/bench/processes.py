@@ -80,7 +80,7 @@ def floor(what: str, path: str, namespace: str) -> Program:
 
 
 def step(what: str, path: str, namespace: str) -> Program:
-    """The smallest relay that does so much more."""
+    """The smallest relay with this one step more."""
     return Program(str(HERE / "steps.py"), what, path, namespace)
 
 

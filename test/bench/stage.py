@@ -2,7 +2,7 @@
 
 """Boards that say the nominal stream on pseudo-terminals, each at a moment of its own in the tick.
 
-They take turns within the 10 ms, so whoever reads them is measured in alternation. Every IMU frame
+They take turns within the 10 ms, so their readers are measured in alternation. Every IMU frame
 carries a number in its first word; nothing else of a board is simulated.
 """
 
@@ -74,7 +74,7 @@ class Stage:
             for board, (near, _) in enumerate(self._ends):
                 time.sleep(max(0.0, at + board * TICK_S / boards - time.monotonic()))
                 self.said[board].append(time.monotonic())
-                with suppress(BlockingIOError):  # nobody reads it yet
+                with suppress(BlockingIOError):  # it is not read yet
                     os.write(near, data)
             tick, at = tick + 1, at + TICK_S
 

@@ -97,7 +97,7 @@ class Relay:
         self.publish(estimates)
 
     def measure(self, data: bytes) -> None:
-        """... stamped, checked and integrated; and the session is told the rest."""
+        """... stamped, checked and integrated; and the session gets the rest."""
         now = time.monotonic()
         self.publish(list(self._session.hear(data, now)))
         self._session.process(now)

@@ -114,7 +114,7 @@ def test_two_surprising_poses_that_disagree_confirm_nothing() -> None:
 
 
 def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> None:
-    """From +π to −π is no jump."""
+    """From +π to −π is not a jump."""
     odometry = Odometry(SETTINGS)
     attach(odometry, heading(math.pi - 0.01))
     odometry.displace(earth(0.0, 0.0, 0.02), 0.0)
@@ -199,7 +199,7 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 
 
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
-    """Whoever drives to a place in it must know that it lies otherwise."""
+    """Goals in it must be discarded."""
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))
     counted = [odometry.alignments]

@@ -113,7 +113,7 @@ def test_resetting_odometry_resets_the_boards(bench: AnyBench) -> None:
 
 
 def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: AnyBench) -> None:
-    """Both are told."""
+    """Both are reported."""
     bench.drive_on()
     tell(bench, EStopButtonReading(True))
     assert bench.session.estop_active

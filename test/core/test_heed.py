@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is left of a read when its IMU readings are told: mostly nothing, and nothing is missed."""
+"""What is left of a read after its IMU readings: mostly nothing, and nothing is missed."""
 
 from contextlib import suppress
 

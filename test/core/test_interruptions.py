@@ -64,7 +64,7 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 
 
 def test_a_restart_leaves_its_doubt_in_the_covariance_for_good() -> None:
-    """Nobody will ever know how the robot rolled out."""
+    """How the robot rolled out stays unknown."""
     on = line(1)
     before = on.estimates[-1].covariance
     on.board.receive(b"R")

@@ -15,7 +15,7 @@ NAME = next(name for name in BOARDS if name == "two lines")
 
 
 def test_it_is_answered_once() -> None:
-    """By whoever carries it out; what comes later says nothing."""
+    """Only the first end counts."""
     task = LongTask()
     task.begin("record", "token", 120.0, 5.0)
     assert task.is_current("token")

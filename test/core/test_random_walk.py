@@ -72,7 +72,7 @@ class Walk(Bench):
             self.judge_time()
 
     def stall(self, seconds: float) -> None:
-        """Nobody serves the session; the line goes on."""
+        """The session is not served; the line goes on."""
         for _ in range(round(seconds / TICK_S)):
             self.step_board()
         if self.session.estop_active:
@@ -201,7 +201,7 @@ class Walk(Bench):
             assert self.session.state in RUNNING, "motion for a board that is not known to run"
             assert not self.session.estop_active, "motion under the e-stop"
             assert self.commanded_at is not None, "motion that was discarded"
-            assert self.now - self.commanded_at < TIMEOUT_S, "motion that nobody wants any more"
+            assert self.now - self.commanded_at < TIMEOUT_S, "motion after the timeout"
             assert not any(asked.request is not Request.START for asked in self.asked.values())
         if data.endswith(b"P"):
             assert data.endswith(STOP + PAUSE)

@@ -59,7 +59,7 @@ def test_requests_without_a_port_are_refused() -> None:
 
 
 def test_a_request_ends_with_the_port(bench: Bench) -> None:
-    """Nobody waits for an answer that cannot come."""
+    """The caller does not wait for an answer that cannot come."""
     bench.session.request(Request.RESET, token := object(), bench.now)
     bench.close()
     answers = [event for event in bench.events if isinstance(event, RequestDone)]

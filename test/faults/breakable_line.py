@@ -59,7 +59,7 @@ def noise(random: Random) -> Damage:
 
 
 def late(ticks: int) -> Damage:
-    """An adapter that keeps everything back for so long, then hands it over at once."""
+    """An adapter that holds everything for this time, then delivers it at once."""
     held: list[bytes] = []
 
     def damage(data: bytes) -> bytes:
@@ -77,7 +77,7 @@ class BreakableLine:
     """A board as its terminal sees it: ``receive`` and ``step`` go through damage.
 
     ``sent``: every frame and text the board sent, whole or damaged later; ``driven_at``: the last
-    tick in which its motors were told to turn.
+    tick in which its motors had a command to turn.
     """
 
     tick_s = TICK_S

@@ -2,8 +2,8 @@
 
 """A busy computer: busy loops on every core, and an adapter that hands over four bytes at a time.
 
-The line is undamaged, so everything that the board sent is published, and nothing else; and nobody
-is told to look at the cable.
+The line is undamaged, so everything that the board sent is published, and nothing else; and no
+message blames the cable.
 """
 
 import subprocess
@@ -24,7 +24,7 @@ TICKS: Final = 3000
 TRANSIT: Final = 200
 """Frames that may be under way when the comparison begins."""
 REACH: Final = 200
-"""Of the frames sent; a message that is none of the next so many was never sent."""
+"""Of the frames sent; a message that is not among the next of this number was never sent."""
 
 
 class PiecesTerminal(Terminal):

@@ -122,7 +122,7 @@ class Campaign(Outcome):
             row.stood_s = max([row.stood_s, *rig.findings.stood_after_s])
             if again:
                 rig.expect_obeys_again()
-        except Exception as error:  # whatever it is, the others are tried all the same
+        except Exception as error:  # whatever it is, the others are tried nevertheless
             rig.findings.expect(False, f"{row.name}: {error!r}")
         row.tried += 1
         rig.findings.stood_after_s.clear()

@@ -25,22 +25,22 @@ Case = Callable[[R], object]
 
 NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
 HANGS_S: Final = 1.0
-"""So long the guard waits for a sign of life."""
+"""How long the guard waits for a heartbeat."""
 DAMAGED_S: Final = 1.1
 """After the last command the robot stands by then, and the rig's grace, on a damaged line."""
 UNHEARD: Final = "robot moves although|moving without a command|stop unconfirmed"
 """In the log of a driver that the board does not hear."""
 NEXT_ATTEMPT_S: Final = 2.0
-"""At the latest after so long a lost port is opened again."""
+"""The latest time after which a lost port is opened again."""
 SILENCE_S: Final = 1.5
-"""So long a board may say nothing before the driver holds it for lost."""
+"""How long a board may be silent before the driver takes it for lost."""
 
 
 def ticks(seconds: float) -> int:
     return round(seconds / TICK_S)
 
 
-# Whoever commands
+# Commanders
 
 
 def publisher_ceases(rig: Rig) -> None:

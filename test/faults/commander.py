@@ -17,7 +17,7 @@ FAR_M: Final = 10.0
 
 
 class Hand(Protocol):
-    """Whoever it is."""
+    """Any sender."""
 
     def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
         """Command about this."""

@@ -20,5 +20,5 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def lenience() -> dict[str, float]:
-    """Whoever tests may have a busy machine; ``make faults`` holds the driver to 0.1 s and 2 s."""
+    """A test may run on a busy machine; ``make faults`` holds the driver to 0.1 s and 2 s."""
     return {"grace_s": 1.0, "ends_within_s": 10.0}

@@ -105,14 +105,14 @@ def by_topic(rig: Rig) -> None:
 
 
 def by_signal_while_a_call_is_pending(rig: Rig) -> None:
-    """Nobody waits for its answer."""
+    """The test does not wait for its answer."""
     rig.probe.call_async(Trigger, "reset")
     rig.probe.wait_for_state("connecting")
     rig.driver.process.send_signal(signal.SIGTERM)
 
 
 def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
-    """The robot drives on by what it was told before the cable came out."""
+    """The robot drives on by its last command before the cable came out."""
     rig.unplug()
     rig.probe.wait_for_state("disconnected")
     rig.plug()
@@ -176,7 +176,7 @@ ENDINGS: Final[dict[str, Ending]] = {
 def terminal_is_closed(
     make_rig: Callable[[str], Rig], run: Callable[[Rig, Ending], object]
 ) -> None:
-    """A session over ssh that drops: SIGHUP, and nobody who takes what is printed."""
+    """A session over ssh that drops: SIGHUP, and no reader of its output."""
     master, slave = pty.openpty()
     with make_rig(TERMINAL.format(os.ttyname(slave))) as rig:
         os.close(slave)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random input from ROS: messages of any content and size, bytes that are no message, calls."""
+"""Random input from ROS: messages of any content and size, invalid bytes, calls."""
 
 import struct
 from collections.abc import Callable
@@ -53,12 +53,12 @@ def pose(random: Random) -> PoseStamped:
 
 
 def no_message(random: Random) -> bytes:
-    """Bytes on the wire that are no message of this type, or hardly one."""
+    """Bytes that are not a valid message of this type, or barely one."""
     return CDR_LITTLE_ENDIAN + random.randbytes(random.randrange(64))
 
 
 def parameters(random: Random) -> SetParameters.Request:
-    """Values that may or may not be allowed; identity and names that nobody knows too."""
+    """Values that may or may not be allowed; read-only ones and unknown names too."""
     value = random.choice(
         (
             ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=odd_float(random)),
@@ -76,7 +76,7 @@ def coin(random: Random) -> bool:
 
 
 def fuzz(rig: Rig, count: int, random: Random) -> None:
-    """So many messages and calls: all calls are answered, the node lives, the readings go on."""
+    """Send messages and calls: all calls are answered, the node lives, the readings go on."""
     probe = rig.probe
     publishers = [
         (probe.publisher(Twist, "cmd_vel"), twist),

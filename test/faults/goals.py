@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What discards a goal of position control: nobody says anything, and the robot stands.
+"""What discards a goal of position control: without another command the robot stands.
 
 Each event returns the board's tick from which it has to.
 """
@@ -19,7 +19,7 @@ from stuck import TAKES_NOTHING
 OLD_GOAL: Final = bytes.fromhex("FF FE 01 7F FF 7F FF 00 00")
 """As far away as can be said."""
 UNHEARD_S: Final = 0.3
-"""A robot that is not heard for so long is driven no further."""
+"""After this time without data from it the robot is not driven any further."""
 HANGS_S: Final = 1.0
 
 

@@ -33,7 +33,7 @@ def two_commanders(rig: Rig) -> None:
 
 
 def other_type(rig: Rig) -> None:
-    """A TwistStamped on the same topic neither drives nor keeps a command alive; it is told."""
+    """A TwistStamped on the same topic neither drives nor prolongs a command; it is reported."""
     context = rclpy.Context()
     context.init()
     node = Node("other", namespace=rig.driver.namespace, context=context)
@@ -70,7 +70,7 @@ def flood_of_releases(rig: Rig) -> None:
 
 
 def everybody_calls_at_once(rig: Rig) -> None:
-    """Five clients, during a reconnection: each is answered, and nobody moves the robot."""
+    """Five clients, during a reconnection: each is answered, and none moves the robot."""
     rig.drive()
     rig.hand.leave()
     rig.unplug()
@@ -135,7 +135,7 @@ def limit_lowered(rig: Rig) -> None:
 
 
 def flood_into_a_full_port(rig: Rig) -> None:
-    """1,000 commands a second; then the port takes bytes again, and nobody commands."""
+    """1,000 commands a second; then the port accepts data again, without commands."""
     publisher = rig.probe.publisher(Twist, "cmd_vel")
     fast = Twist()
     fast.linear.x = 0.4

@@ -69,7 +69,7 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def kept_full(self, old: bytes) -> Iterator[None]:
-        """Likewise, and it takes nothing when the driver has emptied it: its output is held."""
+        """The same, and it accepts nothing when the driver has emptied it: its output is held."""
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
             with self.full(old):

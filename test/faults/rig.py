@@ -48,7 +48,7 @@ class Findings:
 
     complaints: list[str] = field(default_factory=list)
     stood_after_s: list[float] = field(default_factory=list)
-    """How long after it had to the robot was told to stand, by the board's clock."""
+    """How late Stop reached the robot, by the board's clock."""
     published: int = 0
     wrong: int = 0
 
@@ -67,7 +67,7 @@ class Rig:
 
     ``kind``: of board, with these ``settings`` of its own; ``before``: Python for the driver's
     process; ``grace_s`` and ``ends_within_s``: how long after
-    it has to the robot may be told to stand, and a driver may take to end.
+    it has to Stop may reach the robot, and a driver may take to end.
     """
 
     def __init__(
@@ -119,7 +119,7 @@ class Rig:
         self._stack.close()
 
     def make_hand(self) -> Hand:
-        """Whoever commands the robot."""
+        """The commander of the robot."""
         stick = Stick(self.probe)
         self._stack.callback(stick.leave)
         return stick
@@ -139,7 +139,7 @@ class Rig:
         self._terminal.deaf = False
 
     def unplug(self) -> None:
-        """The terminal goes away; the robot does what it was told last."""
+        """The terminal goes away; the robot follows its last command."""
         if self._terminal is not None:
             self._terminal.__exit__(None, None, None)
             self._terminal, self._unplugged_at_s = None, time.monotonic()
@@ -177,7 +177,7 @@ class Rig:
         assert self.wait_for_board(lambda line: line.board.driven), self.driver.output
 
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
-        """From ``since_tick`` on the motors may be driven for so long, and not again."""
+        """From ``since_tick`` on the motors may be driven for this time, and not again."""
         ticks = round((allowed_s + self._grace_s) / TICK_S)
         self.wait_ticks(max(0, since_tick + ticks + 50 - self.line.tick))
         stood_s = max(0, self.line.driven_at - since_tick) * TICK_S

@@ -18,7 +18,7 @@ class RigBoard:
     ``old_command``: bytes that drive it; ``stop``: what it hears last, however a driver ends;
     ``opening``: what it hears first on a new line. ``wheels``: how many wheel_cmd has;
     ``services``: of the common ones; ``tuning``: parameters that refuse nonsense. ``off_within_s``:
-    how long after they are told to, its motors are off; ``old_bytes_s``: how long it takes to hear
+    how long after a stop its motors are off; ``old_bytes_s``: how long it takes to hear
     what a full port has kept; ``ends_later_s``: how much longer its driver takes to end;
     ``deaf_s``: how long it may miss what is said on one line, so that the next one has to tell it.
     ``imu``: whether it sends readings of one.

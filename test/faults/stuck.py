@@ -56,10 +56,10 @@ def full_for_long(rig: Rig) -> None:
 
 
 def estop_into_a_full_port(rig: Rig) -> None:
-    """Whoever pressed it is told that it is late; then it comes before anything that moves."""
+    """The answer says that the stop is late; then it precedes every motion command."""
     rig.drive()
     rig.hand.leave()
-    rig.expect_still(rig.line.tick, "nobody drives")
+    rig.expect_still(rig.line.tick, "no command")
     rig.wait_ticks(100)  # the line is quiet
     with rig.terminal.kept_full(rig.kind.old_command):
         answer = rig.probe.call(SetBool, "estop", data=True)
@@ -112,7 +112,7 @@ def server_closes_one_direction(rig: NetworkRig) -> None:
 
 
 def server_dies(rig: NetworkRig) -> None:
-    """Nobody listens for a while."""
+    """No one reads the port for a while."""
     rig.drive()
     mark = len(rig.driver.lines)
     rig.unplug()

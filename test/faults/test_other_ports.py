@@ -55,7 +55,7 @@ def goals(
 def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
     case: Callable[[GoalRig], None], goals: GoalRig
 ) -> None:
-    """Nobody sends a second one meanwhile."""
+    """No second one is sent meanwhile."""
     case(goals)
     goals.expect_obeys_again()
     goals.judge_stream()

@@ -22,7 +22,7 @@ STANDS_AGAIN_S: Final = 1.0
 
 
 def walk(rig: Rig, random: Random, steps: int) -> list[str]:
-    """So many faults; returns their names in order."""
+    """Inject this many faults; returns their names in order."""
     names = []
     for step in range(1, steps + 1):
         if random.random() < 0.8:

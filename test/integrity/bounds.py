@@ -17,7 +17,7 @@ BUSY_FAULTS = ("none, starting anywhere", "1 byte in 1,000 lost", "1 byte in 100
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """At most one wrong frame in so many (None: none at all), at least this share delivered.
+    """At most one wrong frame in this many (None: none at all), at least this share delivered.
 
     All means all after the first two.
     """

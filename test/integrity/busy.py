@@ -25,10 +25,10 @@ TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
 BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
 """Of the wake-ups beside busy loops, behind which the process gets no more than its share."""
 SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
-"""Then each read is late by so much, always the same but for 1 ms; each piece takes so long."""
+"""Then each read is late by this time, within 1 ms; and the time of each piece."""
 HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)
-"""After so many the line is mixed anew."""
+"""After this many the line is mixed again."""
 
 
 def delay_s(random: Random, now: float = 0.0) -> float:

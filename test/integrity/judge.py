@@ -14,7 +14,7 @@ MOST_DROPPED = 30
 """Intact frames that a parser leaves out in a row, unless what follows shows that it did: a false
 frame may read as a true one that is still to come."""
 REACH_BYTES = 600
-"""A frame that comes out was sent within so many bytes before the end of what was handed over,
+"""A frame that comes out was sent within this many bytes before the end of the delivered ones,
 or within the read itself."""
 
 

@@ -29,7 +29,8 @@ BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """At most so much of the time under uncommanded set-points, and one long one in so many frames.
+    """The largest part of the time under uncommanded set-points, and one long one in this many
+    frames.
 
     Stray motion, false letters and robots that are still driven: none; at `overdue` False that is
     only reported.
@@ -76,7 +77,7 @@ def ms(seconds: float) -> str:
 
 
 def share(score: Score) -> str:
-    """Of the time under way, that with a set-point nobody commanded."""
+    """The part of the time with an uncommanded set-point."""
     return f"{score.uncommanded_s / score.driving_s:.3%}" if score.driving_s else "-"
 
 

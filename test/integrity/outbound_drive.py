@@ -29,7 +29,7 @@ from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import SILENCE_S, STANDS_WITHIN_S
 
 READ_S: Final = 0.002
-"""What the board sends in a tick is read so long after it."""
+"""How long after a tick its bytes are read."""
 STANDS: Final = Shown("running", False)
 CLOCK_S: Final = 1e-6
 """A clock that is read again has gone on."""
@@ -89,7 +89,7 @@ def rehearse(scene: Scene, history: History) -> list[Write]:
 
 
 class _Rehearsal:
-    """One session on a board that shows what it is told to."""
+    """One session on a board that follows commands."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene

@@ -125,7 +125,7 @@ def drive(rate_hz: float, random: Random) -> Scene:
 
 
 def timeout(random: Random) -> Scene:
-    """Whoever commands ceases to."""
+    """The commander ceases."""
     wishes, last_s = _leg(random)
     return Scene(
         kind="timeout",
@@ -137,7 +137,7 @@ def timeout(random: Random) -> Scene:
 
 
 def zero(random: Random) -> Scene:
-    """Whoever commands wants it to stand, and goes on saying so for a while."""
+    """The commander sends zero, and repeats it for a while."""
     wishes, last_s = _leg(random)
     gap_s = 1.0 / random.choice(RATES_HZ)
     until_s, now = last_s + random.uniform(0.0, 0.7), last_s + gap_s

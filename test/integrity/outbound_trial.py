@@ -292,7 +292,7 @@ class Trial:
         self._understood = self._course.understood(self._board.receiver)
 
     def _example(self, what: str) -> None:
-        """For whoever wants to see the bytes; the first few of a score."""
+        """For inspection of the bytes: the first few of a score."""
         examples = self._judge.score.examples
         if len(examples) < EXAMPLES:
             examples.append(Example(self._course.scene.kind, self._board, what, tuple(self._last)))

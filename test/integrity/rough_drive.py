@@ -139,7 +139,7 @@ class RoughDrive(Bench):
             self.settle()
 
     def go(self, seconds: float) -> Outcome:
-        """Drive about for so long."""
+        """Drive about for this time."""
         self.open()
         self.run(2.0)
         self._hands_at = self.now + self._random.expovariate(1 / SECONDS_BETWEEN_HANDS)

@@ -109,7 +109,7 @@ def test_every_assumption_has_its_step_and_what_mends_it() -> None:
     steps = set(re.findall(r"^## (\d)\. ", text, re.MULTILINE))
     form = re.findall(r"^\| (.+) \| (\d) \| (.+) \| \|$", text, re.MULTILINE)
     assert {step for _, step, _ in form} == steps
-    named = {name for _, _, mends in form for name in re.findall(r"`(\w+)`", mends)}
+    named = {name for _, _, corrects in form for name in re.findall(r"`(\w+)`", corrects)}
     assert named - {"imu_rpy"} <= set(PARAMETERS.by_name)
 
 

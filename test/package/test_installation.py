@@ -117,7 +117,7 @@ def test_colcon_installs_what_ros2_looks_for(prefix: Path) -> None:
 
 
 def test_the_installed_documents_link_to_installed_files(prefix: Path) -> None:
-    """Whoever has no repository at hand reads them there."""
+    """Users without the repository read them there."""
     pages = [*(prefix / "share" / PACKAGE).glob("**/*.md")]
     assert len(pages) > 10
     for page in pages:

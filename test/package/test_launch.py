@@ -211,7 +211,7 @@ def test_rviz_is_shown_where_asked_for(launch: Callable[..., Started]) -> None:
 
 @needs_launch
 def test_the_filter_alone_publishes_the_transform(launch: Callable[..., Started]) -> None:
-    """The driver is told not to, the description tells where the IMU is, all in one namespace."""
+    """The driver does not publish it, the description places the IMU, all in one namespace."""
     started = launch("ekf.launch.py", "namespace:=robot1", "frame_prefix:=robot1/")
     assert set(started) == {"driver", "ekf_node", "robot_state_publisher", "xacro"}
     assert parameters(started["driver"])["publish_tf"] is False

@@ -174,7 +174,7 @@ def test_every_entry_point_names_a_function(setup_arguments: dict[str, Any]) -> 
 
 
 def test_manifest_declares_what_the_package_needs_and_nothing_else() -> None:
-    """On a machine set up by rosdep nothing is missing, and nothing is installed for nobody."""
+    """On a machine set up by rosdep nothing is missing, and nothing superfluous is installed."""
     started = started_by(python_files("launch"))
     needed = third_party(python_files(PACKAGE, "launch")) | (started - OPTIONAL)
     assert needed == declared("exec_depend")

@@ -19,7 +19,7 @@ ASSIGNMENTS = {"SYMLINK", "GROUP", "MODE", "ATTR{latency_timer}"}
 
 
 def rules(lines: list[str]) -> list[dict[str, tuple[str, str]]]:
-    """Each line as its keys, with operator and value; anything that is no rule fails."""
+    """Each line as its keys, with operator and value; anything that is not a rule fails."""
     parsed = []
     for line in lines:
         tokens = [TOKEN.fullmatch(token) for token in line.split(", ")]
@@ -42,7 +42,7 @@ def test_every_rule_matches_before_it_assigns() -> None:
 
 
 def test_each_adapter_gets_the_same_name_and_rights() -> None:
-    """/dev/omnibot for the group dialout, and nobody else."""
+    """/dev/omnibot for the group dialout only."""
     assert len(OFFERED) == 4
     for rule in OFFERED:
         assert rule["SUBSYSTEM"] == ("==", "tty")

@@ -2,7 +2,8 @@
 
 """A simulated toy of two serial channels: two wheels behind one, a steered one behind the other.
 
-It is told ``go V W`` (m/s, rad/s) and ``angle DEGREES``, and tells ``odo X Y YAW`` every 400 ms and
+It receives ``go V W`` (m/s, rad/s) and ``angle DEGREES``, and sends ``odo X Y YAW`` every 400 ms
+and
 ``fwl DEGREES`` every 20 ms, each in a line of its own.
 """
 

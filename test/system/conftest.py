@@ -73,7 +73,8 @@ def probe(driver: Driver, probe_of: Callable[[Driver], Probe]) -> Probe:
 
 @pytest.fixture
 def silent_terminal() -> Iterator[tuple[int, str]]:
-    """A pseudo-terminal with nobody behind it: the descriptor of its far end, and its name."""
+    """A pseudo-terminal without a program behind it: the descriptor of its far end, and its
+    name."""
     far, near = os.openpty()
     tty.setraw(near)
     yield far, os.ttyname(near)

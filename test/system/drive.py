@@ -64,7 +64,7 @@ class Outcome:
 
 
 def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float = 0.0) -> Outcome:
-    """Drive for so long, stand still for two seconds, and compare. Needs an initialised rclpy."""
+    """Drive for this time, stand still for two seconds, and compare. Needs an initialised rclpy."""
     from driver_process import Driver
     from geometry_msgs.msg import Twist
     from nav_msgs.msg import Odometry
@@ -174,7 +174,7 @@ def trace(
 
 
 def since(found: Sequence[int | None]) -> int:
-    """The first frame that was heard: before it nobody listened."""
+    """The first frame that was heard: before it the listener was not ready."""
     return next(number for number in found if number is not None)
 
 

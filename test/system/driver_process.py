@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Self
 
 PATIENCE_S = 60.0
-"""How long an event is awaited before a test gives up; nobody asserts how long it took."""
+"""How long an event is awaited before a test gives up; no test asserts how long it took."""
 
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     signal.signal(signal.SIGHUP, lambda *_: None)  # as good under nohup, and no child inherits it

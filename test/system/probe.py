@@ -118,7 +118,7 @@ class Probe:
             self._clients[service] = self.node.create_client(kind, f"omnibot_driver/{service}")
             self._executor.wake()
         client = self._clients[service]
-        assert client.wait_for_service(PATIENCE_S), f"nobody offers {service}"
+        assert client.wait_for_service(PATIENCE_S), f"no service {service}"
         return client
 
     def call_async(self, kind: type, service: str, **request: object) -> "Answer":

@@ -185,7 +185,7 @@ def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
 def test_laps_are_told_in_english(
     laps: float, told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """One is no plural."""
+    """One lap has no plural s."""
     display.report(
         display.Drive(
             seconds=20.0,
@@ -205,7 +205,7 @@ def test_laps_are_told_in_english(
 def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Nothing is said of an IMU, and the real robot's driver is told which board it is."""
+    """Nothing is said of an IMU, and the command for the real robot names the board."""
     real = "-p board:=cart -p port:=/dev/ttyUSB0"
     cart = Capability(title="cart", imu=False, sideways=False, ports=("port",), real=real)
     display.introduce(cart, (" --board cart", "-p board:=cart -p port:=/dev/pts/1"), "/d", "X=1", 9)
@@ -261,7 +261,7 @@ def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_on_the_way_ends_it_cleanly(number: signal.Signals) -> None:
-    """The robot is stopped, the result is told, the exit code is 0, and nothing is left."""
+    """The robot is stopped, the result printed, the exit code is 0, and nothing is left."""
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         process.send_signal(number)

@@ -35,7 +35,7 @@ def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
 
 
 def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) -> None:
-    """What the tools note beside it is no news; comments and order are the user's."""
+    """Notes of the tools are not reported; comments and order stay."""
     path = tmp_path / "robot.yaml"
     path.write_text("axis_signs: [1, -1, -1]\nimu_rpy: [0, 0, 0]\nstep: {}\nlinear_scale: 80\n")
     line = said_of(path, start_driver)
@@ -46,7 +46,7 @@ def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) ->
 def test_names_that_are_not_read_are_told_with_the_nearest(
     start_driver: Start, tmp_path: Path
 ) -> None:
-    """Misspelt, or a parameter that is no calibration: in one warning."""
+    """Misspelt names and other parameters: one warning."""
     path = tmp_path / "robot.yaml"
     path.write_text("axis_sings: [1, -1, -1]\nmax_linear_speed: 0.2\n7: 1\n")
     line = said_of(path, start_driver)

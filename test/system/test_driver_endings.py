@@ -60,7 +60,7 @@ so elsewhere this changes nothing."""
 def test_a_signal_while_driving_ends_with_the_stop_frame_and_exit_code_zero(
     start_board: Start, start_driver: Start, probe_of: Start, signals: list[signal.Signals]
 ) -> None:
-    """Ctrl-C on ``ros2 launch`` arrives twice; the stop frame goes out all the same."""
+    """Ctrl-C on ``ros2 launch`` arrives twice; the stop frame is still sent."""
     board = start_board()
     driver: Driver = start_driver(board.path, before=PATIENT)
     probe: Probe = probe_of(driver)

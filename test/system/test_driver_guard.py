@@ -59,7 +59,7 @@ def hang(driver: Driver, board: PtyBoard) -> int:
 
 
 def wait_until(predicate: Callable[[], object]) -> None:
-    """For processes and log lines, of which nobody is told."""
+    """For processes and log lines, which raise no event."""
     end = time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end, "it did not come about"
@@ -223,7 +223,7 @@ def test_every_connection_has_one_guard_and_no_process_stays_behind(
 
 
 def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: Probe) -> None:
-    """Whoever ends it by ctrl-C does not find an e-stop afterwards."""
+    """After ctrl-C no e-stop remains."""
     driving(probe, board)
     assert driver.end(signal.SIGINT) == 0
     with board.lock:

@@ -169,7 +169,7 @@ def test_the_updater_publishes_where_it_is_installed(robot: Robot) -> None:
 
 
 def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> None:
-    """And it is no error."""
+    """It is not an error."""
     odometry = robot.probe.listen(Odometry, "odom")
     robot.probe.wait_for(lambda: odometry)
     assert odometry[-1].header.frame_id == "robot1/odom"

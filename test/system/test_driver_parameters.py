@@ -89,7 +89,7 @@ runpy.run_module("omnibot_driver.driver", run_name="__main__")
 
 @pytest.mark.parametrize("arguments", [["-h"], ["--help"], ["--ros-args", "-p", "x:=1", "--help"]])
 def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
-    """Before anything is loaded; it is no error."""
+    """Before anything is loaded, with exit code 0."""
     command = [sys.executable, "-c", WITHOUT_ROS, *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
     assert (ended.returncode, ended.stderr) == (0, "")
@@ -109,7 +109,7 @@ OPENS_NOTHING = "import serial; serial.serial_for_url = None"
 def test_a_parameter_file_for_another_node_is_told(
     start_driver: Start, tmp_path: Path, first_line: str, said: str, told: int
 ) -> None:
-    """ROS passes it over, and a port would be opened that nobody meant."""
+    """ROS ignores it, and the wrong port would be opened."""
     path = tmp_path / "driver.yaml"
     path.write_text(f"{first_line}:\n  ros__parameters:\n    port: /dev/null\n")
     driver: Driver = start_driver(None, before=OPENS_NOTHING, more=["--params-file", str(path)])
@@ -120,7 +120,7 @@ def test_a_parameter_file_for_another_node_is_told(
 
 
 def test_integers_are_taken_for_real_numbers(start_board: Start, start_driver: Start) -> None:
-    """``max_linear_speed: 1`` in a YAML file is no mistake worth refusing."""
+    """``max_linear_speed: 1`` in a YAML file is accepted."""
     board = start_board()
     driver: Driver = start_driver(board.path, max_linear_speed=1)
     driver.wait_for_line("state: nominal")
@@ -162,7 +162,7 @@ def test_tuning_changes_while_running_and_identity_does_not(
 def test_the_command_that_is_repeated_is_said_in_a_new_scale(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Nobody commands anew."""
+    """There is no new command."""
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path, cmd_vel_timeout=10.0))
     probe.wait_for_state("nominal")

@@ -215,7 +215,7 @@ def test_services_answer_with_a_reason_when_the_board_is_silent(
 
 
 def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: Start) -> None:
-    """Start, pause and reset have nobody to talk to; the e-stop latches all the same."""
+    """Start, pause and reset fail without a board; the e-stop still latches."""
     probe: Probe = probe_of(start_driver("/dev/there_is_no_such_port"))
     for kind, service in [(Trigger, "start"), (SetBool, "pause"), (Trigger, "reset")]:
         answer = probe.call(kind, service)

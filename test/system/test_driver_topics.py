@@ -142,7 +142,7 @@ def test_odometry_moves_with_the_robot(probe: Probe, board: PtyBoard) -> None:
 
 
 def test_the_state_topic_is_latched(probe: Probe, driver: Driver, probe_of: Start) -> None:
-    """Who comes late is told what is so."""
+    """A late subscriber gets the current value."""
     late: Probe = probe_of(driver)
     states = late.listen(String, "omnibot_driver/state", latched=True)
     late.wait_for(lambda: states)

@@ -186,7 +186,7 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
     driver: Driver, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """SIGSTOP leaves it no time to leave the screen; once it goes on, q ends it all the same."""
+    """SIGSTOP leaves it no time to leave the screen; once it goes on, q still ends it."""
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")
     line = os.open(f"/proc/{terminal.process.pid}/fd/0", os.O_RDWR | os.O_NOCTTY)

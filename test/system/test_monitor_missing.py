@@ -24,7 +24,7 @@ from omnibot_driver.tools.monitor.feed import Feed
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 QUICKLY = ["--timeout", "4"]
-"""Where something is missing, which is awaited for so long."""
+"""How long a missing part is awaited."""
 ROOT = Path(__file__).parents[2]
 
 
@@ -83,14 +83,14 @@ def test_without_a_driver_one_sentence_says_how_to_start_one(
 def test_in_a_wrong_namespace_the_drivers_that_are_there_are_named(
     fake: Probe, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With the option that leads to the first of them; a slash at its end is no matter."""
+    """With the option that leads to the first of them; a slash at its end does not matter."""
     said = sentence(capsys, "--once", "--namespace", "/elsewhere/", *QUICKLY)
     assert "no driver /elsewhere/omnibot_driver here, but /fake/omnibot_driver" in said
     assert said.endswith("try --namespace /fake")
 
 
 def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """What there is is printed all the same."""
+    """The rest is still printed."""
     assert main(["--once", "--namespace", "fake", *QUICKLY]) == 1
     output = capsys.readouterr()
     assert output.out.startswith("/fake/omnibot_driver  nominal")

@@ -70,7 +70,7 @@ class Stamped:
     samples: list[tuple[int, float, float]] = field(default_factory=list)
 
     def errors(self, since_s: float = SETTLED_S) -> list[float]:
-        """Stamp less sampling time, from so long after the first sample and after a restart."""
+        """Stamp minus sampling time, from this time after the first sample and after a restart."""
         return [at - self.sampled_s[tick] for tick, at, _ in self._settled(since_s)]
 
     def unevenness(self, since_s: float = SETTLED_S) -> float:

@@ -23,7 +23,7 @@ from omnibot_driver.tools.calibrate.robot import Robot, connect
 Answer = Callable[[str], str]
 
 BUSY_S = 3.0
-"""A machine that is busy for so long is no lost robot, and no program that was suspended."""
+"""Tolerance for a busy machine: neither a lost robot nor a suspended program."""
 
 
 def yes(_question: str) -> str:

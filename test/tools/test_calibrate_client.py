@@ -25,7 +25,7 @@ from omnibot_driver.tools.needs import ToolError
 def test_a_wrong_namespace_names_the_drivers_there_are(
     rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With exit code 1; a slash at its end is no matter."""
+    """With exit code 1; a slash at its end does not matter."""
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
     assert main(["imu", "--yes", "--namespace", "/nowhere/"]) == 1
     said = capsys.readouterr().err
@@ -64,7 +64,7 @@ def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--namespace", "no/such name!"], "is no namespace"),
+        (["--namespace", "no/such name!"], "is not a namespace"),
         (["--ros-args", "--nonsense"], "ROS does not understand its arguments"),
     ],
 )
@@ -79,7 +79,7 @@ def test_what_ros_cannot_take_is_a_sentence(
 def test_no_driver_at_all_says_how_to_start_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In a domain where nobody is."""
+    """In an empty domain."""
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 0.2)
     monkeypatch.setenv("ROS_DOMAIN_ID", "101" if os.environ["ROS_DOMAIN_ID"] != "101" else "100")
     assert main(["imu", "--plot", str(tmp_path)]) == 1

@@ -77,14 +77,14 @@ def test_the_whole_walk_finds_what_was_planted(
 def test_switch_and_deltas_are_told_by_the_data(
     planted: dict[str, Any], found: dict[str, str], tmp_path: Path
 ) -> None:
-    """Nobody has to look."""
+    """No question is asked."""
     with rig(tmp_path, **planted) as robot:
         assert robot.calibrate("commission", "--only", "board") == 0
         assert robot.written().items() >= found.items()
 
 
 class Deaf:
-    """A robot that can be told everything."""
+    """A robot with every interface."""
 
     parameters: ClassVar[dict[str, Any]] = {one.name: one.default for one in PARAMETERS.rows}
 

@@ -63,7 +63,7 @@ def ending(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Ending:
 
 
 def test_all_is_well(ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """What was found is told, saved and drawn."""
+    """The result is printed, saved and drawn."""
     assert ending() == 0
     assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
     assert "<svg" in (tmp_path / "imu.svg").read_text()
@@ -96,7 +96,7 @@ def test_a_file_that_cannot_be_written_costs_the_file_alone(
 def test_a_broken_pipe_loses_nothing(
     ending: Ending, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever read along has gone before the table comes."""
+    """The reader of the output has gone before the table comes."""
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w") as gone:

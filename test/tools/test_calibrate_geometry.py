@@ -128,7 +128,7 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
 ) -> None:
     """The whole calibration in simulated time; slip shortens every way like a smaller wheel.
 
-    What the driver takes for the sizes is no matter: the board computes with its own.
+    The driver's sizes do not matter: the board computes with its own.
     """
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     robot.parameters |= {"wheel_radius": 0.03, "base_radius": 0.15}

@@ -38,7 +38,7 @@ def sensor(seconds: float, seed: int = 0, force: np.ndarray = UPSIDE_DOWN, lost:
 
 
 def log_of(imu: Imu, moved_m: float = 0.0) -> Log:
-    """With odometry that has moved by so much in all."""
+    """With odometry that has moved by this much in all."""
     rows = np.column_stack((imu.stamp_s, imu.force_mps2, imu.rate_radps))
     way = np.linspace(0.0, moved_m, len(rows) // 4)
     odometry = [(4 * n * PERIOD_S, x, 0.0, 0.0, 0.0, 0.0, 0.0) for n, x in enumerate(way)]

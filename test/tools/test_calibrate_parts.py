@@ -37,7 +37,7 @@ def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
 
 
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
-    """What it is told of the first second comes later; and it has no scales to be checked."""
+    """Its data of the first second arrive later; and it has no scales to check."""
     obedience = Obedience("cmd_vel", {"odom_rate": 20.0})
     still, ahead = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
     for tick in range(250):
@@ -113,7 +113,7 @@ def test_stairs_are_climbed_one_by_one() -> None:
 
 
 def test_an_empty_log_has_empty_columns() -> None:
-    """Of the right shape, so that nobody needs to ask."""
+    """Of the right shape, so that no question is needed."""
     log = Log()
     assert log.imu.rate_radps.shape == log.odometry.pose.shape == (0, 3)
     assert log.wheels.angle_rad.shape == log.wheels.rate_radps.shape == (0, 0)
@@ -181,7 +181,7 @@ def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
 
 
 def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
-    """For the file and the picture; after ten minutes of driving is no time to refuse them."""
+    """For the file and the picture; they are checked before the drive, not after it."""
     path, picture = tmp_path / "a" / "b" / "robot.yaml", tmp_path / "c" / "d" / "picture.png"
     assert output_file(str(path), "", PARAMETERS) == path
     assert picture_file(str(picture), "imu") == picture

@@ -207,7 +207,7 @@ def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.Mo
 
 
 def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    """Nor does silence, where nobody is there to ask."""
+    """Nor without an answer."""
     commands = len(rigged.port.board.commands)
     assert rigged.calibrate("scale", answer=lambda _question: "n") == 1
     assert "you said no" in capsys.readouterr().err
@@ -237,7 +237,7 @@ def test_ctrl_c_at_an_open_question_ends_it(
 
 
 def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
-    """The last one of this module; its guard stops the robot, which nobody hears any more."""
+    """The last one of this module; its guard stops the robot, and no data is read any more."""
 
     def kill() -> None:
         rigged.driver.process.kill()

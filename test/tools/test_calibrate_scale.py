@@ -23,7 +23,7 @@ ASSUMED = (70.0, 70.0, 500.0)
 
 
 def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
-    """A robot of these scales that was told the stairs by one with the assumed ones."""
+    """A robot of these scales that follows stairs computed with the assumed ones."""
     random = np.random.default_rng(seed)
     log, now_s, pose = Log(), 0.0, np.zeros(3)
     for seconds, command in plan((0.25, 0.25, 0.5), ASSUMED, 2, 1.0 + SETTLE_S):
@@ -77,7 +77,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """A computer that hangs for half a second stops the robot; what was driven then is no speed."""
+    """A computer that hangs for half a second stops the robot; its motion then is not measured."""
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))
     middle = [number for number, row in enumerate(log.command_rows) if row[1] > 0.2][70]

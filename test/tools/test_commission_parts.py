@@ -96,7 +96,7 @@ def test_a_wheel_is_itself_or_it_is_a_contradiction(
 def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
     axis: int, pattern: tuple[int, int, int]
 ) -> None:
-    """Likewise."""
+    """The same for these."""
     expected = wanted(axis)
     if pattern == expected:
         assert axis_sign(axis, pattern) == 1
@@ -161,7 +161,7 @@ def test_a_clumsy_hand_still_finds_right_angles(
 
 
 def test_a_sensor_mounted_askew_stays_so() -> None:
-    """30° of yaw are no right angle."""
+    """30° of yaw are not a right angle."""
     assert mounting(*postures(rotation(math.pi, 0, math.pi / 6), 0.5, 0.5)).snapped() is None
 
 

@@ -78,7 +78,7 @@ def test_the_way_is_bounded() -> None:
 
 
 def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
-    """A leap that no robot can have made is no line across the picture."""
+    """An impossible leap is not drawn as a line."""
     model = Model("/omnibot_driver", 0.0)
     model.odom(Pose(2.0, 0.0), HALT, 1.0)
     model.odom(Pose(0.0, 0.0), HALT, 1.04)

@@ -83,7 +83,7 @@ def test_what_has_happened_is_counted() -> None:
 
 
 def test_a_message_cannot_move_the_cursor() -> None:
-    """Whoever publishes diagnostics gets words on the screen, no escape sequences."""
+    """Text of diagnostics is shown without escape sequences."""
     rude = Status("Link", Level.ERROR, "\x1b[2J\nbad\x07", {"Port": "\x1b]0;owned\x07"})
     shown = view(statuses=(rude,), state="\x1b[31m")
     everything = text.report(shown).replace("\n", "") + text.title(shown)
@@ -97,7 +97,7 @@ def test_a_silent_driver_is_said_to_be_silent() -> None:
 
 
 def test_an_estop_is_latched_asked_for_or_not() -> None:
-    """A request that nobody confirms is no latch."""
+    """An unconfirmed request does not show as latched."""
     assert text.estop(view()) == "e-stop not latched"
     assert text.estop(view(estop=True)) == "E-STOP LATCHED"
     assert text.estop(view(estop_asked=True)) == "E-STOP ASKED FOR, NOT YET CONFIRMED"

@@ -33,7 +33,7 @@ def log_of(path: Path) -> Log:
 
 
 def cut(bag: Path, end: int) -> Path:
-    """Its only file, as if the recorder had been killed when that was so long."""
+    """Its only file, as if the recorder had been killed at this length."""
     (bag / "metadata.yaml").unlink()
     (file,) = bag.iterdir()
     file.write_bytes(file.read_bytes()[:end])
@@ -95,7 +95,7 @@ def test_metadata_that_make_no_sense_are_not_needed(
 def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
     tmp_path: Path, mode: CompressionMode
 ) -> None:
-    """Of a chunk that is not whole nothing is told, of those before it all."""
+    """A damaged chunk is dropped, those before it are read."""
     drive = Drive(40.0)  # some chunks
     bag = write(tmp_path / "bag", [drive], compression=mode)
     size = (bag / "bag.mcap").stat().st_size

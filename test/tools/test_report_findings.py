@@ -181,7 +181,7 @@ def test_nothing_but_nan_is_told(drive: Drive) -> None:
 
 
 def test_what_an_estop_refuses_is_no_trouble(drive: Drive) -> None:
-    """The driver warns of each; other refusals are told."""
+    """The driver warns of each; other refusals are listed."""
     why = "motion command refused: the e-stop is latched; release it with the service ~/estop"
     drive.statuses.append((9.5, "omnibot_driver: Commands", 1, why, {}))
     assert not troubles(drive)

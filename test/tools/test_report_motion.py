@@ -188,7 +188,7 @@ def test_a_reset_of_the_odometry_is_noted_and_is_no_way(drive: Drive) -> None:
 
 
 def test_wheel_commands_are_compared_with_the_wheels(drive: Drive) -> None:
-    """Wheel B turns at half the rate it is told."""
+    """Wheel B turns at half of its commanded rate."""
     drive.odom.values[:, :] = 0.0
     drive.imu.values[:, 2] = 0.001
     told = 5.0 * drive.told(drive.joints.stamp_s)[:, [2, 2, 2]]
@@ -220,7 +220,7 @@ def two_wheels() -> Recorder:
 
 
 def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
-    """A steering is no wheel; a command of another length is one that the driver refuses."""
+    """A steering joint is not a wheel; the driver refuses a command of another length."""
     log = two_wheels().log()
     assert log.wheels == JOINTS[:2]
     assert log.joint_states.values[20].tolist() == [0.5, 1.0]

@@ -57,7 +57,7 @@ def test_a_first_order_is_found(gain: float, lag_s: float, delay_s: float, seed:
 def test_a_motor_is_found_in_the_manuals_loop(
     pwm_per_count: float, lag_s: float, delay_s: float, seed: int
 ) -> None:
-    """Likewise; and nothing tells the steps better."""
+    """The same, and nothing explains the steps better."""
     planted = (1.0, pwm_per_count, lag_s, delay_s)
     steps = made_up(motor_model(MANUAL), planted, seed)
     found = fit(motor_model(MANUAL), steps)
@@ -151,7 +151,7 @@ def test_a_damped_swing_overshoots_as_the_books_say() -> None:
 
 
 def test_lost_deltas_are_left_out() -> None:
-    """The steps that remain are told by what was heard of them."""
+    """The remaining steps are identified by the data received."""
     commands, wheels = steps_to_and_fro(MotorConstants())
     kept = np.random.default_rng(1).random(len(wheels.stamp_s)) > 0.2
     thinned = replace(

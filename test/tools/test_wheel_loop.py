@@ -103,7 +103,7 @@ def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: flo
 def test_second_order_deltas_are_mean_values(
     omega: float, damping: float, zero_s: float, delay_s: float
 ) -> None:
-    """Likewise, with any damping and a zero on either side."""
+    """The same with any damping and a zero on either side."""
     times_s = np.linspace(0.0, 0.6, 6001)
     system = ([zero_s, 1.0], [1 / omega**2, 2 * damping / omega, 1.0])
     _, response = signal.step(system, T=times_s)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The other half of the toy of two lines: two wheels that turn as they are told."""
+"""The other half of the toy of two lines: two wheels that follow commands."""
 
 import argparse
 
@@ -12,7 +12,7 @@ TICK_S = 0.01
 
 
 class LineRobot:
-    """Two wheels that turn as they are told; it never stops by itself."""
+    """Two wheels that follow commands; it never stops by itself."""
 
     channels, tick_s = CHANNELS, TICK_S
 

@@ -34,7 +34,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_every_way_a_port_can_refuse_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, error: Exception, advice: str
 ) -> None:
-    """Nobody can be refused as root, so the refusal is put in the library's mouth."""
+    """Root is never refused, so the library is made to refuse."""
 
     def refuse(*_: object, **__: object) -> None:
         raise error

@@ -33,7 +33,7 @@ def stack() -> Iterator[ExitStack]:
 
 
 def read(transport: SimulatedTransport, wanted: int, channel: int = 0) -> bytes:
-    """So many bytes of a channel at least, that of others aside."""
+    """At least this many bytes of a channel, those of others aside."""
     data, deadline_s = b"", time.monotonic() + PATIENCE_S
     while len(data) < wanted:
         assert time.monotonic() < deadline_s, f"only {data!r} came"

@@ -94,7 +94,7 @@ def test_what_comes_from_another_address_is_not_heard(host: Host, transport: Udp
 def test_a_host_that_is_away_is_silent_and_hears_the_first_datagram_when_it_is_back(
     host: Host, transport: UdpPorts
 ) -> None:
-    """What the network says of the one before is no reason not to send this one."""
+    """An error of the datagram before does not keep this one from being sent."""
     address = host.ports[0].getsockname()
     host.ports[0].close()
     transport.write(((0, b"hello"), (1, b"halt")))

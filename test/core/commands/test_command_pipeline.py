@@ -111,7 +111,7 @@ def test_turning_is_ramped_by_its_own_limit() -> None:
 
 
 def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:
-    """Whoever says zero may mean: there is somebody in front of it."""
+    """A zero command may mean that somebody is in front of it."""
     bench = running(limits=GENTLE)
     for _ in range(8):
         bench.drive(0.5)
@@ -171,7 +171,7 @@ def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
 def test_a_command_too_old_or_from_the_future_is_refused_and_keeps_nothing_alive(
     bench: Bench, age_s: float
 ) -> None:
-    """It counts as no command."""
+    """It has no effect."""
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match=r"0\.60 s"):

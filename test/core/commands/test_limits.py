@@ -106,7 +106,7 @@ def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
 
 
 def test_the_linear_speed_is_limited_as_a_vector_and_not_by_axis() -> None:
-    """3 and 4 m/s become 0.3 and 0.4, not 0.5 and 0.5; a turn is no part of it."""
+    """3 and 4 m/s become 0.3 and 0.4, not 0.5 and 0.5; a turn is not part of it."""
     limited = SpeedLimits().twist(BodyTwist(3.0, -4.0, 0.1))
     assert limited == BodyTwist(pytest.approx(0.3), pytest.approx(-0.4), 0.1)
 
@@ -127,7 +127,7 @@ def test_a_limit_of_zero_lets_nothing_through() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_what_is_not_finite_is_refused_by_name(bad: float, place: int) -> None:
-    """Wherever it stands; the message says what to mend."""
+    """In every position; the message says what to fix."""
     values = [0.0, 1e308, -1.0]
     values[place] = bad
     with pytest.raises(CommandRefused, match=r"cmd_vel.*NaN or infinity"):
@@ -136,7 +136,7 @@ def test_what_is_not_finite_is_refused_by_name(bad: float, place: int) -> None:
 
 @given(st.lists(finite, max_size=4))
 def test_what_is_finite_is_not_refused(values: list[float]) -> None:
-    """Size is no reason."""
+    """A large value is not an error."""
     require_finite("wheel_cmd", values)
 
 

@@ -43,7 +43,7 @@ EVENTS: dict[str, Callable[[Bench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """Whatever the board did with what it had been told before."""
+    """Whatever the board did with earlier commands."""
     bench.drive(0.4)
     event(bench)
     bench.run(3.0)
@@ -132,7 +132,7 @@ def test_the_robot_stands_still_after_the_timeout(bench: Bench) -> None:
 
 
 def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(bench: Bench) -> None:
-    """Only the direction from the board is cut: it still hears us, so it is told to stop."""
+    """Only the direction from the board is cut: it still receives, so Stop is sent."""
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = False

@@ -27,7 +27,7 @@ def going_to(x_m: float) -> Bench:
 
 
 def test_a_velocity_is_repeated_in_the_new_scale() -> None:
-    """0.4 m/s are 28 LSB at 70, and 40 at 100; nobody commands anew."""
+    """0.4 m/s are 28 LSB at 70, and 40 at 100; there is no new command."""
     bench = driving()
     bench.drive(0.4)
     bench.run(0.1)

@@ -90,7 +90,7 @@ def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(tur
 
 
 def test_a_goal_beyond_the_words_is_refused_and_the_old_one_stays(bench: Bench) -> None:
-    """Another place than the one that was meant is no compromise."""
+    """A different goal is never substituted."""
     bench.go_to(0.2, 0.0, 0.0)
     for x in (33.0, 1e300, -1.7e308):
         with pytest.raises(CommandRefused, match="the limits are"):
@@ -129,7 +129,7 @@ def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
 
 @pytest.mark.parametrize("options", [{"imu_only": True}, {"use_board_pose": False}])
 def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str, bool]) -> None:
-    """Without its poses nobody can say where a place in odom is for the board."""
+    """Without its poses a place in odom cannot be converted to the board's frame."""
     bench = at_position_control(**options)  # type: ignore[arg-type]
     with pytest.raises(CommandRefused, match="not known"):
         bench.go_to(1.0, 0.0, 0.0)

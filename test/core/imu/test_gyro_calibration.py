@@ -153,9 +153,9 @@ def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
 
 
 def test_a_measurement_that_is_given_up_says_why_once() -> None:
-    """Nobody is answered twice, and nobody who did not ask."""
+    """Each caller gets one answer."""
     calibration = GyroCalibration(NONE, refine=False)
-    calibration.give_up("nobody asked")
+    calibration.give_up("not asked")
     assert not calibration.answers
     calibration.measure("token", 0.0)
     calibration.give_up("the port was lost")

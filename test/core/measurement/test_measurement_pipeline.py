@@ -96,7 +96,7 @@ def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> N
 
 
 def test_motion_during_a_pause_moves_the_pose_and_is_no_speed(bench: Bench) -> None:
-    """The robot rolled to a halt while nobody was told; afterwards it stands."""
+    """The robot rolled to a halt unreported; afterwards it stands."""
     bench.drive(0.5)
     bench.run(0.4)
     bench.ask(Request.PAUSE, 5.0)

@@ -50,7 +50,7 @@ def trembling(random: Random) -> list[float]:
 
 
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
-    """Noise about 1 g upwards, and at some readings some words off by so much."""
+    """Noise about 1 g upwards, and at some readings some words off by this much."""
     random, found = Random(seed), list[Reading]()
     for number in range(count):
         words = trembling(random)
@@ -183,7 +183,7 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """That it has restarted, and that nobody knows how long it stood for."""
+    """It has restarted, and how long it stood is unknown."""
     first = replace(ahead(9.0), duration_s=None, restarted=True)
     came = admitted([ahead(), first, ahead(), ahead()], gate())
     assert came[2:] == [[replace(ahead(), duration_s=None, restarted=True)], [ahead()]]

@@ -302,7 +302,7 @@ def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
 
 
 def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
-    """Within the noise nobody can tell."""
+    """Within the noise it cannot be decided."""
     for _ in range(40):
         bench.drive(0.001, 0.0, 0.01)
         bench.run(0.1)
@@ -340,7 +340,7 @@ def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench:
 
 
 def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> None:
-    """Standing takes a moment, and whoever bumps into it does not drive it."""
+    """Stopping takes a moment, and a bump is not a drive."""
     bench.run(4.0)
     for _ in range(5):
         push(bench, 0.005, 0.0, 0.0)

@@ -177,7 +177,7 @@ def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
-    """And again each second, for whoever wants to hear it."""
+    """And again each second; the caller filters repetitions."""
     drive = Drive()
     drive.command(0.06, 0.0, 0.0)
     found = drive.move(REST, 2.4)

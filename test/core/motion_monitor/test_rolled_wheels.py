@@ -116,7 +116,7 @@ def test_the_angles_go_on_over_a_reset_of_the_odometry_and_a_restart_of_the_boar
 
 
 def test_what_took_an_unknown_time_has_no_rate() -> None:
-    """The first displacement after a pause; its way counts all the same."""
+    """The first displacement after a pause; its way still counts."""
     odometry = Odometry(OdometrySettings())
     (estimate,) = odometry.displace(DisplacementReading(0.1, 0.0, 0.0, "body", None, 0), 1.0)
     assert estimate.rolling is None

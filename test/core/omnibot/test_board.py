@@ -166,7 +166,7 @@ def test_a_regular_sequence_has_no_losses() -> None:
 
 
 def test_the_first_delta_has_lost_nothing() -> None:
-    """Nobody knows what came before the connection, or before a pause."""
+    """What came before the connection, or before a pause, is unknown."""
     board = bot()
     assert lost(board, moved(7)) == [0]
     assert lost(board, PausedFrame(0), moved(100)) == [0]
@@ -202,7 +202,7 @@ def test_stop_and_emergency_stop_are_the_manuals() -> None:
 
 
 def test_waking_is_eight_zeros_and_stop() -> None:
-    """Zeros end any half command and are no letters."""
+    """Zeros end any half command and are not letters."""
     assert joined(bot().wake()) == STOP
 
 

@@ -200,7 +200,7 @@ def test_a_robot_on_a_slope_is_not_misread_for_ever(
 
 
 def test_one_whole_text_is_enough_to_believe() -> None:
-    """At one text a second nobody wants to wait for two."""
+    """At one text a second it must not wait for two."""
     assert FrameDecoder().feed(b"used: 3 \nPaused: 4 \n", 0.0) == [PausedFrame(4)]
 
 

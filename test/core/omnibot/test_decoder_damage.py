@@ -112,7 +112,7 @@ def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
     "extra", [b"\x00", b"P", b"\xfa", b"\xff", b"\xff\xff", b"\xff\xfd", b"Pau"]
 )
 def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes) -> None:
-    """Nobody can tell whether they were its own; the frame behind them comes out."""
+    """They may have been its own; the frame behind them comes out."""
     other = ImuFrame((100, 90, -16300), (4, 5, 6))
     after = LEAD_IN * 2
     found = decoded([LEAD_IN + encode(other) + extra + after])
@@ -171,7 +171,7 @@ def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> Non
 
 @pytest.mark.parametrize("place", [*range(8), 9, 10])
 def test_a_damaged_text_does_not_come_out(place: int) -> None:
-    """A lost letter anywhere but in the number, where nobody can see it, or of its blank."""
+    """A lost letter anywhere but in the number, where it cannot be seen, or of its blank."""
     text = b"Paused: 7 \n"
     hurt = text[:place] + text[place + 1 :]
     found = decoded([LEAD_IN + hurt + LEAD_IN + LEAD_IN])

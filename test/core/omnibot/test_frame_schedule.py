@@ -13,7 +13,7 @@ kinds = st.sampled_from([ImuFrame, DeltaFrame, PoseFrame])
 
 
 def nominal(imus: int) -> FrameSchedule:
-    """A second under way; so many IMU frames came after a pose."""
+    """A second under way; this many IMU frames came after a pose."""
     rhythm = FrameSchedule()
     for _ in range(5):
         for _ in range(5):

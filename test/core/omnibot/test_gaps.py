@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""When a line was idle: the time that bytes take to come is no pause."""
+"""When a line was idle: the time that bytes take to arrive is not a pause."""
 
 import pytest
 

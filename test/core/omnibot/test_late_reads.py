@@ -33,8 +33,8 @@ def arrivals(ticks: Sequence[bytes]) -> tuple[bytes, list[float]]:
 def stopped(
     ticks: Sequence[bytes], place: int, stop_s: float, *, most: int = 4096, piece: int = 1
 ) -> Reads:
-    """Read as pieces come; once, after ``place`` bytes, nothing is read for so long. Then all that
-    is there, but no more than ``most`` bytes at once, each read 20 µs after the one before."""
+    """Read as pieces come; once, after ``place`` bytes, nothing is read for this time. Then all
+    that is there, but no more than ``most`` bytes at once, each read 20 µs after the one before."""
     data, times = arrivals(ticks)
     at, now = 0, 0.0
     while at < len(data):
@@ -95,7 +95,7 @@ def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: in
 def test_any_content_comes_through_a_reader_that_is_always_late(
     content: list[tuple[tuple[int, int, int], tuple[int, int, int], bool]], late_s: list[float]
 ) -> None:
-    """A true shock and a late read together are no damage."""
+    """A true shock and a late read together are not damage."""
     sent: list[Frame] = [REST] * 24
     ticks = [encode(REST)] * 24
     for seq, (accel, gyro, delta) in enumerate(content):
@@ -146,8 +146,8 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """The front of one frame and the back of a later one are no frame: at rest only time says so,
-    and it was read by a prompt reader."""
+    """The front of one frame and the back of a later one are not a frame: at rest only time says
+    so, and it was read by a prompt reader."""
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):
         hurt = [*ticks[:50], ticks[50][:cut], b"", ticks[52][cut:], *ticks[53:]]

@@ -143,7 +143,7 @@ def test_after_a_long_gap_nothing_waits_for_a_pose_that_does_not_come() -> None:
 
 
 def test_the_twist_is_that_of_the_last_displacement_whatever_is_put_right() -> None:
-    """A correction is no motion."""
+    """A correction is not motion."""
     on = line(3)
     lose(on, 1.0)
     twists = [estimate.twist for estimate in on.run(1.0)]

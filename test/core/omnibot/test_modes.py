@@ -130,7 +130,7 @@ def test_a_letter_alone_proves_nothing(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", [Mode.UNKNOWN, Mode.PAUSED])
 def test_p_is_refused_where_the_board_is_not_known_to_run(mode: Mode) -> None:
-    """It is a toggle: there it would start the board, or nobody knows what."""
+    """It is a toggle: there it would start the board, or have an unknown effect."""
     made = tracker(mode)
     with pytest.raises(RequestRefused, match=mode.value):
         made.apply(Happening.SENT_PAUSE)

@@ -91,7 +91,7 @@ def test_everything_goes_out_behind_zeros() -> None:
 
 @pytest.mark.parametrize("x_mm", [0x5000, 0x5210, 0x53FF])
 def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
-    """Another place half a metre away is no goal that anybody asked for."""
+    """Another place half a metre away was not requested."""
     encoder = CommandEncoder(OmniBotSettings())
     with pytest.raises(CommandRefused, match=r"start, pause or reset the board"):
         encoder.drive_to(Pose(x_mm / 1000, 0.0, 0.0))

@@ -54,7 +54,7 @@ def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) 
 
 @pytest.mark.parametrize("count", [20, 77, 150, 240])
 def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
-    """Zero after two seconds is no gap of (255 - count) x 40 ms."""
+    """Zero after two seconds is not a gap of (255 - count) x 40 ms."""
     assert begun(count).delta(0, 102.0).restarted
 
 

@@ -224,7 +224,7 @@ def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
     ],
 )
 def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str, Level]) -> None:
-    """What cannot be known is stale; in IMU-only mode nobody misses displacements."""
+    """What cannot be known is stale; in IMU-only mode no displacements are expected."""
     robot = Robot()
     robot.set(state=state)
     if state == "imu_only":
@@ -248,7 +248,7 @@ def test_a_board_that_has_just_begun_to_send_is_given_time() -> None:
 
 
 def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
-    """And is told, without alarm, that it wants more than it gets."""
+    """The status stays OK and says that the command is limited."""
     robot = Robot()
     robot.command(source="cmd_vel", age_s=0.05)
     robot.seconds(1)

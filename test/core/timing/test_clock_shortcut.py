@@ -73,7 +73,7 @@ surprises = st.tuples(
     edges,
     st.sampled_from([0, 1, 14]),
 )
-"""Readings, ticks since the last, how late they come; and so many calm reads behind them."""
+"""Readings, ticks since the last, how late they come; and a number of normal reads behind them."""
 
 
 @pytest.mark.slow

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How late measurements come is told of measurements alone."""
+"""Only measurements count for the delay of measurements."""
 
 import pytest
 from session_bench import TICK_S, Bench

@@ -36,7 +36,7 @@ class Stamped:
     displacements: list[tuple[int, float, float]] = field(default_factory=list)
 
     def errors(self, since_s: float = SETTLED_S) -> list[float]:
-        """Stamp less true sampling time, from so long after the board began."""
+        """Stamp minus true sampling time, from this time after the board began."""
         return [
             stamp_s - self.board.sampled_at(tick)
             for tick, stamp_s, _ in self.samples
@@ -189,7 +189,8 @@ def test_without_displacements_lost_samples_are_counted_by_their_arrival() -> No
 
 
 def test_a_stall_that_ends_with_one_sample_at_a_time_loses_none() -> None:
-    """A network hands over what it held packet by packet: the first of ten was no tenth."""
+    """A network hands over what it held packet by packet: the first of ten took no tenth of the
+    time."""
     for seed in SEEDS:
         board = Board(seconds=10, skew=1e-4)
         rng = random.Random(seed)

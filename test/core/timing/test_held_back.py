@@ -18,7 +18,7 @@ HELD = 4095
 
 
 def through_a_stall(ticks: int, frame: str, vx: float, yaw_rate: float) -> Bench:
-    """The robot drives on meanwhile, for it hears nobody either."""
+    """The robot drives on meanwhile, for it receives nothing either."""
     bench = Bench(BoardSettings(frame=frame))
     bench.open()
     bench.run_until_state("nominal")

@@ -60,7 +60,7 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """The time that a board is told goes on from what it was told last."""
+    """A board's time goes on from its last value."""
     at: list[float] = []
 
     class Watch(ToyServer):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Talking to a simulated board in simulated time: what it is told, and what it has sent."""
+"""Talking to a simulated board in simulated time: what it receives, and what it has sent."""
 
 import struct
 

@@ -359,7 +359,8 @@ def set_parameter(probe: Probe, name: str, value: str) -> None:
 def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
     start_driver: Start, stack: ExitStack, tmp_path: Path
 ) -> None:
-    """The file has the ticks of both wheels from their start on; a refusal is told as it is."""
+    """The file has the ticks of both wheels from their start on; a refusal is passed on as it
+    is."""
     ecu = ecu_of("firmware", stack, running=True)
     driver = start_driver(
         ecu.path,

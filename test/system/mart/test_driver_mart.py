@@ -97,7 +97,7 @@ def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[Non
 
 
 def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
-    """A metre; commands that cease stop it; battery and sonars are told."""
+    """A metre; commands that cease stop it; battery and sonars are published."""
     odometry = probe.listen(Odometry, "odom")
     batteries = probe.listen(BatteryState, "battery_state")
     ranges = probe.listen(Range, "range/front")

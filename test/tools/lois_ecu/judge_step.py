@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate step`` on robots with a LOIS ECU whose plants nobody told it, by hand:
+"""``calibrate step`` on robots with a LOIS ECU whose plants it does not know, by hand:
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_step.py 20
 
