@@ -171,7 +171,7 @@ class Session:
         self.process(now)
 
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
-        """``receive``, but for what can wait until these are told: ``process`` is to follow.
+        """``receive``, but for what can wait until these are published: ``process`` is to follow.
 
         A command that arrives in between is handled as if it came before the bytes. That must not
         be where they change the mode, so there nothing waits; nor does it where anything else is

@@ -23,7 +23,7 @@ from omnibot_driver.transports.wake_up import WakeUp
 
 SCHEME: Final = "udp://"
 LARGEST: Final = 65_536
-NOBODY: Final = (errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.EHOSTDOWN)
+UNREACHABLE: Final = (errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.EHOSTDOWN)
 """Errors that the network reports for a datagram without a receiver."""
 
 
@@ -150,7 +150,7 @@ class UdpPorts:
 
 def _is_silence(error: OSError) -> bool:
     """Whether nothing was there to hear or to be heard, as when a controller is restarted."""
-    return isinstance(error, BlockingIOError) or error.errno in NOBODY
+    return isinstance(error, BlockingIOError) or error.errno in UNREACHABLE
 
 
 def _place(url: str, channels: int) -> tuple[str, int]:

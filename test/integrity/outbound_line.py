@@ -22,7 +22,7 @@ Change = Callable[[bytes, int, Random], list[Arrival]]
 class Line(Protocol):
     """One line in one trial. `whole`: how many bytes arrive as they are before the next fault.
 
-    Whoever sends a write that is no longer takes it off `whole`, and carries the others.
+    A sender of a write that is no longer takes it off `whole`, and carries the others.
     """
 
     whole: int

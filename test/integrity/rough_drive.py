@@ -115,7 +115,7 @@ class RoughDrive(Bench):
         self._target = self._last = self._smooth = (0.0, 0.0, 0.0)
         self._period_s, self._command_at = 0.1, self.now
         self._hands_at, self._hands_until = self.now, self.now
-        self._last_hands, self._to_be_carried = "nobody", False
+        self._last_hands, self._to_be_carried = "none", False
 
     def settle(self) -> None:
         """What is written is on its way for a while."""

@@ -212,10 +212,10 @@ def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixtur
     assert rigged.calibrate("scale", answer=lambda _question: "n") == 1
     assert "you said no" in capsys.readouterr().err
 
-    def nobody(_question: str) -> str:
+    def no_answer(_question: str) -> str:
         raise EOFError
 
-    assert rigged.calibrate("scale", answer=nobody) == 1
+    assert rigged.calibrate("scale", answer=no_answer) == 1
     assert "no answer to" in capsys.readouterr().err
     assert all(one.kind != "velocity" for one in list(rigged.port.board.commands)[commands:])
     assert not rigged.output.exists()

@@ -60,7 +60,7 @@ class PendingDisplacements:
         return 0.0 if last_stamp_s is None else max(0.0, stamp_s - last_stamp_s)
 
     def unstamped_s(self, last_stamp_s: float | None) -> float:
-        """Likewise, as far as the stamps show it beside what the first one stands for itself."""
+        """The same, as far as the stamps show it beside what the first one stands for itself."""
         unheard_s = self.unheard_s(last_stamp_s)
         if not self._waiting or last_stamp_s is None:
             return unheard_s

@@ -58,7 +58,7 @@ class Walk:
     """Frames in a row, from the first byte held on, that nothing speaks against.
 
     ``ends``: of each; ``lessons``: numbers of frames from which the expectation is to learn, each
-    with two readings; ``known``: what was known after so many frames (fields of a Context), never
+    with two readings; ``known``: what was known after that many frames (fields of a Context), never
     more than a few apart.
     """
 

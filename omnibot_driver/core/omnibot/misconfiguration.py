@@ -4,7 +4,7 @@
 
 Poses that make sense only in the other byte order; deltas that lead to the next pose only in the
 other frame, or come at another rate. This module knows what the wire says in each setting; not how
-anybody is told.
+the user is informed.
 """
 
 import math

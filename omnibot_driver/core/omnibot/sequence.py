@@ -19,8 +19,8 @@ LATE_S: Final = 0.5
 buffer of the host's (4096 bytes, 2.4 s) that lacks one byte in ten is stamped 0.24 s wrong; this is
 twice as much."""
 EARLY_S: Final = 0.2
-"""How far a count from zero may be ahead of the time since the last delta, which was told as
-late. To restart takes longer."""
+"""How far a count from zero may be ahead of the time since the last delta, which was reported late.
+To restart takes longer."""
 
 
 @value(frozen=True, slots=True)
@@ -118,7 +118,7 @@ class Sequence:
             return Step(0, None, restarted=True)
         missing = max(0, passed - counted)
         if (self._told + missing) * self._period_s > now - self._delta_at + self._period_s:
-            return Step(0)  # there was no time for so many
+            return Step(0)  # there was no time for that many
         self._told += missing
         return Step(missing)
 

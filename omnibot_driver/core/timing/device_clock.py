@@ -5,10 +5,10 @@
 The board samples once a tick by a crystal of its own. Its bytes reach us with a delay that is
 unknown and ever changing, but never before they were sent. Two questions follow.
 
-*Which tick is it?* IMU readings are counted, with those that the board says were lost. What no byte
-told of is told exactly by the counter that displacements carry; until the next of those, or without
-any, by arrival: a read takes all that has come, so the newest tick in it is hardly older than one
-period, and never from the future.
+*Which tick is it?* IMU readings are counted, with those that the board says were lost. Losses
+without a trace are counted exactly by the displacements' counter; until the next of those, or
+without any, by arrival: a read takes all that has come, so the newest tick in it is hardly older
+than one period, and never from the future.
 
 *When was it?* ``ClockFit`` lays a line under the arrivals. What stays in the stamps is the least
 delay that ever happens: one constant.

@@ -122,7 +122,7 @@ class Obedience:
         told_ways, done_ways = self._told, self._done
         self._began_s, self._told, self._done = now_s, [0.0, 0.0], [0.0, 0.0]
         for told, done, plain in zip(told_ways, done_ways, PLAIN[self._topic], strict=True):
-            if told > plain * self._look_s and not done >= OBEYED_PART * told:  # NaN is no motion
+            if told > plain * self._look_s and not done >= OBEYED_PART * told:  # NaN is not motion
                 raise ToolError(
                     f"the robot does not move when commanded ({self._topic}): check the motors'"
                     " power,"

@@ -102,7 +102,7 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Diagnostics",
-            f"/diagnostics is of several robots, on {ports}; all are told of here.",
+            f"/diagnostics is of several robots, on {ports}; all are listed here.",
         )
     troubles = [
         status

@@ -3,7 +3,7 @@
 """Files of bags that were never finished, made whole in a copy.
 
 An mcap (mcap.dev/spec) is a row of records, each an operation of one byte, its length in eight, and
-so many bytes; then comes an index, without which it can be read as well. What sqlite3 has written
+that many bytes; then comes an index, without which it can be read as well. What sqlite3 has written
 last is in a file of its own beside the database.
 """
 
