@@ -31,7 +31,7 @@ NAMES: Final = {
 
 
 class Recorder:
-    """``values``: asked for the parameters of the moment; ``publish``: who is told what comes."""
+    """``values``: asked for the parameters of the moment; ``publish``: who receives the result."""
 
     def __init__(self, node: Node, link: Any, values: Callable[[], Mapping[str, Any]]) -> None:
         self._node, self._link, self._values = node, link, values

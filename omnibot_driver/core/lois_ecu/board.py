@@ -96,7 +96,7 @@ class LoisEcu:
         if reports:
             own = not all(isinstance(report, TerminalLine) for report in reports)
             if own and self.mode is Mode.UNKNOWN and self._upkeep.opened:
-                self._upkeep.writer.begin(now)  # it may have booted, and forgotten what it was told
+                self._upkeep.writer.begin(now)  # it may have booted, and lost its settings
             self.mode = Mode.NOMINAL
             self._upkeep.heard_at_s = now
             self._suspicion.understood()

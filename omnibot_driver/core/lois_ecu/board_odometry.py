@@ -45,7 +45,7 @@ class OdometryReader:
         self._before = None
 
     def take(self, group: BoardOdometry) -> Told | None:
-        """None for a first group, and for one that is no number."""
+        """None for a first group, and for one that is not a number."""
         if not all(map(math.isfinite, (group.x_m, group.y_m, group.yaw_rad))):
             return None
         before, self._before = self._before, group
@@ -79,7 +79,7 @@ class OdometryReader:
 
 
 def rim_speeds(group: BoardOdometry, track_m: float) -> tuple[float, float] | None:
-    """Of both rims, left and right, by the velocity; None where it is no number."""
+    """Of both rims, left and right, by the velocity; None where it is not a number."""
     along = group.dx_mps * math.cos(group.yaw_rad) + group.dy_mps * math.sin(group.yaw_rad)
     # Of a tick that took a rest the velocity points to the middle of a large turn.
     forward = math.copysign(math.hypot(group.dx_mps, group.dy_mps), along)

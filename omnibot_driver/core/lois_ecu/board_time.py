@@ -52,7 +52,7 @@ class BoardTime:
         self.stddev_s = UNKNOWN_S
 
     def sent(self, lines: int) -> None:
-        """So many lines came from the board."""
+        """This many lines came from the board."""
         self._lines += lines
 
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:

@@ -107,7 +107,7 @@ _BY_CODE: Final[dict[int, Form]] = {form.code: form for form in _FORMS}
 
 
 def encode_command(command: Command, *, with_sum: bool = True) -> bytes:
-    """The one line that says it. Raises FrameError when a value does not fit or is no period."""
+    """The one line that says it. Raises FrameError when a value does not fit or is not a period."""
     code, payload = _said(command)
     return encode_line(code, payload, with_sum=with_sum)
 
@@ -118,7 +118,7 @@ def _said(command: Command) -> tuple[int, int]:
             return setting, from_float(number)
         case SetPeriod(stream, period_ms):
             if not 0 < period_ms <= PERIOD_OFF:
-                raise FrameError(f"{period_ms} ms is no period: 1 to 65533, 0xfffe or 0xffff")
+                raise FrameError(f"{period_ms} ms is not a period: 1 to 65533, 0xfffe or 0xffff")
             return stream, period_ms
     form = _BY_KIND[type(command)]
     fields: Any = (getattr(command, name) for name in command.__match_args__)

@@ -71,7 +71,7 @@ class Comparison:
             self._motion.filter.forget(wheel.base + COUNT, 0.0, variance)
 
     def count(self, index: int, ticks: int, late_s: float) -> None:
-        """So many more ticks of this wheel, which came ``late_s`` later than usual."""
+        """This many more ticks of this wheel, which came ``late_s`` later than usual."""
         motion, estimate = self._motion, self._motion.filter
         wheel, tick_m = motion.wheels[index], motion.tick_m
         self._counted_m[index] += ticks * tick_m

@@ -3,9 +3,9 @@
 """From a stream of bytes to reports.
 
 A line ends with a line feed and begins at the last ``:`` before it, so a line that lost its end
-costs no other one. What is no line is counted and dropped. A line that lost or gained characters
-has another length; two lines that became one would have to lose fourteen characters between them,
-and pass the checksum besides.
+costs no other one. Anything that is not a line is counted and dropped. A line that lost or gained
+characters has another length; two lines that became one would have to lose fourteen characters
+between them, and pass the checksum besides.
 
 This module reads no clock and never raises on input. It holds less than ``LONGEST_LINE`` bytes
 between calls, and looks at each byte a bounded number of times.
@@ -26,7 +26,8 @@ LONGEST_LINE: Final = 256
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counts since they were made. ``lines``: right ones; ``faults``: pieces that were no line."""
+    """Counts since they were made. ``lines``: right ones; ``faults``: pieces that were not a
+    line."""
 
     lines: int = 0
     faults: int = 0
@@ -71,7 +72,7 @@ class LoisDecoder:
         return self._assembler.in_record
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """A record of so many samples was asked for; one that was not asked for is dropped."""
+        """A record of this many samples was requested; others are dropped."""
         self._assembler.expect_record(kind, left, right)
 
     def forget_counters(self) -> None:

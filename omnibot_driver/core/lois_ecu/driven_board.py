@@ -234,7 +234,7 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.stop())
 
     def emergency_stop(self) -> Packets:
-        """RPM 0/0: the board has no emergency stop that it could be told."""
+        """RPM 0/0: the board has no emergency stop command."""
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:

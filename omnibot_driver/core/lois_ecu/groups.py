@@ -57,7 +57,8 @@ Timed = tuple[float, Report]
 
 
 class Assembler:
-    """``add`` each line, ``damage`` where characters were no line, ``rest`` while nothing comes."""
+    """``add`` each line, ``damage`` where characters were not a line, ``rest`` while nothing
+    comes."""
 
     def __init__(self) -> None:
         self.statistics = GroupStatistics()
@@ -92,7 +93,7 @@ class Assembler:
         return self._record.begun
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """A record of so many samples was asked for; one that was not is dropped."""
+        """A record of this many samples was requested; others are dropped."""
         self._record.expect(kind, left, right)
 
     def forget(self) -> None:
@@ -125,7 +126,7 @@ class Assembler:
         return [*found, (now, report)]
 
     def damage(self) -> None:
-        """Characters between two lines were no line."""
+        """Characters between two lines were not a line."""
         if self._code is not None and not self._done:
             self._drop()
         self._record.damage()
@@ -182,7 +183,7 @@ class Assembler:
         if self._done:
             return []
         payloads = self._payloads
-        if MARKER in payloads and len(payloads) != 3:  # it was no count
+        if MARKER in payloads and len(payloads) != 3:  # it was not a count
             self.statistics.damaged_groups += 1
             payloads = payloads[payloads.index(MARKER) + 1 :]
         group = _group(code, payloads)

@@ -122,7 +122,7 @@ class SetLed:
 
 @dataclass(frozen=True, slots=True)
 class RecordRpm:
-    """Record so many tick times of each wheel, then send them."""
+    """Record this many tick times of each wheel, then send them."""
 
     left_samples: int
     right_samples: int
@@ -130,7 +130,7 @@ class RecordRpm:
 
 @dataclass(frozen=True, slots=True)
 class RecordTorque:
-    """Record so many torque readings of each motor, then send them."""
+    """Record this many torque readings of each motor, then send them."""
 
     left_samples: int
     right_samples: int
@@ -138,7 +138,7 @@ class RecordTorque:
 
 @dataclass(frozen=True, slots=True)
 class RecordHeading:
-    """Record so many compass headings, then send them."""
+    """Record this many compass headings, then send them."""
 
     samples: int
 

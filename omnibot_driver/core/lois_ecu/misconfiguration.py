@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What bytes that are no lines look like: which other board, or which wrong setting.
+"""What bytes that are not lines look like: which other board, or which wrong setting.
 
 Knows bytes, no time. One sentence at most, and none while lines are understood.
 """
@@ -55,5 +55,5 @@ def _advice(seen: bytes) -> str:
             return "lines come with wrong checksums: check the cable and the baud rate"
         return f"lines of {usual} characters come instead of 14: this is another firmware or board"
     if sum(byte > 126 for byte in seen) > len(seen) / 10:
-        return "the bytes are no text: check baudrate (115200), and that the port is the ECU's"
+        return "the bytes are not text: check baudrate (115200), and that the port is the ECU's"
     return "nothing that comes is a line of this board: check that the port is the ECU's"

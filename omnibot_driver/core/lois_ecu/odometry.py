@@ -32,9 +32,9 @@ __all__ = ["FusedOdometry", "LoisOdometry", "LoisOdometrySettings", "Source"]
 FIRMWARE_GAIN: Final = 1.1
 """Backwards, the firmware lowers its target with each tick, until the controller's next step."""
 LONE_TICKS: Final = 2
-"""So many groups of ticks without odometry behind them show a board like the manual's."""
+"""This many groups of ticks without odometry behind them show a board like the manual's."""
 UNCOUNTED_M: Final = 0.06
-"""After so much motion of a wheel that should count backwards and did not, it does not."""
+"""After this much motion, a wheel that did not count backwards cannot do so."""
 LATE_S: Final = 0.012
 """Standard deviation of an arrival, where nothing better is known."""
 HIDDEN_PART: Final = 1 / 6

@@ -72,7 +72,7 @@ class SettingsWriter:
 
     @property
     def ignored(self) -> bool:
-        """Whether the board sends, and seems to take nothing of what it is told."""
+        """Whether the board sends, and seems to ignore its commands."""
         return self._rounds >= 2 * ROUNDS and not self.confirmed
 
     @property

@@ -23,11 +23,11 @@ POSE_MARGIN_RAD: Final = 1.0
 FARTHEST: Final = 1e5
 """Neither m nor rad of a robot on one charge."""
 LATEST_S: Final = 0.3
-"""A group may arrive so much later than it was sent."""
+"""How much later than sent a group may arrive."""
 SLOWEST_CLOCK: Final = 0.5
 """Part of the time that the board's clock counts at least; it stands still while it sends."""
 SURE_AFTER: Final = 2
-"""So many further steps of a clock in one unit, and it has that unit."""
+"""After this many further steps of a clock in one unit, it has that unit."""
 LEARNT_FROM_S: Final = 0.15
 """Arrival tells the length of shorter steps badly."""
 

@@ -14,7 +14,7 @@ from omnibot_driver.core.readings import DisplacementReading
 
 @dataclass(frozen=True, slots=True)
 class FixReading:
-    """Degrees, north and east positive. ``valid``: it is no 0/0."""
+    """Degrees, north and east positive. ``valid``: it is not 0/0."""
 
     latitude_deg: float
     longitude_deg: float

@@ -54,7 +54,7 @@ class RecordAssembler:
         return self._code is not None
 
     def expect(self, kind: RecordKind, left: int, right: int) -> None:
-        """A record of so many samples was asked for; one that was not is dropped."""
+        """A record of this many samples was requested; others are dropped."""
         self._expected = kind, left, right
         self._begin(None)
 

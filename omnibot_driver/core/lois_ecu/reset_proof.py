@@ -12,13 +12,13 @@ from typing import Final
 from omnibot_driver.core.lois_ecu.messages import Ticks
 
 FEW_TICKS: Final = 20
-"""A wheel that was stopped rolls on for so many at the most: 0.4 s at 50 RPM."""
+"""A wheel that was stopped rolls on for at most this many: 0.4 s at 50 RPM."""
 JUMP_TICKS: Final = 60
 """More than any wheel rolls until a reset that arrived is shown."""
 STEADY_TICKS: Final = 3
-"""Of wheels that stand, so many cannot be backlash."""
+"""For wheels at rest, this many cannot be backlash."""
 UNPROVED_S: Final = 2.5
-"""So long to wait for a proof where none may come; meanwhile the reset is sent again."""
+"""How long to wait for a proof where none may come; meanwhile the reset is sent again."""
 
 
 class ResetProof:

@@ -27,7 +27,7 @@ class LoisEcuSettings:
     its wheels in RPM mode. ``written``: further settings that the user wants on the board.
     ``periods_ms``: of what the board sends by itself; others stay as they are. ``with_sum``:
     whether what is sent has a checksum. ``declination_rad``: of magnetic north, east positive.
-    ``odom_rate_hz``: how often the odometry is told, predicted from one group to the next.
+    ``odom_rate_hz``: how often the odometry is published, predicted from one group to the next.
     """
 
     wheel_radius_m: float = 0.13

@@ -19,7 +19,7 @@ STALLED_S: Final = 2.0
 LEAST_RPM: Final = 2
 SAME_MPS: Final = 1e-3
 AT_LEAST: Final = 4
-"""So many groups must say so: on a bad line few come."""
+"""This many groups must agree: on a bad line few arrive."""
 
 
 class StallWatch:

@@ -15,7 +15,7 @@ from omnibot_driver.core.lois_ecu.messages import TerminalMode
 
 SENSORS: Final = (TerminalMode.GPS, TerminalMode.COMPASS)
 UNPROVED_S: Final = 2.0
-"""A robot that cannot be seen to stand is stopped for so long."""
+"""How long a robot is stopped that cannot be seen to stand."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
 """What the board says of itself so soon after a change of the mode may have been on its way."""

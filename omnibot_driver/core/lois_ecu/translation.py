@@ -38,7 +38,7 @@ DAY_S: Final = 86400
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
-"""Counts that are so much nearer to zero are a new beginning, not wheels that roll back."""
+"""Counts that are nearer to zero by this much are a new beginning, not wheels that roll back."""
 
 
 class Translation:

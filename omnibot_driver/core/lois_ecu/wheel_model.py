@@ -33,7 +33,7 @@ class _Effect:
 class WheelModel:
     """Advanced by ``carry_out``. Speeds are of the rim, as commanded.
 
-    kind, target_mps: what the motor is told. hidden_mps: the firmware's RPM target; in duty mode it
+    kind, target_mps: the motor's command. hidden_mps: the firmware's RPM target; in duty mode it
     stays as it was, but ticks under negative duty lower it.
     """
 

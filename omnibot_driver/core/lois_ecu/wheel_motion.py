@@ -73,7 +73,7 @@ class Wheel:
         self.cut = False
         """Without power until the controller has wound up."""
         self.rolls_on = False
-        """The speed that is told may be that from before the target changed its sign."""
+        """The reported speed may be that from before the target changed its sign."""
         self.rolls_on_s = 0.0
         self.locked = False
         """It stands, and the speed that it keeps is more than its target: it gets no power."""

@@ -41,7 +41,7 @@ TRAITS: Final = Traits(
     slack_radps=0.6,
 )
 EXPECTED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
-"""Nothing is heard, and nothing can be: the server is busy with what it was told."""
+"""Nothing is heard, and nothing can be: the server is busy with its last command."""
 EXPECTED_EVERY_S: Final = 0.2
 
 
@@ -187,7 +187,7 @@ class Conductor:
 
     @property
     def commanded(self) -> BodyTwist | None:
-        """As the motors were told last; None in a controlled move."""
+        """By the motors' last command; None in a controlled move."""
         return self._pilot.commanded
 
     @property
@@ -212,7 +212,7 @@ class Conductor:
         self._pilot.apply(wanted, now)
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Nobody else writes."""
+        """No other client writes."""
 
     def due(self, now: float) -> Packets:
         """What to write now."""

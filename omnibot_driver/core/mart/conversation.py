@@ -6,7 +6,7 @@ Replies carry no number, and datagrams are lost, doubled and late. So a reply is
 form, its reason and the least time its command takes; what matches nothing is late, and discarded.
 After a query that was not answered, none with the same form of reply is asked until its reply can
 no longer come. Those that the robot is driven by cannot wait: their answers are marked as doubtful,
-and whoever reads them compares them with what is expected. Time is an argument.
+and their reader compares them with what is expected. Time is an argument.
 """
 
 import math

@@ -19,7 +19,7 @@ NEAR_M: Final = 0.04
 NEAR_RAD: Final = math.radians(2.5)
 SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
-"""After so many moves this is near enough: each more would turn round for it."""
+"""After this many moves this is near enough: each more would turn round for it."""
 STRETCH: Final = 1.3
 """Of straight moves, at first: 12 inches were seen to be 15.8."""
 MOST_SURPLUS_DEG: Final = 10.0
@@ -93,7 +93,7 @@ class Surplus:
         self._degrees[slow] = min(MOST_SURPLUS_DEG, max(0.0, before + (beyond - before) / 2))
 
     def degrees(self, wanted: float, *, slow: bool) -> int:
-        """What to ask for, to turn so many degrees; 0 for less than can be turned."""
+        """What to ask for, to turn this many degrees; 0 for less than can be turned."""
         surplus = self._degrees[slow]
         return max(1, round(wanted - surplus)) if wanted > surplus / 2 else 0
 

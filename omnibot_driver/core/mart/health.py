@@ -82,7 +82,7 @@ class Health:
         return []
 
     def _status(self, bits: int) -> None:
-        """It counts when it is told twice: a late reply to ENC looks the same."""
+        """It counts when it is reported twice: a late reply to ENC looks the same."""
         if not 0 <= bits <= NO_READ:
             return
         before, self._status_before = self._status_before, bits
@@ -132,7 +132,7 @@ class Health:
     def refusal(self) -> str:
         """Why the robot is not to be driven, and what to do; empty if it may be."""
         if self.stranger:
-            return f"the server is no motion controller: it calls itself '{self.stranger}'"
+            return f"the server is not a motion controller; it calls itself '{self.stranger}'"
         if self.tripped:
             return f"the motor board reports {self.tripped}: check motors, wiring and power"
         if self._imu.dead:

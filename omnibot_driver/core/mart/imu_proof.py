@@ -24,9 +24,9 @@ from omnibot_driver.core.mart.words import (
 PROVED_S: Final = 0.2
 """So old a proof of the IMU may be when a motion starts."""
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
-"""A check takes at least about so long; half of what it took longer is the way of its reply."""
+"""A check takes at least about this time; half of what it took longer is the way of its reply."""
 FAILS: Final = {RESET: 3, CHECK: 1}
-"""After so many in a row the IMU is dead."""
+"""After this many in a row the IMU is dead."""
 REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0
 
 

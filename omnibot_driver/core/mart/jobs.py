@@ -20,7 +20,7 @@ from omnibot_driver.core.mart.words import Form, Request, Word
 
 PIECE: Final = 512
 QUIET_S: Final = 1.0
-"""A file is over when nothing came for so long."""
+"""A file is over when nothing came for this time."""
 TIMES: Final = 3
 """A job that may be repeated is asked so often."""
 

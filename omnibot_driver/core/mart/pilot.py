@@ -56,7 +56,7 @@ class Pilot(Starts):
 
     @property
     def stop_words(self) -> tuple[Word, ...]:
-        """What stops the present state, for whoever cannot hear the replies."""
+        """What stops the present state, for a caller that cannot receive the replies."""
         if self.state is State.LOST:
             return LAST_HALTS[self.motion] or LAST_HALTS[Motion.UNKNOWN]
         if self.motion is Motion.NONE:

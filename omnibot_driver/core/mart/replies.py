@@ -51,7 +51,7 @@ class Fail:
 
 @dataclass(frozen=True, slots=True)
 class Other:
-    """What is no reply: a piece of a file, or another program's datagram."""
+    """What is not a reply: a piece of a file, or another program's datagram."""
 
     data: bytes
 
@@ -60,7 +60,7 @@ Reply = Ok | Fail | Other
 
 
 class MartDecoder:
-    """Each datagram is a whole, so nothing is held. ``foreign``: those that are no replies."""
+    """Each datagram is a whole, so nothing is held. ``foreign``: those that are not replies."""
 
     def __init__(self) -> None:
         self.foreign = 0

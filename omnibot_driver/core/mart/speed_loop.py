@@ -18,7 +18,7 @@ MOST_UNITS: Final = 127
 MOST_CHANGE: Final = 15
 """Units in one exchange: all that a command which arrives twice can do too much."""
 SETTLE_S, LEARN_S = 0.45, 0.35
-"""After a larger change nothing is learned for so long; then each so long."""
+"""After a larger change nothing is learned for this time; then once in this time."""
 LARGE_UNITS: Final = 3
 LEARNED: Final = 0.7
 """Part of what a window shows that is taken over at once."""
@@ -29,7 +29,7 @@ SLOWEST_MPS: Final = 0.03
 """Of a wheel whose gain can be learned."""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
-"""A change of the turn rate takes so long; its lag is no error to be made good."""
+"""A change of the turn rate takes this time; its lag is not an error to correct."""
 NEW_RADPS: Final = 0.03
 UNEQUAL: Final = 0.04
 """Of two motors, where nothing but what is commanded tells of a turn."""

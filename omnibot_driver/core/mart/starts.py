@@ -26,7 +26,7 @@ from omnibot_driver.core.mart.words import Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""A heading that has not changed for so long is made to: the robot may just drive straight."""
+"""A heading that has not changed for this time is made to: the robot may just drive straight."""
 AGAIN_S: Final = 1.0
 """After a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
@@ -230,7 +230,7 @@ class Starts(Moves):
         self._polls.press(words.ENC)
 
     def _start_failed(self, reply: Fail, now: float) -> None:
-        """It may move all the same."""
+        """It may still move."""
         word = self._start
         assert word is not None
         self._again_s = now + AGAIN_S

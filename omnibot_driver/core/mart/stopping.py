@@ -85,7 +85,7 @@ class Stopping:
 
     def asks_name(self, now: float) -> bool:
         """Whether the server is asked for its name too: the reply to a move may have been lost,
-        and whoever tells its name is done with the move.
+        and the one that names it has finished the move.
         """
         return self.move is not None and now >= self.began_s + ASK_NAME_S
 

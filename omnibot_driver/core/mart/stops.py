@@ -27,10 +27,10 @@ from omnibot_driver.core.mart.words import Form
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 BLIND_S, TRIPS = 0.8, 3
-"""A robot that drives and is not counted for so long, and for so many exchanges, is stopped."""
+"""A robot that drives without counts for this time and this many exchanges is stopped."""
 FROZEN_S: Final = 0.5
-"""A heading that does not change at all while the robot drives so long, and two exchanges more,
-comes of no living IMU.
+"""A heading that does not change at all while the robot drives for this time, and two exchanges
+more, comes of no living IMU.
 """
 NO_START_S: Final = 1.5
 """A wheel that is driven turns by then."""

@@ -6,7 +6,7 @@ Pure: bytes in, ticks of ``tick_s``, bytes out; the same settings and input give
 Knows the manual's table and, by ``Quirks``, the public firmware. Must not know ports or real time.
 
 Where the manual is silent: no set-point ends by itself; ticks are signed and wrap at 2³²; the
-button is told on press and on release, and both set the set-points to zero.
+button is reported on press and on release, and both set the set-points to zero.
 """
 
 from collections import deque

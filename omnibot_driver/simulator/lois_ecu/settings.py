@@ -46,7 +46,7 @@ class Quirks:
     lenient_hex: a payload that is not a number is obeyed if its checksum is right.
     limits_rpm: beyond 50 RPM it drives 50.
     fast_control: each 91 ms instead of 200 ms, with the same coefficients.
-    slow_timer: one count of 100 us takes 100.7 us, so each speed is told 0.7 % too high.
+    slow_timer: one count of 100 us takes 100.7 us, so each speed is reported 0.7 % too high.
     slow_boot: silent and deaf for two seconds; what comes meanwhile is read then.
     """
 

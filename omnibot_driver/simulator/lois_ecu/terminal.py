@@ -37,7 +37,7 @@ class Terminal:
         return self._to_sensor > 0
 
     def heard(self, count: int) -> None:
-        """So many characters came from the host; they go to the sensor."""
+        """This many characters came from the host; they go to the sensor."""
         if self.on and self._quirks.terminal_passes_input_on:
             self._to_sensor = min(self._to_sensor + count, PASSED_ON_DEPTH)
 

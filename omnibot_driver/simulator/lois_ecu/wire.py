@@ -57,7 +57,8 @@ class LineReader:
     """What the board understands, character by character.
 
     ``checks``: whether lines have a checksum. ``lenient``: fields are read as C's strtol does, with
-    space, sign and prefix, up to what is no digit, instead of making the line wrong.
+    space, sign and prefix, up to the first character that is not a digit, instead of making the
+    line wrong.
     """
 
     def __init__(self, *, lenient: bool) -> None:

@@ -105,7 +105,7 @@ class Chassis:
 
     @property
     def powered(self) -> bool:
-        """Whether the motors are told to turn."""
+        """Whether the motors have a command to turn."""
         return self.right != STOP or self.left != STOP
 
     @property

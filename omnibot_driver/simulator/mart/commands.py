@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The commands of the first port: how they are told apart, what they need, what they answer.
+"""The commands of the first port: how they are distinguished, what they need, what they answer.
 
 The server compares beginnings, in this order, so that F takes every word that begins with F. Knows
 words and numbers. Must not know how a motion goes on.

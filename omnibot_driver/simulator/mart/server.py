@@ -111,7 +111,7 @@ class MartServer(ServerState):
         return new
 
     def restart(self, boot_s: float = 0.0) -> None:
-        """Start the server again; the motors keep what they were told last."""
+        """Start the server again; the motors keep their last command."""
         self.begin()
         self.imu.restart()
         self._boots_until_s = self.now_s + boot_s

@@ -2,7 +2,7 @@
 
 """The commands that start no motion: questions, clock, log, files, and the motors by hand.
 
-Knows what they answer and when. Must not know how they are told apart.
+Knows what they answer and when. Must not know how they are distinguished.
 """
 
 import calendar
@@ -29,7 +29,7 @@ Handler = Callable[["MartServer", str], str | None]
 
 
 def missing(server: "MartServer", what: str) -> str | None:
-    """A number is missing that the server reads all the same."""
+    """A number is missing that the server reads nevertheless."""
     if not server.quirks.crashes_on_missing_numbers:
         return "fail improper command format"
     server.end(what)

@@ -86,7 +86,7 @@ class ServerState:
 
     @property
     def moving(self) -> bool:
-        """Whether the robot truly moves, or its motors are told to."""
+        """Whether the robot truly moves, or its motors have a command."""
         return self.chassis.moving or self.chassis.powered
 
     @property

@@ -33,7 +33,7 @@ HOST_GAINS = LoisEcuSettings(
 REPEAT_S = 0.05
 
 Program = list[tuple[float, tuple[float, float]]]
-"""For so long, at these RPM left and right."""
+"""Duration, and RPM left and right."""
 
 CLASSES: dict[str, Program] = {
     "straight": [(21.0, (20, 20))],

@@ -98,7 +98,7 @@ def test_after_a_square_with_turns_on_the_spot_it_is_within_3_sigma(name: str) -
 
 
 def test_hard_steering_to_both_sides_is_followed() -> None:
-    """Wheels that reverse several times a second, as documented: each tick is told."""
+    """Wheels that reverse several times a second, as documented: each tick is reported."""
     one = motion(nominal("documented", 1001), "jerky")
     assert off_m(one) < 0.05
     assert abs(one.error.yaw_rad) < math.radians(5.0)

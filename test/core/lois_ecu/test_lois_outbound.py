@@ -47,7 +47,7 @@ def heard(data: bytes, *, with_sum: bool, lenient: bool) -> list[tuple[int, int]
 
 
 def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
-    """All sets of up to so many positions."""
+    """All sets of up to this many positions."""
     for count in range(most + 1):
         yield from combinations(range(length), count)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Records as files, with units; and none that nobody waits for any more."""
+"""Records as files, with units; abandoned ones are not saved."""
 
 from pathlib import Path
 

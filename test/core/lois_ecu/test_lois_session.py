@@ -117,7 +117,7 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
 
 @FIRMWARE
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
-    """The counters were zero before; it is sent more than once all the same."""
+    """The counters were zero before; it is still sent more than once."""
     bench = Bench(firmware)
     before = len(bench.written)
     done = bench.reset()
@@ -301,7 +301,7 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
-    """The piece that is left is no sign of a wrong baud rate."""
+    """The rest of a line is not a sign of a wrong baud rate."""
     bench = Bench("firmware")
     while not bench.board._uart.sending:
         bench.run(0.01)

@@ -13,7 +13,8 @@ def pose(x_m: float) -> BoardOdometry:
 
 
 def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float) -> list[float]:
-    """When a wheel looked stalled in six seconds, with so many ticks and so far in each 0.2 s."""
+    """When a wheel looked stalled in six seconds, with these ticks and this distance in each 0.2
+    s."""
     watch = StallWatch()
     watch.wrote(command, 0.0)
     found = []

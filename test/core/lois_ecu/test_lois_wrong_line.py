@@ -20,7 +20,7 @@ SUMLESS_SUM = b":0200140014ff\n"
 WRONG = {
     "another board": (OMNIBOT, "OmniBot board's frames: set board to omnibot"),
     "NMEA": (NMEA, "NMEA sentences"),
-    "noise": (Random(1).randbytes(500), "the bytes are no text: check baudrate"),
+    "noise": (Random(1).randbytes(500), "the bytes are not text: check baudrate"),
     "too short": (SHORT, "lines come without checksum"),
     "too long": (LONG, "lines of 16 characters come instead of 14"),
     "a wrong checksum": (SUMLESS_SUM, "lines come with wrong checksums"),

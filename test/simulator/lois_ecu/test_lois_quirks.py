@@ -343,7 +343,7 @@ def large_records_never_end(quirks: Quirks) -> bool:
 
 
 def lenient_hex(quirks: Quirks) -> bool:
-    """A payload with letters that are no digits, and a right checksum."""
+    """A payload with letters that are not digits, and a right checksum."""
     rig = Rig(quirks)
     rig.run(2.1)
     for _ in range(5):

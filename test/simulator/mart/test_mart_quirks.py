@@ -107,7 +107,7 @@ def zero_distance_is_unlimited(quirks: Quirks) -> bool:
 
 
 def echoes_distance(quirks: Quirks) -> bool:
-    """12 inches are told, 16 were driven."""
+    """12 inches are reported, 16 were driven."""
     rig = Rig(quirks)
     answer = rig.ask("TF 12")
     assert round(rig.x_in) == 16
