@@ -28,12 +28,12 @@ from omnibot_driver.transports import Transport
 JOIN_TIMEOUT_S: Final = 3.0
 """Longer than a guard takes to repeat Stop."""
 STANDS_WITHIN_S: Final = 0.5
-"""So long an end waits until the robot is seen to stand, longer where a proof takes longer; then
-the guard repeats Stop."""
+"""The longest wait at the end until the robot is seen to stand, longer where a proof takes longer;
+then the guard repeats Stop."""
 UNGUARDED_S: Final = 1.5
-"""So long where no guard does."""
+"""The same without a guard."""
 SILENCE_S: Final = 0.25
-"""So long it then waits, without a word, to see that the last Stop was no damaged one."""
+"""The wait after it, in silence, that proves that the last Stop was not damaged."""
 
 T = TypeVar("T")
 

@@ -83,10 +83,10 @@ class SharedSession:
     def command(
         self, action: Callable[[Session, T, float], None], wish: T, sent_ns: Sequence[int]
     ) -> None:
-        """``call``, with a wish that was sent at one of these times of day, as far as is known.
+        """``call`` with a wish, which was sent at one of these times of day, as far as is known.
 
-        Raises CommandRefused for one that has been waiting while this process stood still. Every
-        refusal is delivered as well, in its place among the events.
+        Raises CommandRefused for a wish that waited while this process was stalled. Every refusal
+        is delivered as well, in its place among the events.
         """
         try:
             with self.lock:
@@ -109,18 +109,15 @@ class SharedSession:
 
     @property
     def blocked(self) -> bool:
-        """What was said last was not taken, and the port is opened anew.
+        """Whether the port did not accept the last packets, and is opened anew.
 
-        It may be gone by now: the reader is woken by what the caller finds here.
+        Only for a moment: the reader that opens it is awake already.
         """
         with self.lock:
             return self.write_error is not None
 
     def settle(self) -> None:
-        """Write what is due, wake the pacer if it sleeps for too long.
-
-        What there is to tell takes its place in the order.
-        """
+        """Write what is due, queue what there is to tell, wake the pacer if it would sleep too long."""
         packets = self.session.take_output(time.monotonic())
         self.tell_guard()
         if packets:
@@ -131,7 +128,7 @@ class SharedSession:
             self.outbox.put(partial(self._deliver, events))
 
     def write(self, packets: Packets) -> None:
-        """On an open port that takes them; where it does not, the reader opens it anew."""
+        """To the open port; if it fails, the reader opens it anew."""
         if not packets or self.port is None or self.write_error is not None:
             return
         try:
@@ -146,14 +143,14 @@ class SharedSession:
                     self.outbox.put(partial(self._on_write, packet))
 
     def tell_guard(self) -> None:
-        """What stops the board now, where that has changed."""
+        """Tell the guard what stops the board now, if that has changed."""
         if (keeper := self.keeper) is None:
             return
         if (words := self.session.board.last_words()) != keeper.last_words:
             keeper.change(*words)
 
     def pace(self) -> None:
-        """One pass of the pacer: do what is due, or sleep until something is."""
+        """One pass of the pacer: do what is due, or sleep until then."""
         now = time.monotonic()
         self._pacing_until = min(self.session.wake_at, self._beat_at)
         if now < self._pacing_until:
@@ -165,18 +162,18 @@ class SharedSession:
             self.settle()
 
     def heed_stall(self) -> bool:
-        """Whether this process stood still, and the robot is to be stopped."""
+        """Stop the robot if this process was stalled; whether it was."""
         return self._heed_stall(boot_time_s())
 
     def _heed_stall(self, boot_s: float) -> bool:
         length_s = 0.0 if self.closing.is_set() else self._stall_detector.begun(boot_s)
-        if length_s:  # the caller may have read the steady clock before it stood still
+        if length_s:  # the caller may have read the steady clock before the stall
             self.session.stood_still(length_s, time.monotonic())
         return length_s > 0.0
 
     def _beat(self, now: float) -> None:
         """The pacer, and so the watchdog, is alive."""
-        boot_s = boot_time_s()  # read once: it may stand still between two readings
+        boot_s = boot_time_s()  # read once: a stall may come between two readings
         self._heed_stall(boot_s)
         self._stall_detector.passed(boot_s, time.time_ns())
         if now < self._beat_at:
