@@ -11,7 +11,7 @@ NAME = "omnibot_driver"
 setup(
     name=NAME,
     version="0.1.0",
-    description="ROS 2 driver for the Neuron OmniBot motor board",
+    description="ROS 2 driver for the motor boards of mobile robots",
     maintainer="OmniBot driver developers",
     maintainer_email="maintainers@example.org",
     license="Apache-2.0",

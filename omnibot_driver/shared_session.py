@@ -117,7 +117,7 @@ class SharedSession:
             return self.write_error is not None
 
     def settle(self) -> None:
-        """Write what is due, queue what there is to tell, wake the pacer if it would sleep too long."""
+        """Write what is due, queue what there is to tell, wake a pacer that sleeps too long."""
         packets = self.session.take_output(time.monotonic())
         self.tell_guard()
         if packets:
