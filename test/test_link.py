@@ -218,7 +218,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
         drive([sent_ns])
     with pytest.raises(CommandRefused, match="waited while the driver was stalled"):
         drive([time.time_ns(), sent_ns])  # or so, as little is known of its sender
-    listener.wait_for(lambda: any("stood still" in str(event) for event in listener.events))
+    listener.wait_for(lambda: any("stalled" in str(event) for event in listener.events))
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
 
     listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
