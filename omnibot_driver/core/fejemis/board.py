@@ -387,6 +387,9 @@ class FejemisBoard(Board):
             return True
         return not self._estopped and now - self._released_at > RELEASED_S
 
+    def reset_odometry(self) -> None:
+        """The origin is the driver's own: on the board ``enc0`` would look like a restart."""
+
     # Outbound
 
     def actuator(self, proof: StopProof) -> PairStream:

@@ -2,7 +2,7 @@
 
 """Gyro and acceleration lines, which carry no time, as readings of one IMU with a time.
 
-The board measures both each ``PERIOD_S`` of its own clock, and sends the gyro first. So samples are
+The board measures both each ``PERIOD_S`` of its own clock, and sends them together. So samples are
 counted, and a sample's time is a whole count of periods from one phase. The arrivals tell that
 phase and the count: no sample comes before its time; one that comes after a pose in the stream is
 not older than it.
@@ -18,8 +18,9 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 
 PERIOD_S: Final = 0.01
 STANDARD_GRAVITY: Final = 9.80665
-PAIR_WITHIN_S: Final = 0.008
-"""The two lines of one sample leave the board in one cycle."""
+PAIR_WITHIN_S: Final = 0.005
+"""Half a period: the two lines of one sample leave the board in one cycle, unless one of them was
+subscribed later than the other."""
 LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Two samples in a row that are late by a period and come apart: one was lost before them. After a
@@ -42,6 +43,7 @@ class ImuPairing:
     def begin(self) -> None:
         """The board subscribes anew: the phase is another one."""
         self._gyro: tuple[Gyro, float] | None = None
+        self._acceleration: tuple[Acceleration, float] | None = None
         self._count = 0
         self._arrived_s = -math.inf
         self._phase_s: float | None = None
@@ -49,16 +51,23 @@ class ImuPairing:
         self._block_s, self._block_from = math.inf, 0
         self._delay_s = 0.0
 
-    def gyro(self, gyro: Gyro, now: float) -> None:
-        """The first half of a sample."""
+    def gyro(self, gyro: Gyro, now: float) -> ImuReading | None:
+        """One half of a sample; the sample where the other half has just come."""
         self._gyro = gyro, now
+        return self._whole(now)
 
     def acceleration(self, acceleration: Acceleration, now: float) -> ImuReading | None:
-        """The second half; None where the first one is missing."""
-        held, self._gyro = self._gyro, None
-        if held is None or now - held[1] > PAIR_WITHIN_S:
+        """The other half."""
+        self._acceleration = acceleration, now
+        return self._whole(now)
+
+    def _whole(self, now: float) -> ImuReading | None:
+        if self._gyro is None or self._acceleration is None:
             return None
-        gyro, _ = held
+        (gyro, gyro_at), (acceleration, acceleration_at) = self._gyro, self._acceleration
+        if abs(gyro_at - acceleration_at) > PAIR_WITHIN_S:
+            return None
+        self._gyro = self._acceleration = None
         scale = STANDARD_GRAVITY if self.unit == "g" else 1.0
         self.rates = math.radians(gyro.x), math.radians(gyro.y), math.radians(gyro.z)
         self.forces = (scale * acceleration.x, scale * acceleration.y, scale * acceleration.z)

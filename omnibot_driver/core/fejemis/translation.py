@@ -33,7 +33,7 @@ from omnibot_driver.core.fejemis.readings import (
 )
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.teensy_clock import StampedReadings, TeensyClock
-from omnibot_driver.core.readings import ExtraReading, NoticeReading, Reading
+from omnibot_driver.core.readings import ExtraReading, ImuReading, NoticeReading, Reading
 
 TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
@@ -52,6 +52,7 @@ class Translation:
         self._imu = ImuPairing(settings.acceleration_unit)
         self.stamped = StampedReadings()
         self._low_told_at = -math.inf
+        self._low = False
         self.connect()
 
     def configure(self, settings: FejemisSettings) -> None:
@@ -104,9 +105,9 @@ class Translation:
             case WheelSpeeds():
                 self.odometry.speeds(message, now)
             case Gyro():
-                self._imu.gyro(message, now)
+                self._sample(self._imu.gyro(message, now), clock, now)
             case Acceleration():
-                self._sample(message, clock, now)
+                self._sample(self._imu.acceleration(message, now), clock, now)
             case Attitude():
                 self._orient(message, now)
             case Magnetic():
@@ -121,8 +122,7 @@ class Translation:
             case Distance(keyword="sr04"):
                 self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
 
-    def _sample(self, message: Acceleration, clock: TeensyClock, now: float) -> None:
-        reading = self._imu.acceleration(message, now)
+    def _sample(self, reading: ImuReading | None, clock: TeensyClock, now: float) -> None:
         if reading is None:
             return
         stamp_s = now
@@ -146,7 +146,8 @@ class Translation:
     def _battery(self, message: Battery, now: float) -> None:
         low = message.cells > 0 and message.volts < message.cells * self._settings.low_cell_v
         self.extra(BatteryReading(message.volts, -message.amps, message.cells, low), now)
-        if low and now - self._low_told_at >= LOW_AGAIN_S:
+        was_low, self._low = self._low, low
+        if low and was_low and now - self._low_told_at >= LOW_AGAIN_S:
             self._low_told_at = now
             self.add(
                 NoticeReading(

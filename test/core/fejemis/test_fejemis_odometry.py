@@ -311,20 +311,27 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
     assert stamps[-1] == 2.0
 
 
-def test_a_sample_is_a_gyro_line_and_the_acceleration_behind_it() -> None:
-    """Where either is lost there is none, and the next is whole again."""
+@pytest.mark.parametrize("gyro_first", [True, False])
+def test_a_sample_is_a_gyro_line_and_an_acceleration_line(*, gyro_first: bool) -> None:
+    """In any order; where either is lost there is none, and the next is whole again."""
     imu = ImuPairing("g")
-    imu.gyro(Gyro(180.0, 0.0, -180.0), 1.0)
-    reading = imu.acceleration(Acceleration(0.0, 0.0, 1.0), 1.0)
-    assert reading is not None
+
+    def say(now: float, *, gyro: bool = True, acceleration: bool = True) -> list[ImuReading]:
+        lines = [
+            (gyro, lambda: imu.gyro(Gyro(180.0, 0.0, -180.0), now)),
+            (acceleration, lambda: imu.acceleration(Acceleration(0.0, 0.0, 1.0), now)),
+        ]
+        told = [line() for heard, line in lines[:: 1 if gyro_first else -1] if heard]
+        return [reading for reading in told if reading]
+
+    (reading,) = say(1.0)
     assert reading.angular_velocity == pytest.approx((math.pi, 0.0, -math.pi))
     assert reading.specific_force == pytest.approx((0.0, 0.0, 9.80665))
-    assert imu.acceleration(Acceleration(0.0, 0.0, 1.0), 1.01) is None
-    imu.gyro(Gyro(0.0, 0.0, 0.0), 1.02)
-    imu.gyro(Gyro(1.0, 0.0, 0.0), 1.03)
-    assert imu.acceleration(Acceleration(0.0, 0.0, 1.0), 1.04) is None
-    imu.gyro(Gyro(1.0, 0.0, 0.0), 1.05)
-    assert imu.acceleration(Acceleration(0.0, 0.0, 1.0), 1.0501) is not None
+    assert say(1.01, gyro=False) == []
+    assert len(say(1.02)) == 1
+    assert say(1.03, acceleration=False) == []
+    assert say(1.04, acceleration=False) == []
+    assert len(say(1.05)) == 1
 
 
 @pytest.mark.parametrize("sums", [True, False])
