@@ -146,6 +146,12 @@ class FejemisBoard(Board):
                     f"the {configuration.role} board does not keep what was written with {names};"
                     " check the values, and its firmware"
                 )
+        for half in self._ports.halves:
+            if unknown := half.unknown_streams:
+                return (
+                    f"the firmware of the {half.role} board does not know {', '.join(unknown)}:"
+                    " what rests on it is missing; update the firmware"
+                )
         one, other = (self._configurations[role].geometry for role in ROLES)
         if one and other and _differ(one, other):
             return (
@@ -201,6 +207,13 @@ class FejemisBoard(Board):
                 half.restarted = False
                 self._restarted(half, now)
             self._hear(half, message, now)
+        if half.not_understood(now):
+            self._tell(
+                f"many lines from the {self._ports.role(channel)} board are damaged or not"
+                " understood: check the cable, and whether somebody has asked it for help text",
+                now,
+                halt=False,
+            )
         if half.decoder.changed:
             half.decoder.changed = False
             ended = "have sums now" if half.decoder.sums else "have no sums any more"
@@ -245,7 +258,7 @@ class FejemisBoard(Board):
     def _tell(self, text: str, now: float, *, halt: bool = True) -> None:
         """The same at most once in a while, but every halt is obeyed."""
         if now - self._told_at.get(text, -math.inf) < TELL_EVERY_S:
-            text = "" if halt else text
+            text = ""
         else:
             self._told_at[text] = now
         if halt or text:

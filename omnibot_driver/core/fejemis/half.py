@@ -38,6 +38,8 @@ NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 TOGETHER: Final = ("gyro", "acc")
 """Subscribed in one packet, so that both are sent in the same cycle."""
 AGAIN_S: Final = 0.5
+MANY: Final = 30
+"""Lines in a second that are not understood, of some hundred."""
 SILENT_S: Final = 1.5
 """A board that says nothing for so long is not known to be there."""
 _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
@@ -68,6 +70,7 @@ class Half:
         self.ready = False
         """Its needed stream flows."""
         self._told: int | None = None
+        self._counted_at, self._counted = -math.inf, 0
         self._left = False
         self._at: dict[str, float] = {}
         self._next_at = -math.inf
@@ -81,6 +84,23 @@ class Half:
     def feed(self, data: bytes, now: float) -> list[Message]:
         """What these bytes tell, without what cannot be true of this board's time."""
         return [message for message in self.decoder.feed(data, now) if self._admit(message, now)]
+
+    @property
+    def unknown_streams(self) -> list[str]:
+        """What it was asked to send and does not know."""
+        if self.role is None:
+            return []
+        streams = STREAMS[self.role]
+        return [key for key in streams if f"sub {key} {streams[key]}" in self.unknown_words]
+
+    def not_understood(self, now: float) -> bool:
+        """Whether many of its lines are not; asked with each read, True once for each second."""
+        if now - self._counted_at >= 1.0:
+            self._counted_at, self._counted = now, self.statistics.faults
+        if self.statistics.faults - self._counted <= MANY:
+            return False
+        self._counted = self.statistics.faults + MANY
+        return True
 
     def came_at(self, keyword: str) -> float:
         """When a line of this kind came last."""
@@ -107,12 +127,12 @@ class Half:
             return []
         self._next_at = now + AGAIN_S
         if self.role is None or self.heartbeat is None:
-            return [b"hbti"] if now - self.heard_at > AGAIN_S else []
+            return [b"hbti"]
         wanted = {
             key: period
             for key, period in STREAMS[self.role].items()
             if now - self.came_at(key) > max(AGAIN_S, 4e-3 * period)
-            and f"sub {key} {period}" not in self.unknown_words
+            and key not in self.unknown_streams
         }
         if wanted.keys() & set(TOGETHER):
             wanted |= {key: STREAMS["drive"][key] for key in TOGETHER}
@@ -142,6 +162,7 @@ class Half:
             return False
         if self.clock.restarted:
             self._restart()
+            self.restarted = True
             self.clock.see(time_s, now)
         return True
 
