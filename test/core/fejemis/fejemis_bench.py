@@ -148,7 +148,7 @@ def nominal(
     bench = Bench(simulated, settings, **more)
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
-    bench.run(1.0)
+    bench.run(0.4)
     return bench
 
 

@@ -79,7 +79,7 @@ def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
 def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
     """By the pairs that a sum does not see: the line has none of them."""
     chance = random.Random(7)
-    for _ in range(400):
+    for _ in range(150):
         v = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.3)
         w = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.8)
         for text in (front_line(v, w, FRONT_M), drive_line(v, w)):

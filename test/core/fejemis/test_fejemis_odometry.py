@@ -135,6 +135,7 @@ def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
     assert before.way_to(drive.out).way_m == pytest.approx(0.3, abs=0.03)
 
 
+@pytest.mark.slow
 def test_the_covariance_is_consistent_over_fifty_drives() -> None:
     """Wheels of wrong sizes that slip: the normalised error squared is 3 on average."""
     noise = OdometryNoise(wheels=WHEELS)

@@ -187,6 +187,7 @@ def said_by_the_driver() -> set[str]:
     return said
 
 
+@pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
     """And ``setid`` is not among them."""
     said = said_by_the_driver()

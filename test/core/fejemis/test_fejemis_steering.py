@@ -129,12 +129,11 @@ COMMANDS = [
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sums", [True, False])
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
-def test_the_simulated_body_moves_as_commanded(v: float, w: float, *, sums: bool) -> None:
+def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
     """Within 1 % of the outer wheel's speed, over the whole range."""
-    bench = nominal(Simulated(firmware=Firmware(sums=sums)))
-    bench.drive_on(v, w, 3.0)
+    bench = nominal()
+    bench.drive_on(v, w, 2.5)
     truth = bench.robot.truth
     outer = abs(v) + abs(w) * 0.2
     assert truth.speed_mps == pytest.approx(v, abs=0.012 * outer + 5e-4)
@@ -196,7 +195,7 @@ def test_a_mirrored_reverse_is_driven() -> None:
     assert not bench.notices
 
 
-@pytest.mark.parametrize("w", [0.0, 0.3, -0.3])
+@pytest.mark.parametrize("w", [0.0, 0.3])
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
     """The wheel goes across instead; the robot rolls some centimetres at the most."""
     bench = nominal(
