@@ -17,7 +17,7 @@ robot's limits; it knows no bytes and no clock.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import hypot
+from math import hypot, inf
 from operator import sub
 from typing import Final
 
@@ -50,7 +50,8 @@ class MotionLimits:
     """What the robot can never exceed, pushed by hand too.
 
     ``force_step_mps2``: the least change of specific force, from one reading to the next, that is
-    looked at twice; ``full_scale_mps2``: of the accelerometer.
+    looked at twice; ``full_scale_mps2``: of the accelerometer;
+    infinite where its readings are no words of bits.
     """
 
     fastest_mps: float = 2.0
@@ -245,6 +246,8 @@ class _Spikes:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """As far as values show it that vary anyway. What ends at the end of the
         scale was knocked."""
+        if topmost == inf:  # no word of bits is sent
+            return False
         slack = OUT_OF_PROPORTION * self._restless
         bit = topmost if value < END_OF_SCALE * topmost else 0.0
         while bit > step + slack:

@@ -249,3 +249,10 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
     at_once = replace(ahead(), duration_s=0.0)
     assert through.admit(at_once, 1.0) == [(at_once, 1.0)]
     assert through.admit(ahead(), 1.04) == [(ahead(), 1.04)]
+
+
+def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
+    """A sensor of text has no full scale; the search for a bit of an infinite one never ended."""
+    through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
+    given = [imu(), imu(), imu(8.0), imu(), imu()]
+    assert admitted(list(given), through) == [[reading] for reading in given]
