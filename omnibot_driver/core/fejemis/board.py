@@ -222,11 +222,12 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
-        """The lines are closed: half a line is none."""
+        """The lines are closed: half a line is none, and whoever waits for a job is answered."""
         self._open(now)
         for half in self._ports.halves:
             half.decoder.flush(now)
-        return []
+        self._jobs.begin()
+        return self._taken(now)
 
     def silence(self) -> None:
         """Neither half was heard."""
@@ -538,6 +539,8 @@ class FejemisBoard(Board):
                     f"{job.value} refused: the robot is commanded; stop the sender, then call again"
                 )
             self._tell("the configuration is being loaded; robot stopped", now)
+        if self._translation.odometry.moving and job is not Job.LOAD:
+            raise RequestRefused(f"{job.value} refused: the robot moves; wait until it stands")
         self._jobs.ask(job, token, now, delay_s=self._settings.power_off_delay_s)
         if job in (Job.LOAD, Job.POWER_OFF):
             self._machine.off()

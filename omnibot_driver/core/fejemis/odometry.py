@@ -31,6 +31,7 @@ FASTEST_RADPS: Final = 12.0
 FRESH_S: Final = 0.1
 """Speeds that are older tell nothing."""
 LEAST_S: Final = 0.001
+STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 
 
@@ -52,6 +53,12 @@ class PoseOdometry:
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
         self._speeds_at = -math.inf
+
+    @property
+    def moving(self) -> bool:
+        """Whether a wheel turns, by its last speed."""
+        speeds = self._speeds
+        return speeds is not None and max(map(abs, (speeds.left_mps, speeds.right_mps))) > STILL_MPS
 
     def forget(self) -> None:
         """The board has restarted: its frame begins anew, somewhere on the way."""

@@ -74,6 +74,27 @@ def test_a_job_that_nothing_confirms_fails() -> None:
     assert done.token is token
 
 
+def test_a_job_is_answered_when_the_port_is_lost() -> None:
+    """At once, whether or not it comes back."""
+    bench = nominal()
+    token = object()
+    bench.board.ask(Job.CALIBRATE_GYRO, token, bench.now)
+    bench.settle()
+    bench.close()
+    (done,) = bench.extras(JobDone)
+    assert done.token is token
+    assert "port was lost" in done.message
+
+
+def test_a_robot_that_rolls_is_not_calibrated() -> None:
+    """Nobody commands it any more, and it still moves."""
+    bench = nominal()
+    bench.drive_on(0.5)
+    bench.drive(0.0)
+    with pytest.raises(RequestRefused, match="moves"):
+        bench.board.ask(Job.CALIBRATE_GYRO, None, bench.now)
+
+
 def test_a_configuration_is_saved_and_loaded() -> None:
     """On both boards."""
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.41, 0.43)}))
