@@ -475,7 +475,7 @@ class FejemisBoard(Board):
             times.append(half.wake_at)
             if half.role is not None and half.ready:
                 times += (self._configurations[half.role].wake_at, self._polls[half.role].wake_at)
-        if self._actuator is not None and self._actuator.driving:
+        if self._mode is Mode.NOMINAL:
             drive = self._ports.half("drive")
             if not self._blind:
                 times.append(self._translation.front.stale_at)

@@ -12,6 +12,8 @@ from omnibot_driver.core.fejemis.half import Half, Role
 from omnibot_driver.core.fejemis.polls import Polls
 from omnibot_driver.core.fejemis.ports import ROLES, Ports
 
+SHOWN: Final = 3
+"""So many of the lines that a board did not know, the latest."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 
@@ -45,5 +47,5 @@ def _of_half(half: Half | None) -> dict[str, str]:
         "lines rejected": str(half.rejected),
     }
     if half.unknown_words:
-        own["lines unknown"] = "; ".join(half.unknown_words)
+        own["lines unknown"] = "; ".join(list(half.unknown_words)[-SHOWN:])
     return own

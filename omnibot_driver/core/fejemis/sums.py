@@ -11,12 +11,13 @@ import re
 from typing import Final
 
 MODULUS: Final = 99
+_CONTROL: Final = bytes(range(0x20))
 _SUMMED: Final = re.compile(rb";([0-9]{2})(.*)", re.DOTALL).fullmatch
 
 
 def sum_of(text: bytes) -> int:
     """1..99, of the characters after the prefix."""
-    return sum(code for code in text if code >= 0x20) % MODULUS + 1
+    return sum(text.translate(None, _CONTROL)) % MODULUS + 1
 
 
 def with_sum(text: bytes) -> bytes:

@@ -233,3 +233,14 @@ def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
     assert bench.robot.truth.speed_mps == pytest.approx(0.3, abs=0.01)
     assert bench.board.figures.faults == 0
     assert not bench.notices
+
+
+def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
+    """Both lines are silent for 0.1 s, and a command comes."""
+    bench = nominal()
+    bench.speaks = set()
+    bench.run(0.1)
+    mark = bench.now
+    with pytest.raises(CommandRefused, match="angle"):
+        bench.drive()
+    assert not [text for text in bench.lines(DRIVE, mark) if text.startswith("rc 2 .")]
