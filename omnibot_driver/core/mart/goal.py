@@ -23,6 +23,10 @@ ENOUGH_MOVES, ENOUGH_M = 4, 0.08
 STRETCH: Final = 1.3
 """Of straight moves, at first: 12 inches were seen to be 15.8."""
 MOST_SURPLUS_DEG: Final = 10.0
+WORTH_DEG: Final = 1.0
+"""A turn that leaves the robot nearer by less is not made."""
+WIDER: Final = 0.5
+"""Part by which each turn in a row widens what is near enough: small turns go beyond."""
 MOST_MOVES: Final = 9
 """A goal that is not reached by then is left as it is."""
 
@@ -93,9 +97,12 @@ class Surplus:
         self._degrees[slow] = min(MOST_SURPLUS_DEG, max(0.0, before + (beyond - before) / 2))
 
     def degrees(self, wanted: float, *, slow: bool) -> int:
-        """What to ask for, to turn this many degrees; 0 for less than can be turned."""
+        """What to ask for, to turn this many degrees; 0 where a turn would leave the robot no
+        nearer, as the least that can be turned is too much.
+        """
         surplus = self._degrees[slow]
-        return max(1, round(wanted - surplus)) if wanted > surplus / 2 else 0
+        asked = max(1, round(wanted - surplus))
+        return asked if abs(asked + surplus - wanted) < wanted - WORTH_DEG else 0
 
     def inches(self, way_m: float) -> tuple[int, bool]:
         """What to ask for, to drive so far, and whether slowly."""
@@ -105,11 +112,19 @@ class Surplus:
 
 @dataclass(slots=True)
 class Move:
-    """The way to one goal. ``said``: moves so far; ``given_up``: it is over, or a move failed."""
+    """The way to one goal. ``said``: moves so far; ``turns``: in a row, of these the last;
+    ``given_up``: it is over, or a move failed.
+    """
 
     place: Pose
     said: int = 0
+    turns: int = 0
     given_up: bool = False
+
+    def begin(self, request: Request) -> None:
+        """This move goes out."""
+        self.said += 1
+        self.turns = 0 if request.word in (TF, TB) else self.turns + 1
 
 
 def next_move(move: Move, pose: Pose, settings: MartSettings, surplus: Surplus) -> Request | None:
@@ -117,13 +132,14 @@ def next_move(move: Move, pose: Pose, settings: MartSettings, surplus: Surplus) 
     if move.given_up or move.said >= MOST_MOVES:
         return None
     way = pose.way_to(move.place)
+    near_rad = NEAR_RAD * (1.0 + WIDER * move.turns)
     if way.way_m <= (NEAR_M if move.said < ENOUGH_MOVES else ENOUGH_M):
-        return _turn(way.yaw_rad, NEAR_RAD, surplus)
+        return _turn(way.yaw_rad, near_rad, surplus)
     bearing_rad = math.atan2(way.y_m, way.x_m)
     backward = settings.allow_reverse_goals and abs(bearing_rad) > math.pi / 2
     if backward:
         bearing_rad = math.remainder(bearing_rad - math.pi, math.tau)
-    if turn := _turn(bearing_rad, max(NEAR_RAD, math.atan2(NEAR_M / 2, way.way_m)), surplus):
+    if turn := _turn(bearing_rad, max(near_rad, math.atan2(NEAR_M / 2, way.way_m)), surplus):
         return turn
     word = TB if backward else TF
     inches, slow = surplus.inches(way.way_m)

@@ -26,7 +26,7 @@ class Moves(Stops):
             return None
         if request.word in NEEDS_IMU and not self.imu.fresh(now):
             return request
-        self._move.said += 1
+        self._move.begin(request)
         return request
 
     def _moved(self, reply: Ok | Fail, now: float) -> None:
