@@ -84,7 +84,8 @@ class MartBoard(Board):
                 if pilot.health.volts is None
                 else f"{pilot.health.volts:.2f}",
                 "Late replies": str(pilot.conversation.discarded),
-                "Job": "none" if pilot.jobs.job is None else pilot.jobs.job.value,
+                "Job": pilot.jobs.progress(pilot.now_s),
+                "Goal": pilot.goal_progress,
             },
             trouble=pilot.refusal,
         )

@@ -55,6 +55,7 @@ class Ground:
         self._polls = Polls()
         self.readings: list[Reading] = []
         self.lost = 0
+        self.now_s = 0.0
         self.connect()
 
     @property
@@ -94,6 +95,7 @@ class Ground:
         self._custom_s = -math.inf
         self._custom_refused = False
         self._blocked: Motion = Motion.NONE
+        self._obstacle_told = False
         self._stray_s = self._swept_s = -math.inf
         self._negative_sweep = self._rescue = False
         self._rested_s = -math.inf

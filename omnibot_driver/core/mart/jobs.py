@@ -86,6 +86,18 @@ class Jobs:
         """When ``tick`` has something to do."""
         return min(self._until_s, self._piece_s)
 
+    def progress(self, now: float) -> str:
+        """What is done, and how far it is."""
+        if self.job is None:
+            return "none"
+        limit_s = WITHIN_S.get(self.job, USUAL_S)
+        since = (
+            f"{self.job.value}: {now - self._until_s + limit_s:.0f} s of at most {limit_s:.0f} s"
+        )
+        if not self.collecting:
+            return since
+        return f"{since}, {sum(map(len, self._pieces))} of {self._size} bytes"
+
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin. Raises RequestRefused."""
         if self.job is not None:

@@ -5,6 +5,8 @@
 Knows goals and moves; not when they may be said. Time is an argument.
 """
 
+import math
+
 from omnibot_driver.core.commands.orders import GoTo
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.goal import Done, Move, next_move
@@ -16,6 +18,17 @@ from omnibot_driver.core.mart.words import Request
 
 class Moves(Stops):
     """The part of the pilot that leads to a goal."""
+
+    @property
+    def goal_progress(self) -> str:
+        """How far it is to the goal, and by which move."""
+        move = self._move
+        if move is None:
+            return "none"
+        way = self.odometry.pose.way_to(move.place)
+        turn_deg = math.degrees(math.remainder(way.yaw_rad, math.tau))
+        left = f"{way.way_m:.2f} m and {turn_deg:.0f}° away"
+        return f"over, {left}" if move.given_up else f"move {move.said}, {left}"
 
     def _next_goal_move(self, order: GoTo, now: float) -> Request | None:
         if self._move is None:

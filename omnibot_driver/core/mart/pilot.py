@@ -88,6 +88,7 @@ class Pilot(Starts):
 
     def due(self, now: float) -> Packets:
         """What to send now."""
+        self.now_s = now
         packets = self._due(now)
         self._next_s = self._wake(now)
         return packets

@@ -222,6 +222,7 @@ class Starts(Moves):
             return
         if self.motion is Motion.REFERENCE:
             self.health.reference_fails = 0
+            self._obstacle_told = False
         self.health.heading_changes = 0
         self.state = WHILE[self.motion]
         self._begun_s = now
@@ -237,13 +238,24 @@ class Starts(Moves):
         if reply.reason == words.CONFLICT:
             self.motion = Motion.UNKNOWN
             why = "another motion is in progress"
+        elif word is words.RM and self._is_of_another(reply, now):
+            why = "no reason of its own is known"
+            self.health.reference_fails += reply.reason == ""
         else:
             why = self._obstacle(reply, self.motion)
-        if word is words.RM and reply.reason == "":
-            self.health.reference_fails += 1
         if word in (words.R, words.L) and reply.reason == words.UNSUPPORTED:
             self._custom_refused = True
         self._halt(now, f"{word.text} failed ({reply.reason or 'no reason given'}): {why}")
+
+    def _is_of_another(self, reply: Fail, now: float) -> bool:
+        """Some servers give the reason of the last B, whatever RM failed for: an obstacle is only
+        believed where the front sonar sees one, or RM has failed by it twice in a row.
+        """
+        if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
+            self._obstacle_told = False
+            return reply.reason not in words.OBSTACLES
+        told, self._obstacle_told = self._obstacle_told, True
+        return not told
 
     def _job(self, now: float) -> Packets:
         request = self.jobs.next(now, stands=self.proof.proved)

@@ -3,6 +3,7 @@
 """The driver's half against the simulated controller: what is commanded is driven, and stopped."""
 
 import math
+import re
 from statistics import mean
 from typing import Final
 
@@ -10,6 +11,7 @@ import pytest
 from mart_bench import MartBench, steer_along
 
 from omnibot_driver.core.mart import MartSettings, State
+from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.readings import BatteryReading, DockedReading, SonarReading
 from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware, Kind
@@ -256,6 +258,38 @@ def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
     assert any("RM failed" in notice for notice in bench.notices)
     assert bench.board.refusal == ""
     assert not bench.robot.stands
+
+
+def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
+    """The server gives the reason of the last B; the front sonar sees nothing."""
+    bench = MartBench("source").ready()
+    bench.server.motions[Kind.LINEAR].error = "insufficent clearence"
+    bench.server.motions[Kind.REFERENCE].samples = 58
+    bench.command(0.3, 0.0, 4.0)
+    assert any("RM failed (insufficent clearence)" in notice for notice in bench.notices)
+    assert not any("obstacle in front" in notice for notice in bench.notices)
+    assert not bench.robot.stands
+
+
+def test_a_goal_and_a_job_show_how_far_they_are() -> None:
+    """In /diagnostics."""
+    bench = MartBench().ready()
+    shown = set()
+    bench.go_to(0.6, 0.4, 0.0)
+    for _ in range(60):
+        bench.run(0.2)
+        shown.add(bench.board.figures.own["Goal"].split(",")[0])
+    assert {"move 1", "move 2", "over"} <= shown
+    bench.go_to(1.5, 0.4, 0.0)
+    bench.run(3.0)
+    bench.estop(True)
+    bench.run(2.0)
+    assert bench.board.figures.own["Goal"] == "none"
+    bench.estop(False)
+    bench.run(1.0)
+    bench.board.ask(Job.DOCK, "token", bench.now, "DOCK", 20)
+    bench.run(2.0)
+    assert re.fullmatch(r"docking: [23] s of at most 90 s", bench.board.figures.own["Job"])
 
 
 def test_a_dead_imu_is_told_when_a_command_comes() -> None:
