@@ -13,6 +13,7 @@ from typing import Final
 
 from omnibot_driver.core.lois_ecu.board_odometry import Told
 from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
+from omnibot_driver.core.lois_ecu.resting import RestingWheel
 from omnibot_driver.core.lois_ecu.wheel_motion import (
     ALONG,
     BIAS,
@@ -23,6 +24,8 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
     SPEED,
     TURN,
     WINDUP_M,
+    X,
+    Y,
 )
 
 TICKS_AGE_S: Final = 0.005
@@ -47,6 +50,22 @@ FASTER_RPM: Final = 2.5
 LONGEST_PAUSE_S: Final = 0.5
 LONGEST_LAG_S: Final = 0.3
 SPEED_PART: Final = 0.04
+JUMP_RPM: Final = 8.0
+JUMP_RPM_PER_S: Final = 200.0
+"""No wheel changes its speed by more: a tick waited while the board sent something else."""
+BLIND_M: Final = 0.012
+SWINGING_M: Final = 0.035
+"""After 1 m without ticks: what is not known of a wheel's way, besides all else; at speeds that
+swing the board tells too few of them."""
+SWERVED_M: Final = 0.025
+"""After 1 m at such speeds: what is not known of the place although the ways are."""
+COASTED_TICKS: Final = 1.0
+"""A wheel that comes to rest has rolled so much less since its last tick than at that speed."""
+EQUAL_RPM: Final = 3.0
+"""Standard deviation of the true difference of two speeds of which the board tells the same."""
+SWINGS_RPM: Final = 4.0
+SWINGS_PART: Final = 0.4
+"""Of a change of speed that was not expected: how much of its time it may have lasted."""
 UNSEEN_PART: Final = 0.6
 """A wheel of which no tick was seen has wound up by this part at the most."""
 
@@ -60,6 +79,10 @@ class Comparison:
         self._turned_m = 0.0
         self._told = [0.0, 0.0]
         self._repeats = [0, 0]
+        self._jumped = [False, False]
+        self._resting = RestingWheel(), RestingWheel()
+        self._changed_at_m = [0.0, 0.0]
+        """Way of each wheel when the speed that is told changed last."""
 
     # Ticks
 
@@ -108,6 +131,14 @@ class Comparison:
         """Since the group before, ``duration_s`` ago."""
         motion = self._motion
         shown = motion.shown_mps(0), motion.shown_mps(1)
+        for index, wheel in enumerate(motion.wheels):
+            if wheel.blind and motion.holds:
+                rolled_m = abs(motion.speed_mps(index)) * duration_s
+                swings = wheel.rests or self._resting[index].swings
+                part = SWINGING_M if swings else BLIND_M
+                motion.shift(index, 0.0, part * math.sqrt(min(rolled_m, 1.0)))
+                for state in (X, Y) if swings else ():
+                    motion.filter.disturb([(state, 1.0)], SWERVED_M**2 * min(rolled_m, 1.0))
         if told.still and told.same_velocity:
             moved = any(told.speeds_mps or ())
             if moved or max(map(abs, shown)) < CREEPING_RPM * motion.rpm_mps:
@@ -122,9 +153,23 @@ class Comparison:
             return
         left, right = (wheel.course.measured_sign for wheel in motion.wheels)
         differ = abs(shown[1] - shown[0]) > DIFFERING_RPM * motion.rpm_mps
-        if any(told.speeds_mps) or left * right <= 0 or differ:  # else any two equal speeds
+        if any(told.speeds_mps) or left * right <= 0 or (differ and told.still):
             for index, speed in enumerate(told.speeds_mps):
                 self._speed(index, speed, duration_s)
+        else:
+            self._equal(duration_s)
+
+    def _equal(self, duration_s: float) -> None:
+        """Both speeds are the same, whatever they are."""
+        motion = self._motion
+        sure = not any(wheel.rests or wheel.locked or wheel.rolls_on for wheel in motion.wheels)
+        if sure and not any(resting.chance for resting in self._resting):
+            terms = [(SPEED, 1.0), (PER_WHEEL + SPEED, -1.0)]
+            residual = motion.speed_mps(1) - motion.speed_mps(0)
+            motion.filter.measure(terms, residual, (EQUAL_RPM * motion.rpm_mps) ** 2)
+        for index, resting in enumerate(self._resting):
+            if not motion.wheels[index].rests:
+                resting.note(abs(motion.speed_mps(index)) / motion.rpm_mps, duration_s)
 
     def _no_tick(self, duration_s: float, ticks: float) -> None:
         """Neither wheel has rolled further than this."""
@@ -175,11 +220,21 @@ class Comparison:
         wheel, base = motion.wheels[index], PER_WHEEL * index
         rpm_mps, tick_m = motion.rpm_mps, motion.tick_m
         sign = wheel.course.measured_sign
-        before, self._told[index] = self._told[index], speed_mps
         if not sign or speed_mps * sign < 0:
+            self._told[index] = speed_mps
             return
+        change_rpm = abs(speed_mps - self._told[index]) / rpm_mps
+        jumps = change_rpm > JUMP_RPM + JUMP_RPM_PER_S * duration_s
+        self._jumped[index] = jumps and not self._jumped[index]
+        if self._jumped[index]:
+            return
+        before, self._told[index] = self._told[index], speed_mps
         repeated = abs(speed_mps - before) < 0.1 * rpm_mps
         self._repeats[index] = self._repeats[index] + 1 if repeated else 0
+        if motion.holds and wheel.course.kind == "rpm" and wheel.blind and speed_mps:
+            self._rest(index, abs(speed_mps), duration_s, repeated=repeated)
+            if wheel.rests:
+                return
         expected = motion.speed_mps(index)
         ticked = not repeated or abs(expected) * duration_s > 3.0 * tick_m
         if not expected and motion.holds:
@@ -194,10 +249,35 @@ class Comparison:
         shown = abs(speed_mps) + (motion.rounded_mps(index) if speed_mps else 0.5 * rpm_mps)
         fast = shown > FASTER_RPM * rpm_mps and wheel.course.kind == "rpm"
         if ticked and fast and not wheel.rolls_on:
-            self._rolls_at(index, math.copysign(shown, expected or float(sign)))
+            self._rolls_at(index, math.copysign(shown, sign), duration_s)
         estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
 
-    def _rolls_at(self, index: int, speed_mps: float) -> None:
+    def _rest(self, index: int, told_mps: float, duration_s: float, *, repeated: bool) -> None:
+        """Whether this wheel stands by now, or rolls again."""
+        motion, resting = self._motion, self._resting[index]
+        wheel, tick_m, speed = motion.wheels[index], motion.tick_m, motion.speed_mps(index)
+        sign = math.copysign(1.0, wheel.course.target_mps)
+        resting.tell(told_mps / motion.rpm_mps, duration_s)
+        if not repeated:
+            if wheel.rests:
+                wheel.rests = False
+                motion.shift(index, sign * tick_m, 2 * tick_m)
+                spread = 2 * motion.rpm_mps + told_mps / 2
+                motion.filter.forget(wheel.base + SPEED, sign * told_mps, spread**2)
+            self._changed_at_m[index] = motion.way_m(index)
+        elif resting.chance == 1.0 and not wheel.rests:
+            wheel.rests = True
+            rolled_m = motion.way_m(index) - self._changed_at_m[index]
+            too_far_m = rolled_m + sign * COASTED_TICKS * tick_m
+            motion.shift(index, -too_far_m, 2 * tick_m + abs(too_far_m) / 4)
+            for state in (X, Y):  # it may have pointed elsewhere then
+                motion.filter.disturb([(state, 1.0)], (too_far_m / 4) ** 2)
+            motion.filter.forget(wheel.base + SPEED, 0.0, 0.0)
+            motion.filter.forget(wheel.base + PUSH, 0.0, 0.0)
+        elif not wheel.rests and resting.chance:
+            motion.doubt(index, resting.chance * abs(speed) * duration_s)
+
+    def _rolls_at(self, index: int, speed_mps: float, duration_s: float) -> None:
         """On average over the last tick."""
         motion, estimate, base = self._motion, self._motion.filter, PER_WHEEL * index
         push = estimate.mean[base + PUSH]
@@ -210,6 +290,9 @@ class Comparison:
         residual = speed_mps - (motion.speed_mps(index) - push * lag_s)
         variance = motion.rpm_mps**2 / 8 + (SPEED_PART * speed_mps) ** 2 + (push * lag_s) ** 2 / 4
         variance *= 1 + self._repeats[index] ** 2
+        wheel = motion.wheels[index]
+        if wheel.blind and abs(residual) > SWINGS_RPM * motion.rpm_mps:
+            motion.doubt(index, SWINGS_PART * abs(residual) * min(duration_s, LONGEST_PAUSE_S))
         if residual**2 > DOUBT**2 * (estimate.variance_of(terms) + variance):
             estimate.disturb([(base + SPEED, 1.0)], (residual / 2) ** 2)
         estimate.measure(terms, residual, variance)

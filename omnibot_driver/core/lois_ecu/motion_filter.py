@@ -114,6 +114,13 @@ class MotionFilter:
             self._step(end_s - at_s)
             at_s = end_s
 
+    def shift(self, index: int, way_m: float, stddev_m: float) -> None:
+        """This wheel rolled so much further than believed."""
+        terms = self._way_terms(index)
+        for state, factor in terms:
+            self.filter.mean[state] += factor * way_m
+        self.filter.disturb(terms, stddev_m**2)
+
     def doubt(self, index: int, stddev_m: float) -> None:
         """The way of this wheel may be off by this, and all that follows from it."""
         wheel, base = self.wheels[index], PER_WHEEL * index

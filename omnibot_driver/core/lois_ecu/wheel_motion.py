@@ -77,11 +77,14 @@ class Wheel:
         self.rolls_on_s = 0.0
         self.locked = False
         """It stands, and the speed that it keeps is more than its target: it gets no power."""
+        self.rests = False
+        """It stands, as the speed that it keeps shows."""
         self.blind = False
 
     def begin_anew(self, speed_mps: float) -> None:
         """The controller was set back while the wheel had this speed."""
         self.cut, self.wound_m = True, 0.0
+        self.rests = False
         if abs(speed_mps) > STANDS_MPS:
             self.rolls_on, self.rolls_on_s = True, ROLLS_ON_S
 
@@ -144,7 +147,7 @@ class Wheel:
         seen, factor = (self.base + HELD, sign) if holds else (v, 1.0)
         lacking = sign * target_mps - sign * factor * new[seen]
         self.locked = holds and not new[v] and lacking + 2 * step.unsure_mps[self.base] <= 0.0
-        if self.locked:
+        if self.locked or self.rests:
             new[push] = 0.0
             step.rows[push], step.rows[v] = [(push, 0.0)], [(v, 0.0)]
             return

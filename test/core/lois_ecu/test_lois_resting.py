@@ -1,0 +1,55 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Whether a wheel stands of which the public firmware tells the same speed again and again."""
+
+import pytest
+
+from omnibot_driver.core.lois_ecu.resting import RestingWheel
+
+GROUP_S = 0.1
+
+
+def told(*speeds_rpm: float) -> RestingWheel:
+    """One after the other."""
+    wheel = RestingWheel()
+    for rpm in speeds_rpm:
+        wheel.tell(rpm, GROUP_S)
+    return wheel
+
+
+def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands() -> None:
+    """As with the gains of the boot: 31 RPM, 12 RPM, and no tick any more."""
+    assert told(31, 28, 19, 12).chance == 0.0
+    assert 0.0 < told(31, 28, 19, 12, 12).chance < 1.0
+    assert told(31, 28, 19, 12, 12, 12).chance == 1.0
+
+
+def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
+    """However often it is repeated."""
+    assert told(19, 20, *[20] * 50).chance == 0.0
+
+
+def test_one_tick_that_came_late_is_no_fall() -> None:
+    """The tick after it seems to be early, and is told as a high speed, once."""
+    assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
+
+
+@pytest.mark.parametrize("rpm", [1, 3, 25, 40])
+def test_a_wheel_that_starts_and_a_fast_one_do_not_rest(rpm: float) -> None:
+    """The last speed before a rest is neither so low nor so high."""
+    assert told(60, 58, 55, rpm, rpm, rpm, rpm).chance == 0.0
+
+
+def test_another_speed_ends_the_rest() -> None:
+    """Whatever it is."""
+    assert told(31, 28, 12, 12, 12, 2).chance == 0.0
+
+
+def test_a_fall_that_was_not_told_is_seen() -> None:
+    """While both wheels have the same speed the board tells none."""
+    wheel = told(12)
+    for rpm in (30.0, 28.0):
+        wheel.note(rpm, GROUP_S)
+    for _ in range(3):
+        wheel.tell(14, GROUP_S)
+    assert wheel.chance == 1.0
