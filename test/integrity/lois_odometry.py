@@ -2,8 +2,9 @@
 
 """How honest the odometry of a LOIS ECU is: errors and NEES of many simulated drives.
 
-``python test/integrity/lois_odometry.py --drives 50 --seed 1000`` prints a table; ``--nominal``:
-with wheels of the right size. Seeds below 100 were used to choose constants: judge by others.
+``python test/integrity/lois_odometry.py --drives 50 --seed 5000`` prints a table; ``--nominal``:
+with wheels of the right size; ``--gains boot``: those that the board begins with. Seeds below 4000
+were used to choose constants: judge by others.
 """
 
 import argparse
@@ -14,8 +15,9 @@ from statistics import mean
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "core" / "lois_ecu"))
 
-from lois_drives import MOTIONS, motion, nominal, wrong
+from lois_drives import HOST_GAINS, MOTIONS, VARIED, motion, nominal, wrong
 
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import QUIRKS
 
 
@@ -25,16 +27,20 @@ def main() -> None:
     parser.add_argument("--drives", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1000)
     parser.add_argument("--firmware", choices=tuple(QUIRKS), action="append")
-    parser.add_argument("--motion", choices=MOTIONS, action="append")
+    parser.add_argument("--motion", choices=MOTIONS + VARIED, action="append")
+    parser.add_argument("--gains", choices=("host", "boot"), default="host")
     parser.add_argument("--nominal", action="store_true")
     wanted = parser.parse_args()
+    ours = HOST_GAINS if wanted.gains == "host" else LoisEcuSettings()
     robot = nominal if wanted.nominal else wrong
     seeds = range(wanted.seed, wanted.seed + wanted.drives)
-    print("| Firmware | Motion | Way, turn | Off by, mean (greatest) | Heading off by | NEES |")
-    print("|---|---|---|---|---|---|")
+    print(
+        "| Firmware | Motion | Way, turn | Off by, mean (greatest) | Heading | NEES | Beyond 3 σ |"
+    )
+    print("|---|---|---|---|---|---|---|")
     for firmware in wanted.firmware or QUIRKS:
-        for name in wanted.motion or MOTIONS:
-            drives = [motion(robot(firmware, seed), name) for seed in seeds]
+        for name in wanted.motion or VARIED:
+            drives = [motion(robot(firmware, seed), name, ours) for seed in seeds]
             off = [math.hypot(one.error.x_m, one.error.y_m) for one in drives]
             turned = [abs(math.degrees(one.error.yaw_rad)) for one in drives]
             nees = [one.nees for one in drives]
@@ -42,7 +48,8 @@ def main() -> None:
                 f"| {firmware} | {name} | {mean(one.way_m for one in drives):.1f} m,"
                 f" {math.degrees(mean(one.turned_rad for one in drives)):.0f}° |"
                 f" {mean(off):.3f} m ({max(off):.3f}) | {mean(turned):.1f}° ({max(turned):.1f}) |"
-                f" {mean(nees):.1f} (greatest {max(nees):.0f}) |",
+                f" {mean(nees):.1f} (greatest {max(nees):.0f}) |"
+                f" {sum(one.sigmas > 3 for one in drives)} |",
                 flush=True,
             )
 

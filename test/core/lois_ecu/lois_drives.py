@@ -56,6 +56,34 @@ MOTIONS = ("straight", "curve", "in place", "reverse", "reverse curve", "jerky",
 """Of the campaign; the last two are squares."""
 
 
+VARIED = (
+    "straight ahead",
+    "curve left",
+    "curve right",
+    "place left",
+    "place right",
+    "straight back",
+    "curve back",
+)
+"""Of the campaign: 5 m or 80° to 400°, at a speed that the seed gives."""
+
+
+def varied(name: str, seed: int) -> Program:
+    """One of ``VARIED``."""
+    random = Random(f"varied {name} {seed}")
+    if name.startswith("place"):
+        rpm, angle_rad = random.uniform(7, 20), math.radians(random.uniform(80, 400))
+        sign = 1 if name == "place left" else -1
+        return [(angle_rad * 0.235 / 0.0136 / rpm, (-sign * rpm, sign * rpm))]
+    rpm = random.uniform(10, 35)
+    half = rpm * random.uniform(0.025, 0.175) * (1 if "left" in name else -1)
+    if name.startswith("straight"):
+        half = 0.0
+    if name.endswith("back"):
+        rpm, half = -rpm, half * random.choice((-1, 1))
+    return [(5.0 / 0.0136 / abs(rpm), (rpm - half, rpm + half))]
+
+
 def jerky(seed: int, seconds: float = 20.0) -> Program:
     """Other set-points of either sign several times a second."""
     random, program, left_s = Random(f"jerky {seed}"), [], seconds
@@ -220,9 +248,11 @@ class Rig:
         self.run(REPEAT_S)
 
 
-def motion(settings: LoisSettings, name: str, *, side_m: float = 5.0) -> Drive:
-    """One of ``MOTIONS``, with encoders that begin anywhere between two ticks."""
-    rig = Rig(settings)
+def motion(
+    settings: LoisSettings, name: str, ours: LoisEcuSettings | None = None, *, side_m: float = 5.0
+) -> Drive:
+    """One of ``MOTIONS`` or ``VARIED``, with encoders that begin anywhere between two ticks."""
+    rig = Rig(settings, ours)
     random = Random(f"encoders {settings.seed}")
     for encoder in rig.board._vehicle.encoders:
         encoder._periods = random.random()
@@ -231,6 +261,8 @@ def motion(settings: LoisSettings, name: str, *, side_m: float = 5.0) -> Drive:
         rig.square(side_m, 1 if name == "left" else -1)
         rig.order(*STOP, 2.0)
         return rig.outcome()
+    if name in VARIED:
+        return rig.drive(varied(name, settings.seed))
     return rig.drive(jerky(settings.seed) if name == "jerky" else CLASSES[name])
 
 
