@@ -29,11 +29,12 @@ def assert_stands_for_good(bench: AnyBench) -> None:
 
 
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
-    """0.3 m/s for four seconds."""
+    """0.3 m/s for four seconds, less what a controller takes until the wheels have that speed."""
     bench.drive_on(0.3, 4.0)
     bench.run(3.0)
     assert bench.robot.stands
-    assert bench.robot.way_m == pytest.approx(1.2, rel=0.25)
+    late_s = getattr(bench.robot, "late_s", 0.0)
+    assert bench.robot.way_m == pytest.approx(0.3 * (4.0 - late_s), rel=0.2)
     assert bench.odometry[-1].pose.x_m == pytest.approx(bench.robot.way_m, abs=0.02)
 
 

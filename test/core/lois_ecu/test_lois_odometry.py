@@ -41,9 +41,9 @@ def off_m(one: Drive) -> float:
 
 
 @cache
-def driven(firmware: Firmware, name: str) -> Drive:
+def driven(firmware: Firmware, name: str, seed: int = 1) -> Drive:
     """With wheels of the right size."""
-    return drive(nominal(firmware, 1), CLASSES[name])
+    return drive(nominal(firmware, seed), CLASSES[name])
 
 
 @BOTH
@@ -65,18 +65,25 @@ def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> Non
 
 
 @BOTH
-def test_backward_its_way_is_within_3_percent_and_its_place_within_3_sigma(
-    firmware: Firmware,
-) -> None:
-    """The public firmware counts nothing, and its position stands at equal speeds: the heading
-    drifts. Of eight such drives the place is off by 5 % of the way on average; this is the worst.
-    """
-    one = driven(firmware, "reverse")
-    assert one.way_m > 5.0
-    way_m, true_m = (math.hypot(place.x_m, place.y_m) for place in (one.last.pose, one.true))
-    assert way_m == pytest.approx(true_m, rel=0.03)
-    assert off_m(one) < (0.02 if firmware == "documented" else 0.15) * one.way_m
-    assert one.sigmas < 3.0
+def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
+    """The public firmware counts nothing, and tells whole RPM: the heading drifts. Eight drives are
+    off by 4.9 % on average; the first of these three is the worst of them, with 13 %."""
+    drives = [driven(firmware, "reverse", seed) for seed in (1, 2, 3)]
+    for one in drives:
+        assert one.way_m > 5.0
+        way_m, true_m = (math.hypot(place.x_m, place.y_m) for place in (one.last.pose, one.true))
+        assert way_m == pytest.approx(true_m, rel=0.03)
+        assert one.sigmas < 3.0
+    part = 0.02 if firmware == "documented" else 0.1
+    assert mean(off_m(one) / one.way_m for one in drives) < part
+
+
+@pytest.mark.parametrize("name", ["place right", "straight back", "curve back"])
+def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
+    """With them the public firmware's right wheel swings and rests, and keeps its last speed."""
+    one = motion(wrong("firmware", 1000), name, LoisEcuSettings())
+    assert one.nees < 21.1
+    assert one.sigmas < 3.5
 
 
 @BOTH
