@@ -33,7 +33,7 @@ TIMES = 20
 PACE_S = 0.05
 
 GONE = (errno.EBADF, errno.EIO, errno.ENODEV, errno.ENXIO, errno.EPIPE)
-"""Errors of a line that takes nothing any more."""
+"""Errors of a line that no longer accepts data."""
 
 DRIVER = 0
 

@@ -167,7 +167,7 @@ def test_the_core_takes_a_board_that_lacks_most_parameters() -> None:
 def test_a_parameter_of_another_board_is_refused_by_that_boards_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """And an unknown one with the nearest of this board."""
+    """An unknown one is refused with the nearest of this board."""
     other = SimpleNamespace(PARAMETERS=table("few", FEW, own={"Docking": (OWN,)}))
     monkeypatch.setitem(boards.PROFILES, "few", "few_profile")
     monkeypatch.setitem(sys.modules, "few_profile", other)

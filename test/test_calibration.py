@@ -24,7 +24,7 @@ def test_what_is_saved_is_loaded_exactly(tmp_path: Path, bias: list[float]) -> N
 
 
 def test_no_file_yet_is_no_calibration(tmp_path: Path) -> None:
-    """Nor is an empty one; the folder comes with the file."""
+    """An empty one is none either; the folder is created with the file."""
     path = tmp_path / "new" / "robot.yaml"
     assert calibration.load(path, PARAMETERS) == {}
     calibration.save(path, {"gyro_bias": BIAS})

@@ -136,7 +136,7 @@ def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None
 
 
 def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line: Line) -> None:
-    """And it goes on guarding: the next time as well."""
+    """It goes on guarding: it stops the robot the next time as well."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     longest_s = alive(keeper, 2 * guard.LIMIT_S)
     os.write(line.near, b"so far: ")
@@ -214,7 +214,7 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
-    """And the new one guards."""
+    """The new one guards."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGKILL)

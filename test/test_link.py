@@ -113,7 +113,7 @@ def test_closing_writes_stop_and_ends_the_threads(board: PtyBoard) -> None:
 
 
 def test_every_read_and_every_write_can_be_listened_to(board: PtyBoard) -> None:
-    """Byte for byte as they were, the opening and the farewell included."""
+    """Byte for byte as they were, the opening and the final Stop included."""
     read, written = [], []
     listener, ours = Listener(), session()
     link = link_to(
@@ -153,7 +153,7 @@ def test_an_estop_is_written_before_the_call_returns(
 
 
 def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
-    """And the link goes on."""
+    """The link goes on."""
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()

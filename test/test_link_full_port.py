@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A link whose port takes nothing any more: Stop comes first when it does again."""
+"""A link whose port no longer accepts data: Stop is written first when it does again."""
 
 import os
 import threading
@@ -75,7 +75,7 @@ def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: T
 
 
 def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: Terminal) -> None:
-    """The driver's own farewell finds no room; somebody has to say it."""
+    """The driver's own final Stop finds no room; the guard has to send it."""
     link, ours = at_rest(terminal)
     terminal.fill()
     closed, farewell_over = ours.closed, threading.Event()

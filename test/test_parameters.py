@@ -106,7 +106,7 @@ def test_tuning_may_change_while_it_runs(name: str) -> None:
 
 
 def test_what_is_not_given_is_the_default() -> None:
-    """And what is given is taken."""
+    """A given value is used."""
     assert check_all({}) == {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     values = check_all({"max_linear_speed": 1, "port": "/dev/ttyACM3"})
     assert values["max_linear_speed"] == 1.0

@@ -2,7 +2,7 @@
 
 """Several lines of bytes as one transport: the channels of each follow those of the one before it.
 
-A line that is missing or takes nothing keeps none of the others from being read or written. It is
+A line that is missing or blocked keeps none of the others from being read or written. It is
 opened again by itself, while the others stay open. Each time that the lines that are there have
 changed, ``read`` says so.
 """
@@ -177,7 +177,8 @@ class Several:
             self._changed = True
 
     def _write_what_waits(self, now: float) -> None:
-        """And see where there is room again; a line that has none for too long is missing."""
+        """Write, and see where there is room again; a line that has none for too long is
+        missing."""
         with self._writing:
             for line in self._lines:
                 if line.descriptor is None or not (line.waits or line.watched):

@@ -31,7 +31,7 @@ from omnibot_driver.core.readings import PoseReading
 
 @given(st.lists(small_moves, min_size=1, max_size=5), headings)
 def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: float) -> None:
-    """And come out with it, turned as if it had come before them."""
+    """They come out with it, turned as if it had come before them."""
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     for move in moves:
         assert odometry.displace(trip.move(*xyyaw(move)), 0.0) == []

@@ -39,7 +39,7 @@ def test_a_silence_is_found_once(liveness: Liveness) -> None:
 
 
 def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
-    """And is counted from that reading on."""
+    """It is counted from that reading on."""
     assert liveness.fell_silent(12.0)
     liveness.heard_at = 20.0
     assert not liveness.fell_silent(21.9)

@@ -71,7 +71,7 @@ def test_garbage_is_not_an_understood_board() -> None:
 
 
 def test_a_silent_board_is_told_once() -> None:
-    """And again only after it has been heard meanwhile."""
+    """It is reported again only after data in between."""
     bench = Bench()
     bench.speaks = False
     bench.open()

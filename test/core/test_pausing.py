@@ -137,7 +137,7 @@ def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None
 
 
 def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
-    """And a fresh command moves it again."""
+    """A fresh command moves it again."""
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
     bench.hears = True

@@ -120,7 +120,7 @@ def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
 
 
 def while_full(end: Callable[[Rig], object], rig: Rig) -> None:
-    """The port takes nothing until the driver has gone."""
+    """The port accepts no data until the driver has ended."""
     with rig.terminal.full(rig.kind.old_command):
         end(rig)
         rig.driver.process.wait()
@@ -151,7 +151,7 @@ ENDINGS: Final[dict[str, Ending]] = {
         lambda rig: (by_topic(rig), rig.wait_ticks(20), by_signals(signal.SIGINT)(rig)),
         before=IN_A_CALLBACK.format("time.sleep(60.0)"),
     ),
-    "a farewell that hangs, and ctrl-C": Ending(
+    "a final Stop that hangs, and ctrl-C": Ending(
         by_signals(signal.SIGINT), (1,), HANGS, allowed_s=0.5, late_s=4.0
     ),
     "an exception in the reader": Ending(by_topic, (1,), before=IN_THE_READER),

@@ -32,7 +32,7 @@ DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)
 
 
 class Terminal(PtyBoard):
-    """``deaf``: the adapter takes nothing off the kernel's buffer; it goes on sending."""
+    """``deaf``: the adapter reads nothing from the kernel's buffer; it keeps sending."""
 
     deaf = False
 

@@ -78,7 +78,7 @@ def estop_into_a_full_port(rig: Rig) -> None:
 
 
 TERMINAL: Final[dict[str, Callable[[Rig], None]]] = {
-    "an adapter that takes nothing for 3 s": partial(stuck, 2.0),
+    "an adapter that accepts no data for 3 s": partial(stuck, 2.0),
     "an adapter that takes and sends nothing for 3 s": partial(stuck, 2.0, mute=True),
     "the kernel's buffer is full": full,
     "the kernel's buffer is full, and the board silent": partial(full, mute=True),

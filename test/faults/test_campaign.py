@@ -13,7 +13,7 @@ from rig import Rig
 from walk import walk
 
 LEFT_OUT = {
-    "an adapter that takes nothing for 3 s",
+    "an adapter that accepts no data for 3 s",
     "the kernel's buffer is full, and the board silent",
     "TwistStamped where Twist is expected",
 }

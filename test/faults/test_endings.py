@@ -17,7 +17,7 @@ SOME = (
     "SIGINT, SIGTERM, SIGKILL to its process group",
     "an exit in a callback",
     "a callback that hangs, and ctrl-C",
-    "a farewell that hangs, and ctrl-C",
+    "a final Stop that hangs, and ctrl-C",
     "an exception, the port full",
     "SIGKILL, the port full",
     "a segmentation fault",

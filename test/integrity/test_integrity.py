@@ -48,7 +48,7 @@ def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
 
 
 def test_the_judge_finds_what_the_plain_parser_makes_up() -> None:
-    """Or it would find nothing with ours."""
+    """Otherwise it would find nothing with ours."""
     truth = generate(SCENARIOS["gyro stuck at (-6, -5, -4)"], 1, 20.0)
     received = receive(truth, FAULTS["1 byte in 1,000 lost"], Random(1))
     score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())

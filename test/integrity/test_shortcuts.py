@@ -104,7 +104,7 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
 def test_readings_come_out_alike(
     scenario: str, fault: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And where each read ended, and the mode, whatever is sent meanwhile or refused."""
+    """So do the end of each read and the mode, whatever is sent meanwhile or refused."""
     chunks = chunks_of(scenario, fault, "whole bursts", 2)
 
     def told() -> list[object]:
@@ -127,7 +127,7 @@ def test_readings_come_out_alike(
 
 
 def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Or the tests above would compare nothing: so most reads go."""
+    """Otherwise the tests above would compare nothing: most reads go this way."""
     fed = []
     feed = FrameDecoder.feed
 
@@ -144,7 +144,7 @@ def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatc
 
 
 def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Or the tests above would compare nothing: hardly an IMU frame is weighed."""
+    """Otherwise the tests above would compare nothing: hardly an IMU frame is weighed."""
     weighed = []
     weigh = decoder.Expectation.weigh
 
@@ -195,8 +195,8 @@ def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None
     assert max(b - a for a, b in pairwise([*places, len(walk.frames)])) <= 6
 
 
-def test_most_of_the_lattice_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Or they would compare one full search with another."""
+def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise they would compare one full search with another."""
     edges = {True: 0, False: 0}
     pieces = trellis._Search.pieces
     chunks = chunks_of("driving", "1 byte in 100 lost", "4096-byte blocks", 1)
@@ -214,7 +214,7 @@ def test_most_of_the_lattice_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
 @settings(max_examples=200)
 @given(st.lists(pieces, min_size=1, max_size=8).map(b"".join).map(lambda data: data[:170]))
 def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
-    """Nor does the bound fall, along any edge, by more than the edge costs."""
+    """The bound falls along no edge by more than the edge costs."""
     least = least_costs(data)
     search = trellis._Search(
         data, NOTHING_KNOWN, Expectation(16384.0), InterFrameGaps(BYTE_S), "big"

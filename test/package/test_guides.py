@@ -76,7 +76,7 @@ def test_what_the_driver_tells_is_explained(template: str) -> None:
 
 
 def test_every_state_is_explained() -> None:
-    """And none besides."""
+    """There is no other row."""
     assert set(SENTENCES) >= STATES
     assert all(state in SAID for state in STATES)
 

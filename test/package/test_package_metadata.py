@@ -142,7 +142,7 @@ def test_manifest_and_setup_agree(setup_arguments: dict[str, Any]) -> None:
 
 
 def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any]) -> None:
-    """And only what the package can do without."""
+    """Extras contain only what the package can do without."""
     assert setup_arguments["extras_require"] == {**EXTRAS, "test": ["pytest"]}
 
 

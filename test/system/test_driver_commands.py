@@ -101,7 +101,7 @@ def test_wheel_cmd_turns_the_wheels(probe: Probe, board: PtyBoard) -> None:
 def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
     probe: Probe, driver: Driver, board: PtyBoard, data: list[float], reason: str
 ) -> None:
-    """And the node lives on: a right one still arrives."""
+    """The node lives on: a right one still arrives."""
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=data))
     driver.wait_for_line(f"wheel_cmd rejected.*{reason}")

@@ -105,7 +105,7 @@ def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
 def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
     start_driver: Start, probe_of: Start, silent_terminal: tuple[int, str]
 ) -> None:
-    """The kernel's buffer is full, so the farewell does not fit in; the guard goes on trying."""
+    """The kernel's buffer is full, so the final Stop does not fit in; the guard goes on trying."""
     far, path = silent_terminal
     driver: Driver = start_driver(path, auto_start=False)
     probe_of(driver).wait_for_state("connecting")

@@ -60,7 +60,7 @@ def test_an_unplugged_board_is_found_again(
 def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(
     start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """Not that the port takes nothing: there is none. The log tells who pressed it."""
+    """The answer says that there is no port. The log says who latched it."""
     link = tmp_path / "omnibot"
     with PtyBoard(SimulatedBoard(), str(link)):
         driver: Driver = start_driver(str(link), reconnect_interval=0.05)

@@ -178,7 +178,7 @@ def test_estop_answers_while_a_reset_waits(
 def test_a_second_request_is_refused_while_one_is_under_way(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """And says which."""
+    """The message says which."""
     board = start_board(boot_time_s=3.0, running=True)
     probe: Probe = probe_of(start_driver(board.path))
     probe.wait_for_state("nominal")

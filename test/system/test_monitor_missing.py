@@ -167,7 +167,7 @@ def test_without_ros_one_sentence_says_so() -> None:
 
 @pytest.mark.parametrize("wrong", [["--timeout", "0"], ["--teleop", "--once"], ["--nonsense"]])
 def test_wrong_usage_has_exit_code_2(wrong: list[str], capsys: Any) -> None:
-    """And the usage is shown."""
+    """The usage is shown."""
     with pytest.raises(SystemExit) as ended:
         main(wrong)
     assert ended.value.code == 2

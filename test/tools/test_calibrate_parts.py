@@ -104,7 +104,7 @@ def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
 
 
 def test_stairs_are_climbed_one_by_one() -> None:
-    """And then there are none."""
+    """The last one is followed by none."""
     law = stairs([(1.0, (1.0, 0.0, 0.0)), (2.0, HALT), (1.0, (0.0, 1.0, 0.0))])
     assert [law(t, Pose()) for t in (0.0, 0.99, 1.0, 2.9, 3.5)] == [
         (1.0, 0.0, 0.0), (1.0, 0.0, 0.0), HALT, HALT, (0.0, 1.0, 0.0),

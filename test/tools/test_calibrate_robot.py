@@ -183,7 +183,7 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
 
 
 def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
-    """Nor is a robot seen to stand by it."""
+    """It does not prove a standstill either."""
     nonsense = Odometry()
     nonsense.pose.pose.position.x = nonsense.twist.twist.linear.x = float("nan")
 
@@ -207,7 +207,7 @@ def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.Mo
 
 
 def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    """Nor without an answer."""
+    """The same holds without an answer."""
     commands = len(rigged.port.board.commands)
     assert rigged.calibrate("scale", answer=lambda _question: "n") == 1
     assert "you said no" in capsys.readouterr().err

@@ -73,7 +73,7 @@ def test_three_signs_are_understood(answer: str) -> None:
 
 @pytest.mark.parametrize("answer", ["", "+", "++", "+0-+", "abc", "1 0 -1", "yes"])
 def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
-    """And is asked again."""
+    """The question is asked again."""
     assert understand(answer) is None
 
 
@@ -177,7 +177,7 @@ def test_a_side_lowered_instead_of_raised_is_a_contradiction(
 
 @pytest.mark.parametrize("tilt_rad", [0.05, 1.5])
 def test_a_tilt_that_is_none_is_a_contradiction(tilt_rad: float) -> None:
-    """Or one that is a fall."""
+    """A fall is not a tilt either."""
     with pytest.raises(Contradiction, match="front raised"):
         mounting(*postures(np.eye(3), tilt_rad, 0.5))
 
@@ -205,7 +205,7 @@ def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
 
 
 def test_what_is_not_held_still_or_not_gravity_is_said() -> None:
-    """And nothing at all, too."""
+    """An empty record is rejected too."""
     shaking = resting((0.0, 0.0, 9.8), (0.0, 0.0, 0.0), 1.0)
     shaking.rate_radps[::2] = 0.5
     with pytest.raises(Contradiction, match="not held still"):
@@ -273,7 +273,7 @@ def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
 
 
 def test_a_drift_is_of_its_time_alone() -> None:
-    """And none where no data from the board, nor of a robot that stood."""
+    """Without data, or at rest, no drift is computed."""
     stamps = np.arange(0.0, 4.0, 0.04)
     twist = np.zeros((100, 3))
     twist[50:, 0] = 0.2

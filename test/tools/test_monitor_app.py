@@ -113,7 +113,7 @@ def test_the_estop_is_released_by_two_keys() -> None:
 
 
 def test_space_stops_even_while_a_question_stands() -> None:
-    """And the question is gone: it was a no."""
+    """The question closes with the answer no."""
     assert press("R", "space", "y").asked == ["estop"]
 
 

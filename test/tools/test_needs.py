@@ -36,7 +36,7 @@ def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
     ["tools.calibrate", "tools.calibrate step", "tools.report", "tools.monitor", "demo"],
 )
 def test_help_needs_no_library(words: str) -> None:
-    """Nor ROS: a Python without site-packages has neither."""
+    """It needs no ROS either: a Python without site-packages has neither."""
     module, *subcommand = words.split()
     done = subprocess.run(
         [sys.executable, "-ES", "-m", f"omnibot_driver.{module}", *subcommand, "--help"],

@@ -17,7 +17,7 @@ ROWS = dict(re.findall(r"^\| (\S+) \| [^|]+ \| ([^|]+) \|$", DOCUMENT, re.MULTIL
 
 
 def test_every_subject_has_a_row() -> None:
-    """And none besides."""
+    """There is no other row."""
     subjects = {
         node.args[1].value
         for file in (ROOT / "omnibot_driver/tools/report").glob("*.py")

@@ -118,7 +118,7 @@ def test_the_channels_take_turns(host: Host, transport: UdpPorts) -> None:
 
 
 def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
-    """And then nothing was read."""
+    """The read returns without data."""
     threading.Timer(0.02, transport.interrupt).start()
     assert transport.read() == (0, b"")
 

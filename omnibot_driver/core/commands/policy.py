@@ -107,7 +107,7 @@ class CommandPolicy:
             self._actuator.apply(EMERGENCY_STOP, now)
 
     def release(self, now: float) -> None:
-        """End the e-stop; the robot stands until a new command comes."""
+        """End the e-stop; the robot stays stopped until the next command."""
         if self.latched:
             self.latched = False
             self.halt(now)

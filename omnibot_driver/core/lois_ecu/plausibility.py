@@ -74,7 +74,7 @@ class Gate(Generic[Group]):
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """What was learnt of the board's counters is worth nothing."""
+        """What was learnt of the board's counters is void."""
 
 
 class TicksGate(Gate[Ticks]):

@@ -72,7 +72,7 @@ class Covariance:
         )
 
     def with_errors(self, errors: Iterable[tuple[float, float, float, float]]) -> "Covariance":
-        """And of independent errors along lines in (x, y, yaw), each with a variance along its
+        """Add independent errors along lines in (x, y, yaw), each with a variance along its
         own."""
         xx = xy = x_yaw = yy = y_yaw = yaw_yaw = 0.0
         for variance, x, y, yaw in errors:

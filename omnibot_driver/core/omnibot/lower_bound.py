@@ -5,7 +5,7 @@
 From a header frames lead on without damage to a place where none begins. Each damage leads on by
 no more than ``REACH`` bytes and costs no less than ``DAMAGE``; a bad run costs more by the byte. So
 the least number of damages on the way to the end of a stretch is known before anything is weighed.
-This module knows the shapes of frames and the cheapest prices; what is searched, ``lattice`` knows.
+This module knows the shapes of frames and the cheapest prices; ``trellis`` knows what is searched.
 """
 
 import re
@@ -24,7 +24,7 @@ _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)
 
 
 def least_costs(data: bytes) -> list[float]:
-    """For each node of the lattice: the least cost from there to the end, while more may follow.
+    """For each node of the trellis: the least cost from there to the end, while more may follow.
 
     Along an edge it grows by the edge's price at the most.
     """

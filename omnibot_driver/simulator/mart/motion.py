@@ -54,8 +54,8 @@ class Motion:
     running: in progress, so that others are refused. posts: notices that it started or stopped, and
     that were not read. error: of this motion. right, left: what the server believes of the
     registers. encoder: as it was read last, of which the next sample knows. sampled_s: time of the
-    last sample of the IMU, or -1. moved_s, stopped_s, turned_s: when the wheel began to turn, was
-    told to stop, and turned last. angle_deg: since its start. released: the stop port ended it.
+    last sample of the IMU, or -1. moved_s, stopped_s, turned_s: when the wheel began to turn, got
+    its stop, and turned last. angle_deg: since its start. released: the stop port ended it.
     """
 
     def __init__(self, kind: Kind) -> None:

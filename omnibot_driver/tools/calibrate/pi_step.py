@@ -82,7 +82,7 @@ class _Bench:
         self.ticks = int(robot.parameters["ticks_per_revolution"])
 
     def set(self, values: Mapping[str, Any]) -> None:
-        """And wait until the board has them."""
+        """Set them, and wait until the board has them."""
         self.robot.set_parameters(values)
         self.robot.rest(WRITTEN_WITHIN_S)
 

@@ -40,7 +40,7 @@ def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
 
 
 def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
-    """And the base after the wheels: Stop, then the newest."""
+    """The base after the wheels too: Stop, then the newest."""
     bench.drive(0.3)
     bench.run(0.1)
     start = len(bench.written)

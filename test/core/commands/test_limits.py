@@ -84,7 +84,7 @@ def test_a_limited_twist_is_within_every_limit_and_points_the_same_way(twist: Bo
 
 @given(any_twists)
 def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
-    """And what is not is at a limit, or beyond it."""
+    """What is not allowed is cut to a limit."""
     limits = SpeedLimits(linear_mps=0.5, angular_radps=0.7)
     if limits.allow(twist):
         limited = limits.twist(twist)
@@ -180,6 +180,6 @@ def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
 def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
     age_s: float, said: str
 ) -> None:
-    """And what to look at."""
+    """The message also says what to check."""
     with pytest.raises(CommandRefused, match=f"cmd_vel refused.*{said}.*clocks agree"):
         require_timely("cmd_vel", age_s, 0.5)

@@ -37,7 +37,7 @@ def test_silence_for_the_timeout_ends_the_refusal() -> None:
 
 
 def test_a_zero_command_ends_the_refusal() -> None:
-    """And is let through itself."""
+    """The zero command itself is let through."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -60,7 +60,7 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """And after ~/start too."""
+    """The same holds after ~/start."""
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
         interlock.trip(now)

@@ -114,7 +114,7 @@ def test_motion_is_refused_unless_the_board_runs(state: str) -> None:
 
 
 def test_motion_is_refused_without_a_port() -> None:
-    """And says so."""
+    """The message says so."""
     with pytest.raises(CommandRefused, match="not connected"):
         Bench().drive(0.3)
 

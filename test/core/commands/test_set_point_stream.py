@@ -329,7 +329,7 @@ def test_a_release_without_a_latch_does_nothing(stream: Stream) -> None:
 
 
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:
-    """After the process stood still for long, what was commanded before is worth nothing."""
+    """After the process stood still for long, earlier commands have no effect."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(60.0) == STOP

@@ -17,7 +17,7 @@ def bench() -> Bench:
 
 
 def test_a_command_is_on_the_wire_before_the_call_returns(bench: Bench) -> None:
-    """And it is the manual's frame: 0.3 m/s are 21 LSB, -0.2 m/s are -14, 0.5 rad/s are 250."""
+    """It is the manual's frame: 0.3 m/s are 21 LSB, -0.2 m/s are -14, 0.5 rad/s are 250."""
     start = len(bench.written)
     bench.drive(0.3, -0.2, 0.5)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 00 15 FF F2 00 FA")

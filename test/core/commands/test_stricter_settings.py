@@ -54,7 +54,7 @@ def test_what_was_commanded_under_looser_ones_ends(
     ],
 )
 def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
-    """Nor do other accelerations and rates: the robot drives on."""
+    """Neither do other accelerations and rates: the robot drives on."""
     bench = driving()
     start = len(bench.written)
     bench.drive(0.4)

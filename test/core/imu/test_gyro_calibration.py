@@ -107,7 +107,7 @@ def test_without_wheels_the_gyro_alone_tells() -> None:
 def test_a_robot_that_moves_is_refused_with_what_showed_it(
     rates: Iterator[Vector3], rolling: Vector3, why: str
 ) -> None:
-    """And the bias stays as it was."""
+    """The bias stays as it was."""
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=True)
     calibration.measure("token", 0.0)
     stand(calibration, rates, 2.1, rolling=rolling)
@@ -193,7 +193,7 @@ def test_nothing_is_refined_unless_it_is_wanted_and_the_wheels_say_that_they_sta
 def test_whatever_the_gyro_says_no_bias_is_larger_than_a_sensor_can_have(
     rates: list[Vector3], measure: bool
 ) -> None:
-    """Nor anything but a number."""
+    """The bias is always a finite number."""
     calibration = GyroCalibration(NONE, refine=True)
     if measure:
         calibration.measure("token", 0.0)

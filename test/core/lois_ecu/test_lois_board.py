@@ -302,7 +302,7 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
 
 
 def test_gps_and_compass_come_in_si_units_and_enu() -> None:
-    """East is 0; without a date there is no time, and 0/0 is no fix."""
+    """East is 0; without a date there is no time, and 0/0 is not a fix."""
     rig = Rig(
         LoisSettings(quirks=DOCUMENTED),
         LoisEcuSettings(periods_ms={Stream.TICKS: 200, Stream.GPS_DATE: 1000}),
@@ -428,7 +428,7 @@ def test_a_record_that_lost_a_line_is_given_up() -> None:
     ],
 )
 def test_what_is_no_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> None:
-    """And taken back when it is one after all."""
+    """The message is withdrawn when it is one after all."""
     ecu = LoisEcu(LoisEcuSettings())
     assert ecu.receive(data * 100, 0.0) == []
     assert ecu.advice is not None

@@ -178,7 +178,7 @@ def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> Non
 
 
 def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
-    """And ends with twice that."""
+    """The record ends with two of them."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.HEADING, 3)
     data = b":0c0005fffb68\n:0c0003016a3c\n:0c016a016a69\n"

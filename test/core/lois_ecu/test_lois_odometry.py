@@ -267,7 +267,7 @@ def test_a_velocity_that_is_no_number_is_no_speed() -> None:
 
 
 def test_duty_backward_is_known_by_commands_alone() -> None:
-    """And badly: the covariance says so."""
+    """The estimate is poor, and the covariance says so."""
     odometry = LoisOdometry(LoisEcuSettings(drive_mode="duty"))
     odometry.wrote(SetDuty(-40, -40), 0.0)
     found: list[FusedOdometry] = []

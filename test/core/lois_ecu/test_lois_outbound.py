@@ -90,7 +90,7 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 
 
 def test_set_points_are_found_in_what_was_written() -> None:
-    """And nothing else is taken for one."""
+    """Nothing else is taken for one."""
     commands = [STOP, Reset(), CLEAR, SetRpm(20, -20), SetDuty(5, 6)]
     for with_sum in (True, False):
         data = b"".join(encode_command(command, with_sum=with_sum) for command in commands)

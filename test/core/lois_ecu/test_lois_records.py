@@ -30,7 +30,7 @@ def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
 
 
 def test_without_a_known_unit_there_are_counts_alone(tmp_path: Path) -> None:
-    """And a sentence."""
+    """A message explains it."""
     assert read(tmp_path / "rpm.csv", RPM, None).splitlines()[1] == "0,,,,,500,250"
     assert "unit" in remark(RecordReading(RPM, None, 60))
 
@@ -49,7 +49,7 @@ def test_torque_and_headings_have_their_columns(tmp_path: Path) -> None:
 
 
 def test_a_record_that_nobody_waits_for_leaves_no_file(tmp_path: Path) -> None:
-    """Nor does one that cannot be written."""
+    """A file that cannot be written is not left either."""
     assert not save(RecordReading(RPM, 1e-4, 60), tmp_path / "rpm.csv", lambda: False)
     (tmp_path / "taken").mkdir()
     with pytest.raises(OSError, match="taken"):

@@ -82,7 +82,7 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
 
 
 def test_the_motion_monitor_names_this_boards_parameters() -> None:
-    """And none of another board's; without a ~/start the e-stop's release ends the refusal."""
+    """It names none of another board's; without a ~/start the e-stop's release ends the refusal."""
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=25))
     for _ in range(2):
         with pytest.raises(CommandRefused, match="motion monitor"):
@@ -225,7 +225,7 @@ def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
 
 @FIRMWARE
 def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
-    """And its release moves nothing."""
+    """Its release moves nothing."""
     bench = Bench(firmware)
     configure(bench, GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)

@@ -55,7 +55,7 @@ def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, senten
 def test_a_board_whose_checksum_is_set_otherwise_is_set_right(
     firmware: str, *, checks: bool
 ) -> None:
-    """And drives, without a restart of anything."""
+    """It drives without a restart of anything."""
     _, robot = MAKERS[firmware]()
     robot.board._reader.checks = not checks
     bench = AnyBench(LoisEcuBoard(LoisEcuSettings(with_sum=checks)), robot)

@@ -59,8 +59,8 @@ class Server(NamedTuple):
 
 
 class Driver(NamedTuple):
-    """``proved``: the IMU was, just now. ``pending``: what is to be answered. ``unanswered``: so
-    many stops.
+    """``proved``: the IMU was, just now. ``pending``: what is to be answered. ``unanswered``: the
+    number of stops.
 
     ``moved``: the last motion that was begun was a controlled move; ``counted``: the encoder was
     answered since the robot stands, and since no harmful copy can come any more.

@@ -59,7 +59,7 @@ def conversation() -> Conversation:
 
 
 def test_a_reply_answers_the_pending_request() -> None:
-    """And says how long it took."""
+    """It also gives the time that it took."""
     talk = conversation()
     assert talk.ask(words.ENC.request(), 1.0) == ((0, b"ENC"),)
     answer = talk.hear(parse(b"ok 123"), 1.01)
@@ -114,7 +114,7 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """And what the robot is driven by is asked at once, and marked."""
+    """The query that the robot is driven by is sent at once, and marked."""
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
     assert talk.overdue(1.1) is None

@@ -293,7 +293,7 @@ def test_a_goal_and_a_job_show_how_far_they_are() -> None:
 
 
 def test_a_dead_imu_is_told_when_a_command_comes() -> None:
-    """And no word that starts."""
+    """No word is sent that starts."""
     bench = MartBench().ready()
     bench.server.imu.alive = False
     bench.command(0.3, 0.0, 3.0)

@@ -122,7 +122,8 @@ def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
 def test_an_imu_word_is_published_wrong_by_half_a_g_at_the_most(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """Or 0.6 rad/s: a third bit from the top may pass while the robot shakes, larger ones do not.
+    """The limit for a rate is 0.6 rad/s: a third bit from the top may pass while the robot shakes,
+    larger ones do not.
 
     Every other reading is there.
     """

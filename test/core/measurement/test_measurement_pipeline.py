@@ -39,7 +39,7 @@ def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
 
 
 def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
-    """And after both, a tick is 10 ms again."""
+    """After both, a tick is 10 ms again."""
     bench.board.reboot()
     bench.run_until_state("paused")
     bench.run_until_state("nominal")

@@ -61,7 +61,7 @@ def bench() -> Bench:
 def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
     board: dict[str, object], command: Triple, what: str, advice: str, frame: str
 ) -> None:
-    """And the log says what was seen, and what to look at."""
+    """The log says what was measured, and what to check."""
     bench = started(BoardSettings(running=True, frame=frame, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, command) <= WITHIN_S
     (notice,) = bench.notices
@@ -186,7 +186,7 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_refused_command_says_why() -> None:
-    """And what to do."""
+    """It also says what to do."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     with pytest.raises(CommandRefused, match="the motion monitor has stopped the robot; send a"):
@@ -224,7 +224,7 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
 
 
 def test_the_e_stop_works_while_motion_is_refused() -> None:
-    """And its release does not end the refusal."""
+    """Its release does not end the refusal."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert estop(bench, True) == "e-stop latched"

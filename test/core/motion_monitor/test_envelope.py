@@ -102,7 +102,7 @@ def test_a_set_point_that_was_short_counts_as_well() -> None:
 
 
 def test_nothing_is_known_before_the_first_set_point() -> None:
-    """Nor for a while after it, nor on the way to a goal."""
+    """The same holds for a while after it, and on the way to a goal."""
     history = SetpointHistory()
     assert not history.known(0.0)
     history.add(AT_REST, 10.0)
@@ -156,7 +156,7 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """And then it is gone."""
+    """Afterwards it is gone."""
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)
     assert wind_up.pay(0.5, 0.0, 0.1)

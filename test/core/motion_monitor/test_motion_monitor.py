@@ -177,7 +177,7 @@ def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
-    """And again each second; the caller filters repetitions."""
+    """The event repeats each second; the caller filters repetitions."""
     drive = Drive()
     drive.command(0.06, 0.0, 0.0)
     found = drive.move(REST, 2.4)
@@ -228,7 +228,7 @@ def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() ->
 
 
 def test_how_a_stopped_robot_rolls_out_is_no_second_fault() -> None:
-    """Nor what it does until Stop can have reached it."""
+    """Neither is what it does until Stop can have reached it."""
     drive = Drive()
     drive.command(0.05, 0.0, 0.0)
     assert first(drive.move((-0.3, 0.0, 0.0), 0.2))[1] is Fault.WRONG_WAY

@@ -101,7 +101,7 @@ def test_imu_counts_are_scaled_by_the_ranges_of_the_settings() -> None:
 
 
 def test_a_text_says_that_the_board_is_paused() -> None:
-    """And nothing else."""
+    """It says nothing else."""
     assert readings(bot(), PausedFrame(3)) == [PausedReading()]
 
 
@@ -246,7 +246,7 @@ def test_after_silence_or_on_a_new_line_the_mode_is_unknown(mode: Mode) -> None:
 
 
 def test_a_new_line_does_not_finish_what_the_old_one_began() -> None:
-    """Half a frame is worth nothing on another line."""
+    """Half a frame has no meaning on another line."""
     board = bot()
     board.receive(encode(REST) * 2 + encode(moved(0))[:5], 0.0)
     board.connect()

@@ -76,7 +76,7 @@ def test_in_step_any_content_is_delivered_in_any_chunks(
 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
-    """But one that ends in a header's byte, or leaps: the first bytes of the next tell."""
+    """Except one that ends in a header's byte, or a spike: the next bytes decide."""
     made, found, complete = FrameDecoder(), 0, 0
     last = REST
     for number, tick in enumerate(ticks_of(name)):

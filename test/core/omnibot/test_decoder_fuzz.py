@@ -122,7 +122,7 @@ ADVERSARIES = {
 def work(
     monkeypatch: pytest.MonkeyPatch, stream: bytes, chunk_length: int, pause_s: float = 0.0
 ) -> tuple[int, int]:
-    """Looks at a byte, edges and gaps of the lattice; and the most bytes held between calls."""
+    """Looks at a byte, edges and gaps of the trellis; and the most bytes held between calls."""
     done, measure, forward = 0, decoder.measure, trellis._Search._forward
 
     def measuring(data: bytes | bytearray, at: int) -> int:

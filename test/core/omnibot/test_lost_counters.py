@@ -167,7 +167,7 @@ def test_the_covariance_jumps_with_a_gap_and_shrinks_when_it_is_settled(lost: in
 
 
 def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
-    """And a pose moves nothing."""
+    """A pose moves nothing."""
     on = line(1, OdometrySettings(use_board_pose=False))
     lose(on, 0.4)
     (first,) = on.run(PERIOD_S)
@@ -249,7 +249,7 @@ losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
 def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
     pattern: list[tuple[int, int]], seed: int, frame: str
 ) -> None:
-    """And no step on the way was larger than the robot could have moved."""
+    """No step on the way is larger than the robot could have moved."""
     on = line(seed, frame=frame)
     fate = iter([lost for come, gone in pattern for lost in [False] * come + [True] * gone])
     on.loses = lambda _data, _now: next(fate, False)

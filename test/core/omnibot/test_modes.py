@@ -77,7 +77,7 @@ def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard
 
 @pytest.mark.parametrize("mode", Mode)
 def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
-    """And not sooner: six missing deltas may not be chance, five may."""
+    """It is not believed sooner: five missing deltas may be chance, six may not."""
     made = tracker(mode)
     if mode is Mode.IMU_ONLY:
         made.hear(DELTA)

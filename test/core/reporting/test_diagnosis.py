@@ -128,7 +128,7 @@ FAULTS: list[tuple[Change, str, Level, str]] = [
 def test_each_fault_alone_raises_its_own_status(
     fault: Change, name: str, level: Level, said: str
 ) -> None:
-    """And no other; the message says what to do."""
+    """No other status changes; the message says what to do."""
     robot = Robot()
     fault(robot)
     robot.seconds(5)

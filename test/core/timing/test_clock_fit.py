@@ -27,7 +27,7 @@ def followed(
 
 @pytest.mark.parametrize("skew", [1e-4, 0.0, -1e-4])
 def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> None:
-    """And the slope found."""
+    """The slope is found as well."""
     line, late_s = followed(skew, lambda tick: tick % 7 * 1e-3, lambda _: NEVER_BELOW)
     assert late_s == pytest.approx(0.0, abs=1e-6)
     assert line.slope_s == pytest.approx(PERIOD_S * (1.0 + skew), rel=1e-6)

@@ -98,7 +98,7 @@ def test_surprises_are_stamped_alike(
 
 
 def test_calm_lines_take_the_short_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Or the tests above would compare nothing."""
+    """Otherwise the tests above would compare nothing."""
     compared = 0
     compare = DeviceClock._compare
 

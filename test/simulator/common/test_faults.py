@@ -19,7 +19,7 @@ def bits(value: int) -> int:
 
 
 def test_a_line_without_faults_changes_nothing() -> None:
-    """Nor does it count anything."""
+    """It counts nothing either."""
     line = FaultyLine(LineFaults())
     assert line.carry(SENT) == SENT
     assert (line.lost, line.flipped) == (0, 0)

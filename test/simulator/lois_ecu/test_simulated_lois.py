@@ -240,7 +240,7 @@ def test_planted_errors_are_in_the_truth_alone() -> None:
 @given(st.lists(st.binary(max_size=200), max_size=6))
 @settings(max_examples=30)
 def test_any_bytes_are_taken(chunks: list[bytes]) -> None:
-    """And the same bytes lead to the same answer."""
+    """The same bytes lead to the same answer."""
     sent = []
     for _ in range(2):
         board = SimulatedLois()

@@ -101,7 +101,7 @@ def test_ncc_and_dock_see_no_obstacle(text: str) -> None:
 
 
 def test_tf_dock_stops_at_the_dock() -> None:
-    """And claims what it computed."""
+    """It reports the computed distance."""
     rig = Rig(dock_m=20 * INCH_M)
     assert rig.ask("DOCKED") == "ok false"
     answer = rig.ask("TF DOCK 60", 60.0)

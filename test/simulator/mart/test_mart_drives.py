@@ -27,7 +27,7 @@ def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
 
 
 def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
-    """And does not know of it: nothing but a write to the motors ends it."""
+    """The server does not know of it: nothing but a write to the motors ends it."""
     rig = Rig(reference_start_fails=True)
     assert rig.ask("RM 30") == "fail "
     rig.run(1.0)
@@ -64,7 +64,7 @@ def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(chan
 
 
 def test_rm_200_drives_backward_at_56() -> None:
-    """And at full speed forward after the smallest change."""
+    """After the smallest change it drives forward at full speed."""
     rig = Rig()
     rig.drive("RM 200")
     assert rig.server.chassis.right == 128 + 56
@@ -98,7 +98,7 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """Or with that of the last F."""
+    """The reason may also be that of the last F."""
     rig = Rig(stuck="right")
     assert rig.ask("RM 30") == "fail "
     assert rig.took_s == pytest.approx(0.6, abs=0.03)
@@ -119,7 +119,7 @@ def test_rm_0_is_a_motor_that_does_not_turn() -> None:
     ("text", "seconds"), [("R", 0.6), ("L", 0.6), ("MCR 20", 0.6), ("F", 0.76), ("TF 12", 0.76)]
 )
 def test_a_stuck_motor_is_told_of(text: str, seconds: float) -> None:
-    """And nothing is in progress."""
+    """No motion is in progress."""
     rig = Rig(stuck="right")
     assert rig.ask(text) == "fail start timedout"
     assert rig.took_s == pytest.approx(seconds, abs=0.02)
@@ -235,7 +235,7 @@ def test_enc_counts_the_right_wheel_alone_and_has_a_sign() -> None:
 
 @pytest.mark.parametrize("start", ["F", "B", "RM 30", "R", "L", "TF 2", "MCR 5", "MCR 0"])
 def test_enc_is_zeroed_at_each_motion_start(start: str) -> None:
-    """And keeps its value afterwards."""
+    """It keeps its value afterwards."""
     rig = Rig()
     rig.drive("F")
     rig.ask("SM")

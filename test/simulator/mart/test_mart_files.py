@@ -72,7 +72,7 @@ def test_log_deletes_earlier_files_then_last_move_answers_a_bare_fail() -> None:
 
 
 def test_exit_downloads_the_log_if_log_was_given() -> None:
-    """And ends the server."""
+    """It also ends the server."""
     rig = Rig()
     rig.ask("LOG")
     rig.ask("HELLO")

@@ -10,7 +10,7 @@ LOST = "fail MPU6050 connection lost"
 
 @pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24", "SB"])
 def test_with_a_dead_imu_it_never_answers_and_does_not_move(text: str) -> None:
-    """Nor anything that is said afterwards."""
+    """Later requests are not answered either."""
     rig = Rig(imu_dies_s=0.0)
     rig.say(text, "HELLO", "SM")
     rig.stop("SL")
@@ -66,7 +66,7 @@ def test_the_obstacle_check_is_dead_without_an_imu() -> None:
 
 
 def test_rm_that_was_started_without_an_imu_is_answered_when_it_comes_back() -> None:
-    """And what was said after it is done then."""
+    """Later requests are carried out then."""
     rig = Rig(imu_dies_s=0.0, imu_returns_s=30.0)
     rig.say("RM 30", "SRM")
     assert rig.run(29.0) == []
@@ -139,7 +139,7 @@ def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -
 
 
 def test_mcr_fails_in_half_a_second_if_it_is_dead() -> None:
-    """And the motors stop."""
+    """The motors stop."""
     rig = Rig(imu_dies_s=0.0)
     assert rig.ask("MCR 90") == LOST
     assert rig.took_s == pytest.approx(0.5, abs=0.05)

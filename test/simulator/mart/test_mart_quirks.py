@@ -234,7 +234,7 @@ def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
 
 @pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
 def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
-    """And goes on."""
+    """It goes on afterwards."""
     rig = Rig(replace(FIRMWARE, crashes_on_missing_numbers=False))
     if text == "CS 5":
         rig.drive("F")
@@ -252,7 +252,7 @@ def test_a_documented_server_stops_at_a_wall_and_when_its_imu_dies() -> None:
 
 
 def test_a_documented_move_is_cancelled_at_any_time() -> None:
-    """And is answered then."""
+    """It is answered then."""
     for start, stop in (("TF 100", "SL"), ("TB 100", "SL"), ("MCR 170", "SS"), ("MCL 170", "SS")):
         for after_s in (0.02, 0.12, 1.0):
             rig = Rig(DOCUMENTED)

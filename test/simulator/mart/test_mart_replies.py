@@ -248,7 +248,7 @@ def test_an_unknown_reset_repeats_the_previous_reply() -> None:
     ],
 )
 def test_undocumented_commands_are_known(text: str, answer: str) -> None:
-    """And do no harm."""
+    """They do no harm."""
     rig = Rig()
     assert rig.ask(text) == answer
     assert not rig.server.chassis.powered

@@ -12,7 +12,7 @@ CONFLICT = "fail conflicting action in progress"
 
 @pytest.mark.parametrize("start", ["F", "F SLOW", "F FAST", "B", "B SLOW", "B FAST", "B NORMAL"])
 def test_sm_ends_f_and_b_on_the_command_port_in_0_4_s(start: str) -> None:
-    """And the robot stands when it answers."""
+    """The robot stands when it answers."""
     rig = Rig()
     rig.drive(start)
     assert rig.moving
@@ -25,7 +25,7 @@ def test_sm_ends_f_and_b_on_the_command_port_in_0_4_s(start: str) -> None:
 
 @pytest.mark.parametrize("speed", [45, 50, 60])
 def test_srm_ends_rm_in_0_43_to_0_6_s(speed: int) -> None:
-    """And only SRM does."""
+    """Only SRM does."""
     rig = Rig()
     rig.drive(f"RM {speed}")
     assert rig.ask("SM") == "fail no motion"

@@ -54,7 +54,7 @@ def test_deltas_are_sent_every_so_many_ticks(period: str) -> None:
 
 
 def test_without_options_all_is_as_usual() -> None:
-    """And the line is good."""
+    """The line has no faults."""
     board, line = board_from_url("sim://")
     assert board.settings == BoardSettings()
     assert line.carry(SENT) == SENT

@@ -1,0 +1,106 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The project's English: a phrase that readers had to read twice does not come back.
+
+Every text file of the repository is searched: log lines, messages, documents, comments, docstrings.
+A phrase may span a line break. Identifiers are not searched, since ``_`` belongs to a word.
+"""
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SUFFIXES = {".cfg", ".md", ".py", ".rst", ".rules", ".service", ".toml", ".xacro", ".xml", ".yaml"}
+SKIPPED = {"build", "install", "log"}
+"""Folders that are generated."""
+
+PATTERNS = {
+    "mend": r"mend(s|ed|ing)?",
+    "is no X": r"(there )?(is|are|was|were) no(?! (longer|more|need|different)\b)",
+    "nobody": r"nobody",
+    "whoever": r"whoever",
+    "likewise": r"likewise",
+    "all the same": r"all the same(?! time)",
+    "it is told": r"(is|are|was|were|be|been|being) told",
+    "so many": r"so (many|long|much)(?! (as|of|that)\b)",
+    "counts as no": r"counts? as no",
+    "is not finite and counts": r"is not finite and",
+    "stood still for": r"the driver stood still",
+    "until a new command comes": r"until a new command comes",
+    "nothing comes from": r"nothing comes from",
+    "hears us": r"the board (does not hear|hears) us",
+    "is to stand": r"although it is to stand",
+    "nobody commands": r"the robot stands$",
+    "the wire said": r"the wire said",
+    "takes nothing": r"the port takes nothing",
+    "follows when": r"the stop follows when",
+    "worth nothing": r"worth nothing",
+    "makes sense": r"nothing that comes in makes sense",
+    "lattice": r"lattices?",
+    "farewell": r"farewells?",
+}
+"""By its name: what must not be written, as whole words."""
+
+ALLOWED = {
+    "test/package/test_plain_english.py": "names the phrases",
+}
+"""Files that are not searched, each with its reason."""
+
+CONJUNCTIONS = {"And", "But", "Nor", "Or"}
+"""A docstring that begins with one needs its function's name to be understood."""
+
+
+@cache
+def texts() -> dict[str, str]:
+    """Every text file of the repository by its name."""
+    return {
+        str(name): (ROOT / name).read_text(encoding="utf-8")
+        for name in sorted(file.relative_to(ROOT) for file in ROOT.rglob("*"))
+        if (name.suffix in SUFFIXES or name.name == "Makefile")
+        and not any(part in SKIPPED or part.startswith(".") for part in name.parts)
+    }
+
+
+def found(phrase: str) -> Iterator[str]:
+    """Where the phrase stands, as file, line and words."""
+    pattern = re.compile(
+        rf"\b(?:{PATTERNS[phrase]})(?!\w)".replace(" ", r"(?: |\s*\n[\s#|]*)"),
+        re.IGNORECASE | re.MULTILINE,
+    )
+    for name, text in texts().items():
+        if name in ALLOWED:
+            continue
+        for match in pattern.finditer(text):
+            if match[0].lower().startswith("there"):  # "there is no parameter" is usual
+                continue
+            yield f"{name}:{text.count(chr(10), 0, match.start()) + 1}: {match[0]}"
+
+
+@pytest.mark.parametrize("phrase", PATTERNS)
+def test_the_phrase_is_not_used(phrase: str) -> None:
+    """CONTRIBUTING.md says what to write in its place."""
+    assert list(found(phrase)) == []
+
+
+def test_no_docstring_begins_with_a_conjunction() -> None:
+    """A reader who looks at one docstring alone understands it."""
+    fragments = [
+        f"{name}: {doc.splitlines()[0]}"
+        for name, text in texts().items()
+        if name.endswith(".py")
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.AsyncFunctionDef | ast.ClassDef | ast.FunctionDef | ast.Module)
+        and (doc := ast.get_docstring(node))
+        and doc.split()[0] in CONJUNCTIONS
+    ]
+    assert fragments == []
+
+
+def test_every_exception_is_needed() -> None:
+    """An exception for a file that has gone is removed."""
+    assert set(ALLOWED) <= set(texts())
