@@ -62,7 +62,7 @@ integrity: $(VENV)/.test  ## measure damaged lines of BOARD, both ways (15 minut
 bench: $(VENV)/.test  ## measure BOARD against a floor (11 minutes), into docs/internals/performance.md
 	$(PY) test/bench/report.py --board $(BOARD)
 
-faults: $(VENV)/.test  ## break everything around BOARD, with the real node (15 minutes), into docs/safety.md
+faults: $(VENV)/.test  ## break everything around BOARD, with the real node (15 minutes), into docs/internals/faults.md
 	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py --board $(BOARD)
 
 soak: $(VENV)/.test  ## random faults for MINUTES (10)

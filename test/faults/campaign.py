@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The fault campaign: ``make faults`` runs it and writes its table into docs/safety.md.
+"""The fault campaign: ``make faults`` runs it and writes its table into docs/internals/faults.md.
 
 Every scripted fault, random input, random walks over several seeds; with ``--minutes`` a soak of
 random walks alone. Drivers wait for real time, so the pieces run side by side, each with drivers
@@ -34,7 +34,7 @@ from rig_board import RigBoard, load
 from stuck import NETWORK
 from walk import walk
 
-DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "safety.md"
+DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "internals" / "faults.md"
 BEGIN, END = "<!-- campaign: begin -->", "<!-- campaign: end -->"
 BOARDS: Final = ("omnibot", "lois_ecu")
 ROUNDS: Final = 2

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How long the motion monitor takes, in board time, as a table for docs/safety.md.
+"""How long the motion monitor takes, in board time: a table for internals/motion_monitor.md.
 
 PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
 

@@ -3,7 +3,7 @@
 """Whether the robot moves as it is commanded, by its displacements against its set-points.
 
 All velocities are in the board's own axes; time is that of its displacements. This module knows
-neither bytes nor how a robot is stopped. docs/safety.md has the thresholds, and the reasons.
+neither bytes nor how a robot is stopped. docs/internals/motion_monitor.md has the thresholds.
 """
 
 import math
