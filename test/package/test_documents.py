@@ -19,7 +19,7 @@ PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 GENERATED: dict[str, Callable[[], str]] = runpy.run_path(str(ROOT / "docs/generate.py"))[
     "GENERATED"
 ]
-OTHERS_PARAMETERS = {"repeat_rate", "speed", "use_sim_time", "max_linear_sped"}
+OTHERS_PARAMETERS = {"front_port", "repeat_rate", "speed", "use_sim_time", "max_linear_sped"}
 SPHINX = ("sphinx", "myst_parser", "sphinx_rtd_theme")
 
 
