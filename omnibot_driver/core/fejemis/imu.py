@@ -45,6 +45,8 @@ class ImuPairing:
         self._gyro: tuple[Gyro, float] | None = None
         self._acceleration: tuple[Acceleration, float] | None = None
         self._count = 0
+        self._skipped = 0
+        """Samples of which one half came: they are not told, but they count."""
         self._arrived_s = -math.inf
         self._phase_s: float | None = None
         self._floor_s: deque[float] = deque(maxlen=PHASE_BLOCKS)
@@ -53,11 +55,13 @@ class ImuPairing:
 
     def gyro(self, gyro: Gyro, now: float) -> ImuReading | None:
         """One half of a sample; the sample where the other half has just come."""
+        self._skipped += self._gyro is not None
         self._gyro = gyro, now
         return self._whole(now)
 
     def acceleration(self, acceleration: Acceleration, now: float) -> ImuReading | None:
         """The other half."""
+        self._skipped += self._acceleration is not None
         self._acceleration = acceleration, now
         return self._whole(now)
 
@@ -83,7 +87,8 @@ class ImuPairing:
             self._phase_s = self._arrived_s = arrived_s
             return arrived_s
         since_s, self._arrived_s = arrived_s - self._arrived_s, arrived_s
-        self._count += 1
+        self._count += 1 + self._skipped
+        self._skipped = 0
         time_s = self._phase_s + self._count * PERIOD_S
         lost = math.ceil(max(0.0, (not_before_s - CYCLE_S - time_s) / PERIOD_S))
         delay_s = arrived_s - time_s - lost * PERIOD_S

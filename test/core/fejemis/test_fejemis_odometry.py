@@ -259,9 +259,12 @@ def within(errors: list[float]) -> float:
 
 
 @pytest.mark.parametrize("ppm", [-100.0, 0.0, 100.0])
-@pytest.mark.parametrize(("loss", "imu_s"), [(0.0, 2e-4), (0.005, 2e-4)])
-def test_stamps_are_those_of_the_board(ppm: float, loss: float, imu_s: float) -> None:
-    """Poses within 0.05 ms, and the IMU, whose lines carry no time, within 0.2 ms."""
+@pytest.mark.parametrize("loss", [0.0, 0.03])
+def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
+    """Poses within 0.05 ms, and the IMU, whose lines carry no time, within 0.2 ms.
+
+    Three lines in a hundred are lost where one character in a thousand is.
+    """
     chance = random.Random(f"{ppm} {loss}")
     clock, imu = TeensyClock(), ImuPairing("m/s^2")
     phase_s, start_s = chance.random() * 0.01, chance.random() * 50
@@ -274,18 +277,21 @@ def test_stamps_are_those_of_the_board(ppm: float, loss: float, imu_s: float) ->
     for true_s, kind in samples:
         board_s = start_s + true_s * (1.0 + ppm * 1e-6)
         arrived = max(arrived, true_s + late(chance))
-        if chance.random() < loss:
-            continue
-        if kind == "pose":
+        if kind == "pose" and chance.random() >= loss:
             pose_s = round(board_s, 5)
             assert clock.see(pose_s, arrived)
-            stamp_s = clock.host_s(pose_s)
-        elif clock.known:
-            stamp_s = min(arrived, clock.host_s(imu.sampled_s(clock.board_s(arrived), pose_s)))
-        if true_s > 4.0:
-            off[kind].append(stamp_s - true_s)
-    assert within(off["pose"]) < 5e-5
-    assert within(off["imu"]) < imu_s
+            off["pose"].append(clock.host_s(pose_s) - true_s)
+        elif kind == "imu":
+            reading = None
+            if chance.random() >= loss:
+                imu.gyro(Gyro(0.0, 0.0, 0.0), arrived)
+            if chance.random() >= loss:
+                reading = imu.acceleration(Acceleration(0.0, 0.0, 9.8), arrived)
+            if reading and clock.known:
+                sampled_s = imu.sampled_s(clock.board_s(arrived), pose_s)
+                off["imu"].append(min(arrived, clock.host_s(sampled_s)) - true_s)
+    assert within(off["pose"][200:]) < 5e-5
+    assert within(off["imu"][400:]) < 2e-4
     assert clock.skew_ppm == pytest.approx(ppm, abs=8.0)
 
 
