@@ -147,6 +147,11 @@ class FejemisBoard(Board):
                     " check the values, and its firmware"
                 )
         for half in self._ports.halves:
+            if half.decoder.contradicted:
+                return (
+                    f"the lines of the {half.role} board contradict `line_sums`"
+                    f" ({self._settings.line_sums}): set it to auto"
+                )
             if unknown := half.unknown_streams:
                 return (
                     f"the firmware of the {half.role} board does not know {', '.join(unknown)}:"
@@ -281,6 +286,7 @@ class FejemisBoard(Board):
         self._jobs.hear(role, message, now)
         self._configurations[role].hear(message)
         self._polls[role].hear(message)
+        self._configurations["front"].turned = self._configurations["drive"].turned
         if isinstance(message, FrontAngle):
             if role == "front":
                 self._front_angle(message, now)

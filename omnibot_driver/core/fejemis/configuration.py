@@ -44,6 +44,8 @@ class Configuration:
     def __init__(self, role: Role, written: Mapping[Written, tuple[float, ...]]) -> None:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
+        self.turned = False
+        """``confs`` is told in the order in which it is written, not as the help text has it."""
         self.written = written
         self.begin()
 
@@ -109,6 +111,11 @@ class Configuration:
                 self.told.setdefault("ir", ())
             case Status() if message.keyword in _SHOWN:
                 self.told[message.keyword] = message.numbers
+            case _:
+                return
+        if "conf" in self.told and "confs" in self.told:  # which also tells the track
+            track_m, told = self.told["conf"][4], self.told["confs"]
+            self.turned = abs(told[0] - track_m) < DIGIT < abs(told[1] - track_m)
 
     @property
     def geometry(self) -> Geometry | None:
@@ -117,7 +124,7 @@ class Configuration:
             return Geometry(*self.written[Written.STEERING])
         if "confs" not in self.told:
             return None
-        front_m, track_m = self.told["confs"]
+        front_m, track_m = self.told["confs"][:: -1 if self.turned else 1]
         return Geometry(track_m, front_m)
 
     def _missing(self) -> list[bytes]:
@@ -135,8 +142,8 @@ class Configuration:
         wanted = self.written[setting]
         if told is None:
             return False
-        if setting is Written.STEERING:
-            told = told[1], told[0]
+        if setting is Written.STEERING and not self.turned:
+            told = told[::-1]
         if setting is Written.ACCELEROMETER:
             wanted = wanted[:3]
         return len(told) >= len(wanted) and all(

@@ -40,12 +40,13 @@ class FejemisDecoder:
     """One board's line. ``sums``: whether its lines have sums; None while that is not known.
 
     ``changed``: they began or ceased to, since it was set to False last. ``doubtful``: the last
-    line was otherwise, so what is said without a sum is understood sooner.
+    line was otherwise, so what is said without a sum is understood sooner. ``contradicted``: it was
+    otherwise than it was set.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:
         self.statistics = DecoderStatistics()
-        self.changed = self.doubtful = False
+        self.changed = self.doubtful = self.contradicted = False
         self._held = b""
         self._cut = False
         """The line in hand is too long already."""
@@ -98,10 +99,11 @@ class FejemisDecoder:
         if isinstance(message, Heartbeat):
             self._learn(with_sum=right is not None)
         elif self.sums is not None and self.sums is not (right is not None):
-            self.doubtful = self._line_sums == "auto"
+            self.contradicted = self._line_sums != "auto"
+            self.doubtful = not self.contradicted
             return None
         else:
-            self.doubtful = False
+            self.doubtful = self.contradicted = False
         if isinstance(message, Comment):
             self.statistics.comments += 1
         elif not self._forms.admit(text):

@@ -6,6 +6,8 @@ import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
 from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.fejemis.codec import parse
+from omnibot_driver.core.fejemis.configuration import Configuration
 from omnibot_driver.core.fejemis.readings import (
     BatteryReading,
     Job,
@@ -16,6 +18,7 @@ from omnibot_driver.core.fejemis.readings import (
     SteeringReading,
 )
 from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
+from omnibot_driver.core.fejemis.steering import Geometry
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 
 
@@ -186,6 +189,24 @@ def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: (0.08, -1.0, 1.0, 1.0, 1.0)}))
     bench.run(6.0)
     assert any("confw" in text for text in bench.notices)
+
+
+def test_the_order_of_the_steering_geometry_is_found_out() -> None:
+    """The help text has it otherwise than the command; the track in ``conf`` decides."""
+    for turned in (False, True):
+        configuration = Configuration("drive", {})
+        configuration.hear(parse("conf 0.0775 0.0775 19 68 0.4000 0.001"))
+        configuration.hear(parse("confs 0.4000 0.4200" if turned else "confs 0.4200 0.4000"))
+        assert configuration.geometry == Geometry(track_m=0.4, wheelbase_m=0.42)
+
+
+def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
+    """Nothing is understood then but heartbeats."""
+    bench = Bench(settings=FejemisSettings(line_sums="off"))
+    bench.open()
+    bench.run(4.0)
+    assert bench.session.state == "connecting"
+    assert any("contradict" in text for text in bench.notices)
 
 
 def test_boards_with_different_geometries_are_told_of() -> None:
