@@ -1,0 +1,143 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How long the front angle of a Fejemis takes from one board to the other, through the driver.
+
+``python test/bench/fejemis_relay.py [--seconds 20] [--busy 0]``: a simulated pair on two
+pseudo-terminals in a process of its own, the driver's link without ROS in this one. ``--busy``:
+processes that compute all the time beside both.
+"""
+
+import argparse
+import contextlib
+import itertools
+import multiprocessing
+import os
+import re
+import select
+import statistics
+import time
+import tty
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import partial
+from multiprocessing.connection import Connection
+from typing import Final
+
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.policy import CommandSettings
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.fejemis.board import FejemisBoard
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.session import Session
+from omnibot_driver.core.settings import SessionSettings
+from omnibot_driver.link import Link
+from omnibot_driver.simulator.fejemis import SimulatedFejemis
+from omnibot_driver.transports.serial_port import SerialPort
+from omnibot_driver.transports.several import Several
+
+SETTLES_S: Final = 3.0
+TOLD: Final = re.compile(rb"fwl (-?[0-9.]+) 0x")
+RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
+
+
+def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
+    """Both halves in real time: when each angle left, and when it came to drive.
+
+    The wheel swings from side to side, so that each angle of the last while is another one.
+    """
+    pair = SimulatedFejemis()
+    drive, _ = masters
+    angles = itertools.cycle([*range(-60, 60), *range(60, -60, -1)])
+    pair.front._items["fwl"] = lambda: f"fwl {next(angles):.2f} 0x0 0x3c2"
+    for master in masters:
+        os.set_blocking(master, False)
+    began = time.monotonic()
+    told: deque[tuple[float, float]] = deque(maxlen=40)
+    took: list[float] = []
+    while (now := time.monotonic()) - began < seconds:
+        while pair.tick * pair.tick_s < now - began:
+            for channel, data in pair.advance():
+                with contextlib.suppress(BlockingIOError):
+                    os.write(masters[channel], data)
+                if channel == 1:
+                    told += [(time.monotonic(), float(deg)) for deg in TOLD.findall(data)]
+        until = began + (pair.tick + 1) * pair.tick_s
+        ready, _, _ = select.select(masters, [], [], max(0.0, until - time.monotonic()))
+        for master in ready:
+            data = os.read(master, 4096)
+            at = time.monotonic()
+            pair.receive(data, at, 0 if master == drive else 1)
+            for deg in map(float, RELAYED.findall(data) if master == drive else ()):
+                left = [left for left, angle_deg in told if abs(angle_deg - deg) < 0.4]
+                if left and at - began > SETTLES_S:
+                    took.append(at - left[-1])
+    results.send(took)
+
+
+def compute() -> None:
+    """For ever."""
+    while True:
+        sum(range(1000))
+
+
+def drive_for(seconds: float, ports: Sequence[str]) -> None:
+    """The driver's link, commanded at 20 Hz."""
+    settings = SessionSettings(
+        limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
+    )
+    session = Session(FejemisBoard(FejemisSettings()), settings, run=True)
+    opener: Callable[[], Several] = partial(
+        Several, [partial(SerialPort, port, 115200, "port") for port in ports]
+    )
+    link = Link(
+        session,
+        opener,
+        ports[0],
+        guard=False,
+        reconnect_interval_s=0.5,
+        deliver=lambda _events: None,
+        report=lambda _trouble: None,
+        failed=lambda error: print("failed:", error),
+    )
+    link.start()
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        with contextlib.suppress(CommandRefused):
+            link.call(lambda session, now: session.command_twist(BodyTwist(0.0, 0.0, 0.0), now))
+        time.sleep(0.05)
+    link.close("stop")
+
+
+def main() -> None:
+    """Measure, and print a line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--busy", type=int, default=0, help="processes that compute beside it")
+    arguments = parser.parse_args()
+    pairs = [os.openpty() for _ in range(2)]
+    for _, near in pairs:
+        tty.setraw(near)
+    context = multiprocessing.get_context("fork")
+    ours, theirs = context.Pipe()
+    masters = [master for master, _ in pairs]
+    others = [context.Process(target=compute, daemon=True) for _ in range(arguments.busy)]
+    both = context.Process(target=boards, args=(masters, arguments.seconds, theirs), daemon=True)
+    for process in (*others, both):
+        process.start()
+    drive_for(arguments.seconds - 1.0, [os.ttyname(near) for _, near in pairs])
+    took = ours.recv()
+    for process in (*others, both):
+        process.kill()
+    took_ms = sorted(1e3 * each for each in took)
+    tell = {part: took_ms[int(part / 100 * (len(took_ms) - 1))] for part in (50, 90, 99, 100)}
+    print(
+        f"{len(took_ms)} angles, {arguments.busy} busy processes: mean"
+        f" {statistics.mean(took_ms):.2f} ms; "
+        + ", ".join(f"{part} %: {value:.2f} ms" for part, value in tell.items())
+    )
+
+
+if __name__ == "__main__":
+    main()
