@@ -77,7 +77,7 @@ def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
 
 
 def compute() -> None:
-    """For ever."""
+    """Until it is killed."""
     while True:
         sum(range(1000))
 

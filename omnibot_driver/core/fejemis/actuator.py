@@ -2,8 +2,8 @@
 
 """Set-points for both boards at once: repeated, and said again as the front wheel turns.
 
-While the encoder holds the drive board back, each angle that is told may allow more of it; so the
-line is said anew with the angle, not only with the rate of repetition. Knows when a line is due;
+While the encoder holds the drive board back, each new angle may allow it more speed; so the lines
+are sent again with each angle, not only at the rate of repetition. Knows when a line is due;
 not what is in it.
 """
 

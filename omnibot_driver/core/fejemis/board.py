@@ -39,12 +39,12 @@ NO_POSE_S: Final = 0.25
 """A robot whose pose is older is driven no further."""
 FLOWS_S: Final = 0.5
 RELEASED_S: Final = 1.0
-"""After an e-stop ``start`` is repeated for so long, and that the board is stopped is no news."""
+"""How long ``start`` is repeated after an e-stop; a stopped board is expected meanwhile."""
 START_AGAIN_S: Final = 0.2
 UNHEARD_S: Final = 3.0
-"""A board that says nothing for so long from the beginning is missed."""
+"""A board that is silent for this time after the port was opened is reported."""
 TELL_EVERY_S: Final = 10.0
-"""The same thing is told so often at most."""
+"""The same notice is repeated no more often."""
 GEOMETRIES_DIFFER_M: Final = 0.002
 
 
@@ -189,7 +189,7 @@ class FejemisBoard(Board):
     # Inbound
 
     def connect(self) -> None:
-        """The lines are new; nothing turns that nobody asked for since."""
+        """The lines are new: brush and lift are off, and both boards are configured again."""
         self._forget()
         self._ports.begin(self._settings)
         self._translation.connect()
@@ -204,7 +204,7 @@ class FejemisBoard(Board):
         self._polls[role].begin()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """What these bytes tell."""
+        """The readings that these bytes complete."""
         self._open(now)
         half = self._ports.halves[channel]
         for message in half.feed(data, now):
@@ -215,7 +215,7 @@ class FejemisBoard(Board):
         if half.not_understood(now):
             self._tell(
                 f"many lines from the {self._ports.role(channel)} board are damaged or not"
-                " understood: check the cable, and whether somebody has asked it for help text",
+                " understood: check the cable, and whether another program asks it for help text",
                 now,
                 halt=False,
             )
@@ -227,7 +227,7 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
-        """The lines are closed: half a line is none, and whoever waits for a job is answered."""
+        """The lines are closed: half a line is dropped, and a job is answered."""
         self._open(now)
         for half in self._ports.halves:
             half.decoder.flush(now)

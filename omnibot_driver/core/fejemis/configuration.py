@@ -45,7 +45,7 @@ class Configuration:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self.turned = False
-        """``confs`` is told in the order in which it is written, not as the help text has it."""
+        """``confs`` is sent in the order in which it is written, not in that of the help text."""
         self.written = written
         self.begin()
 

@@ -23,7 +23,7 @@ from omnibot_driver.core.fejemis.sums import without_sum
 LONGEST_LINE: Final = 200
 """Characters, as the boards' own buffers hold."""
 CHANGED_AFTER: Final = 2
-"""So many heartbeats in a row have or lack a sum before that is believed: one may be damaged."""
+"""Heartbeats in a row that must have, or lack, a sum: one alone may be damaged."""
 
 
 @dataclass(slots=True)
@@ -40,8 +40,8 @@ class FejemisDecoder:
     """One board's line. ``sums``: whether its lines have sums; None while that is not known.
 
     ``changed``: they began or ceased to, since it was set to False last. ``doubtful``: the last
-    line was otherwise, so what is said without a sum is understood sooner. ``contradicted``: it was
-    otherwise than it was set.
+    line was of the other form, so lines to the board go without a sum. ``contradicted``: it was of
+    another form than was set.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:

@@ -62,7 +62,7 @@ class Pair(Protocol):
 
 
 class Encoder:
-    """``held``: the drive board is told less than commanded until the front wheel stands right.
+    """``held``: the drive board gets less than commanded until the front wheel stands right.
 
     ``restless``: the lines are worth saying again with each angle: while it is held, or where no
     sum protects them, so that a damaged one is obeyed for 15 ms instead of a whole repetition.

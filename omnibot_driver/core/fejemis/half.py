@@ -41,7 +41,7 @@ AGAIN_S: Final = 0.5
 MANY: Final = 30
 """Lines in a second that are not understood, of some hundred."""
 SILENT_S: Final = 1.5
-"""A board that says nothing for so long is not known to be there."""
+"""A board that is silent for this time is taken to be gone."""
 _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 
 
@@ -138,7 +138,7 @@ class Half:
             wanted |= {key: STREAMS["drive"][key] for key in TOGETHER}
         texts = [f"sub {key} {period}".encode("ascii") for key, period in wanted.items()]
         if not self._left:
-            self._left = True  # what somebody else has subscribed would only fill the line
+            self._left = True  # subscriptions of another program would only fill the line
             every = (f"sub {key} {period}" for key, period in STREAMS[self.role].items())
             return [b"leave", *(text.encode("ascii") for text in every)]
         return texts

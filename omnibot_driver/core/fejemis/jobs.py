@@ -21,9 +21,9 @@ CALIBRATION_S: Final = 1.2
 """A calibration averages for about a second."""
 AGAIN_S: Final = 0.4
 SAID: Final = 3
-"""What may be repeated is said so often."""
+"""How often a request is sent that may be repeated."""
 UNCHANGED_S: Final = 4.0
-"""Offsets that are still the same after so long were right before."""
+"""Offsets that have not changed by then were right before."""
 
 Lines = dict[Role, list[bytes]]
 OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {

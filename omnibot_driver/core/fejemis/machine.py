@@ -17,7 +17,7 @@ OFF: Final = (b"motv 0 0", b"brush 0")
 TIMES: Final = 3
 BETWEEN_S: Final = 0.1
 BRUSH_AGAIN_S: Final = 1.0
-"""A brush that turns is told so again, as a line may be lost."""
+"""How often ``brush 1`` is repeated while it turns: a line may be lost."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_TIME_S: Final = 0.04

@@ -24,7 +24,7 @@ ANGLE_WITHIN_RAD: Final = 0.003
 SLOWEST: Final = 30.0
 """A line to the drive board has at least such a part of the outer wheel's speed."""
 SCALES: Final = 4.0
-"""A line to the front board has up to so many times, or a part of, the numbers commanded."""
+"""Numbers for the front board are at most four times those commanded, at least a quarter."""
 
 
 @lru_cache(maxsize=512)

@@ -4,7 +4,7 @@
 
 A sum mod 99 does not see two lost characters whose codes add up to 99 or 198 (`0` and `3`, `1` and
 `2`, `.` and `5`, `-` and `6`): a motion line must not have both of a pair, see `motion_lines.py`.
-What is left to do for every line are spaces at its end, which choose its sum:
+Spaces at the end of every line choose its sum, against two more kinds of damage:
 
 * A lost line end makes one line of two. It passes if the sum of the second, with its prefix, equals
   what else was lost: so no such sum may be the code of a character of a number.
@@ -26,7 +26,7 @@ _COMPLEMENTS: Final = tuple(
     if one <= other and (one + other) % MODULUS == 0
 )
 LONGEST_PADDING: Final = 98
-"""With so many spaces every sum occurs."""
+"""Spaces with which every sum occurs."""
 
 
 @lru_cache(maxsize=1024)

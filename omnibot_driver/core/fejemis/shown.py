@@ -13,7 +13,7 @@ from omnibot_driver.core.fejemis.polls import Polls
 from omnibot_driver.core.fejemis.ports import ROLES, Ports
 
 SHOWN: Final = 3
-"""So many of the lines that a board did not know, the latest."""
+"""How many of the latest lines that a board did not know are shown."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 

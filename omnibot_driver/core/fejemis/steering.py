@@ -1,14 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From a body twist to what each board is told, so that the body moves so.
+"""From a body twist to the commands for both boards that move the body so.
 
 The drive board does not do what ``rc`` says: its outer wheel turns with the root of v² + w²,
 about the centre that the *measured* front angle gives. So both are multiplied by
 (`|v|` + `|w|`·B/2) / sqrt(v² + w²), which makes that root the speed of the outer wheel.
 
-While the front wheel is on its way the drive board is told less: as much as moves the body neither
-faster nor turns it quicker than commanded. A turn on the spot begins when the wheel is across;
-until then the drive board is told to stand. Knows geometry and angles; not how they are said.
+While the front wheel is on its way the drive board gets less: as much as moves the body no faster
+and turns it no quicker than commanded. A turn on the spot begins when the wheel is across; until
+then the drive board is commanded to stand. Knows geometry and angles, not lines.
 """
 
 import math
@@ -27,7 +27,7 @@ STILL_ALIGNED_RAD: Final = math.radians(10.0)
 GIVEN_RAD: Final = math.radians(5.0)
 """What a body may do besides while its wheel is on the way: as if it were off by this angle."""
 FOLLOWS_WITHIN_S: Final = 1.0
-"""A front wheel that comes no nearer to its angle for so long does not follow."""
+"""A front wheel that gets no nearer to its angle within this time does not follow."""
 NEARER_RAD: Final = math.radians(1.0)
 FOLLOWS_RAD: Final = math.radians(12.0)
 
@@ -78,7 +78,7 @@ def outer_mps(twist: BodyTwist, track_m: float) -> float:
 def steer(
     wanted: BodyTwist, geometry: Geometry, angle_rad: float | None, *, turning: bool
 ) -> Steered:
-    """What to tell. ``angle_rad``: of the front wheel, None where it is not known.
+    """What to command. ``angle_rad``: of the front wheel, None while it is unknown.
 
     ``turning``: whether the body turns on the spot already.
     """
@@ -112,7 +112,7 @@ def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTw
 def told_twist(
     speed_mps: float, turn_radps: float, geometry: Geometry, angle_rad: float
 ) -> BodyTwist:
-    """Of a body whose drive board is told this, by the manual's equations."""
+    """Of a body whose drive board gets this command, by the manual's equations."""
     outer = math.copysign(math.hypot(speed_mps, turn_radps), speed_mps)
     return body_twist(outer, geometry, angle_rad)
 

@@ -37,7 +37,7 @@ from omnibot_driver.core.readings import ExtraReading, ImuReading, NoticeReading
 
 TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
-"""A low battery is told so often."""
+"""How often a low battery is reported."""
 PERIOD_S: Final = 0.03
 """The orientation is of a sample of the IMU that is no older."""
 

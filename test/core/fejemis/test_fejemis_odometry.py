@@ -123,7 +123,7 @@ def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) ->
 
 
 def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
-    """Somebody has said ``enc0``: the robot is where it was."""
+    """Another program has sent ``enc0``: the robot is where it was."""
     drive = Drive()
     drive.run(0.5, 0.2, 4.0)
     before = drive.out

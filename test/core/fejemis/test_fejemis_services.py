@@ -90,7 +90,7 @@ def test_a_job_is_answered_when_the_port_is_lost() -> None:
 
 
 def test_a_robot_that_rolls_is_not_calibrated() -> None:
-    """Nobody commands it any more, and it still moves."""
+    """It is commanded to stand, and still moves."""
     bench = nominal()
     bench.drive_on(0.5)
     bench.drive(0.0)

@@ -191,7 +191,7 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 
 
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
-    """Whoever says it."""
+    """In each of the three ways."""
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()
         bench.board.set_brush(True, bench.now)
