@@ -61,8 +61,9 @@ class Several:
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """Of all lines; None in the place of one that is not open."""
-        return tuple(line.descriptor for line in self._lines)
+        """Of all lines; None in the place of one that is missing, be it open still: whoever shared
+        it would keep it from being opened again."""
+        return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
     @property
     def missing(self) -> Mapping[int, str]:

@@ -152,6 +152,18 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
     assert list(changed(lines)) == [0]
 
 
+def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
+    ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A guard that held it open would hold its lock too."""
+    os.set_blocking(ends.near[0], False)
+    fill(ends.near[0])
+    monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
+    lines.write(((0, b"old"),))
+    assert lines.descriptors is not None
+    assert [one is None for one in lines.descriptors] == [True, False]
+
+
 def test_what_a_full_line_does_not_take_at_once_follows_in_order(
     ends: Ends, lines: Several
 ) -> None:
