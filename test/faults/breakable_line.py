@@ -74,7 +74,7 @@ def late(ticks: int) -> Damage:
 
 
 class BreakableLine:
-    """A board as its terminal sees it: ``receive`` and ``step`` go through damage.
+    """A board as its terminal sees it: ``receive`` and ``advance`` go through damage.
 
     ``sent``: every frame and text the board sent, whole or damaged later; ``driven_at``: the last
     tick in which its motors had a command to turn.
@@ -100,13 +100,12 @@ class BreakableLine:
     def receive(self, data: bytes, at_s: float | None = None, channel: int = 0) -> None:
         self.board.receive(self.to_board(data), at_s, channel)
 
-    def step(self) -> bytes:
-        data = self.board.step()
+    def advance(self) -> list[Packet]:
+        packets = self.board.advance()
         self.sent += self._kind.sent(self.board)
         if self.board.driven:
             self.driven_at = self.board.tick
-        return self.from_board(data)
-
-    def advance(self) -> list[Packet]:
-        data = self.step()
-        return [(0, data)] if data else []
+        if len(self.channels) == 1:  # damage may say something where the board says nothing
+            packets = [(0, b"".join(data for _, data in packets))]
+        arrived = [(channel, self.from_board(data)) for channel, data in packets]
+        return [(channel, data) for channel, data in arrived if data]

@@ -36,7 +36,7 @@ from walk import walk
 
 DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "internals" / "faults.md"
 BEGIN, END = "<!-- campaign: begin -->", "<!-- campaign: end -->"
-BOARDS: Final = ("omnibot", "lois_ecu")
+BOARDS: Final = ("omnibot", "lois_ecu", "fejemis")
 ROUNDS: Final = 2
 WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
@@ -173,12 +173,14 @@ class Campaign(Outcome):
     def _one_life(
         self, kind: type[Rig], cases: Callable[[int], dict[str, Case[Any]]], *, damaged_bytes: bool
     ) -> None:
-        rows = {name: self.row(name) for name in cases(0) if name not in self._kind.without}
+        own = dict(self._kind.cases) if kind is Rig else {}
+        names = {**cases(0), **own}
+        rows = {name: self.row(name) for name in names if name not in self._kind.without}
         with self.rig(kind) as rig:
             self.run(Row("warm-up"), lambda rig: rig.wait_ticks(100), rig)
             descriptors, memory = rig.cost()
             for number in range(ROUNDS):
-                for name, case in cases(number).items():
+                for name, case in {**cases(number), **own}.items():
                     if name in rows:
                         self.run(rows[name], case, rig)
             self.judge(rig, damaged_bytes=damaged_bytes)

@@ -286,7 +286,7 @@ def driver_hangs(rig: Rig) -> None:
 def second_driver(rig: Rig) -> None:
     """On the same port: refused, and the first one does not notice."""
     rig.drive()
-    with Driver(port=rig.port, **rig.kind.parameters) as other:
+    with Driver(**rig.ports, **rig.kind.parameters) as other:
         said = other.wait_for_line("is in use")
         rig.findings.expect(
             str(rig.driver.process.pid) in said, f"the owner's pid is not in: {said}"

@@ -104,7 +104,7 @@ class Rig:
         self.plug()
         self._stack.callback(self.unplug)
         self.driver = self._stack.enter_context(
-            Driver(port=self.port, before=self._before, **self._parameters)
+            Driver(before=self._before, **self.ports, **self._parameters)
         )
         self.probe = self._stack.enter_context(Probe(self.driver.namespace))
         self.imu = self.probe.listen(Imu, "imu/data_raw") if self.kind.imu else []
@@ -125,6 +125,11 @@ class Rig:
         return stick
 
     # The line
+
+    @property
+    def ports(self) -> dict[str, str]:
+        """The driver's parameters that name them."""
+        return dict(self.kind.ports(self.port))
 
     @property
     def terminal(self) -> Terminal:
@@ -148,7 +153,7 @@ class Rig:
         """A new terminal, hardly of the old name, behind the old link."""
         if self._unplugged_at_s is not None:
             for _ in range(round((time.monotonic() - self._unplugged_at_s) / TICK_S)):
-                self.line.step()
+                self.line.advance()
         self._terminal = self._make_terminal().__enter__()
 
     def _make_terminal(self) -> Terminal | Server:
@@ -192,7 +197,7 @@ class Rig:
         mark = len(self._diagnostics)
         self.probe.wait_for(
             lambda: any(
-                status.hardware_id == self.port and re.search(pattern, status.message)
+                status.hardware_id == self.ports["port"] and re.search(pattern, status.message)
                 for message in self._diagnostics[mark:]
                 for status in message.status
             )

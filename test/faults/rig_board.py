@@ -23,6 +23,9 @@ class RigBoard:
     ``deaf_s``: how long it may miss what is said on one line, so that the next one has to tell it.
     ``imu``: whether it sends readings of one.
 
+    ``ports``: the driver's parameters that name its ports, by the link to the terminal; ``cases``:
+    faults that this board alone has.
+
     ``sent``: the frames of its last tick; ``not_sent``: of what was published, by kind, how many
     messages were never sent, and of how many. ``lossy``: settings of board number n for a line that
     loses bytes. ``without``: faults that do not apply, and pieces of the campaign.
@@ -31,6 +34,8 @@ class RigBoard:
     name: str
     make: Callable[[Any], Any]
     parameters: Mapping[str, object] = field(default_factory=dict)
+    ports: Callable[[str], Mapping[str, str]] = lambda link: {"port": link}
+    cases: Mapping[str, Callable[[Any], object]] = field(default_factory=dict)
     old_command: bytes
     stop: bytes
     opening: bytes

@@ -11,7 +11,7 @@ from other_rigs import NetworkRig
 from rig import TIMEOUT_S, Rig
 from std_srvs.srv import SetBool
 
-TAKES_NOTHING: Final = "lost .* while writing: it has accepted no data"
+TAKES_NOTHING: Final = "(lost .* while writing|is missing): it has accepted no data"
 LOST: Final = "lost .*retrying"
 
 

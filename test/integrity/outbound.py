@@ -22,7 +22,7 @@ from outbound_runs import RECEIVERS, SCRIPTS, Scores, over, run
 from outbound_scenes import DRIVES, SCENES
 
 DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "internals" / "integrity.md"
-WITH_SUMS: Final = ("lois_ecu",)
+WITH_SUMS: Final = ("lois_ecu", "fejemis")
 """Boards that drop what was damaged on the way to them."""
 BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"
 

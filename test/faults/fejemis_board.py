@@ -1,0 +1,135 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The Fejemis, for the campaign: two ports, lines of text with sums, one robot.
+
+What it sends comes of two boards at rhythms of their own, so no message is compared with what was
+sent. It has no wheel command and no reset.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from rig import Rig
+from rig_board import RigBoard
+
+from omnibot_driver.simulator.common.board import Packet
+from omnibot_driver.simulator.fejemis import CHANNELS, FejemisSettings, SimulatedFejemis
+
+TICKS: Final = 5
+"""Of the simulated boards, in one of the rig's."""
+SILENCE_S: Final = 1.6
+ANGLE_S: Final = 0.2
+DRIVE, FRONT = 0, 1
+
+
+class Pair:
+    """Both Teensys as one board with the ticks of the rig. ``received``: by the drive half."""
+
+    channels = CHANNELS
+
+    def __init__(self, settings: FejemisSettings | None) -> None:
+        self.pair = SimulatedFejemis(settings)
+        self.tick = 0
+        self.deaf = [False, False]
+
+    @property
+    def received(self) -> bytearray:
+        return self.pair.drive.received
+
+    @property
+    def driven(self) -> bool:
+        return self.pair.drive.speeds_mps != (0.0, 0.0)
+
+    def receive(self, data: bytes, at_s: float | None = None, channel: int = 0) -> None:
+        self.pair.receive(data, at_s or 0.0, channel)
+
+    def advance(self) -> list[Packet]:
+        self.tick += 1
+        return [packet for _ in range(TICKS) for packet in self.pair.advance()]
+
+    def reboot(self) -> None:
+        self.pair.reboot()
+
+    @property
+    def facts(self) -> Mapping[str, object]:
+        return self.pair.facts
+
+
+def _befall(rig: Rig, half: str, what: str) -> None:
+    with rig.terminal.lock:
+        rig.line.board.pair.befall(half, what)
+
+
+def half_is(half: str, what: str, allowed_s: float) -> Any:
+    """One half alone; somebody drives on, in vain until it is well."""
+
+    def case(rig: Rig) -> None:
+        rig.drive()
+        since = rig.line.tick
+        _befall(rig, half, what)
+        if allowed_s:
+            rig.expect_still(since, f"{half} is {what}", allowed_s)
+        else:
+            rig.probe.wait_for_state("connecting")
+        rig.hand.leave()
+        _befall(rig, half, "well")
+        _befall(rig, half, "sensor-well") if half == "front" else None
+        rig.probe.wait_for_state("nominal")
+        rig.expect_still(rig.line.tick, f"{half} is well again", 0.5)
+
+    return case
+
+
+CASES: Final = {
+    "the drive half falls silent, and obeys": half_is("drive", "silent", SILENCE_S),
+    "the drive half restarts": half_is("drive", "restart", ANGLE_S),
+    "the cable of the drive half is out (it drives on until it is in)": half_is(
+        "drive", "unplugged", 0.0
+    ),
+    "the drive half hangs (it drives on until it lives)": half_is("drive", "hung", 0.0),
+    "the front half falls silent, and obeys": half_is("front", "silent", ANGLE_S),
+    "the front half restarts": half_is("front", "restart", ANGLE_S),
+    "the cable of the front half is out": half_is("front", "unplugged", ANGLE_S),
+    "the front half hangs": half_is("front", "hung", ANGLE_S),
+    "the angle sensor is broken (Hall element)": half_is("front", "hall-broken", ANGLE_S),
+    "the angle sensor tells an error": half_is("front", "sensor-error", ANGLE_S),
+    "the angle sensor is absent": half_is("front", "sensor-absent", ANGLE_S),
+}
+
+
+BOARD: Final = RigBoard(
+    name="fejemis",
+    make=Pair,
+    parameters={"board": "fejemis"},
+    ports=lambda link: {"port": f"{link}-drive", "front_port": f"{link}-front"},
+    old_command=b";07rc 2 0.4 0\n",
+    stop=b";92rc 2 0 0 \n",
+    opening=b"\nrc 2 0 0",
+    wheels=2,
+    services=frozenset({"start", "pause", "reset_odometry", "estop"}),
+    tuning=(
+        "max_linear_speed",
+        "max_angular_speed",
+        "max_linear_acceleration",
+        "cmd_vel_timeout",
+        "command_rate",
+        "reconnect_interval",
+    ),
+    imu=True,
+    cases=CASES,
+    without=frozenset(
+        {
+            "wheel_cmd has the wrong size",
+            "~/reset",
+            "full for long, and told once",  # each attempt hears the board for a moment
+            "e-stop into a full port",  # judged by the OmniBot's frames
+            "faults_of_the_network",
+            "faults_of_goals",
+            "goal_ending",
+            "random_input",
+            "walk",
+            "walk_with_goals",
+            "busy_computer",
+        }
+    ),
+)

@@ -1,0 +1,210 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The Fejemis's part of ``make integrity``: its published values on lines that lose or add bytes.
+
+A simulated pair, which shares no code with the driver, is driven in curves by a session of its own;
+what both boards say then is played to another session, whole and damaged. A value is wrong that the
+whole lines did not bring. Odometry goes on from what is left, so it is judged by its distance from
+where the whole lines had it.
+"""
+
+import os
+from bisect import bisect_left
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from functools import partial
+from multiprocessing import Pool
+from random import Random
+from typing import Final
+
+from carriage import FAULTS, Fault
+
+from omnibot_driver.boards import check_all, load
+from omnibot_driver.core.events import Event, Extra
+from omnibot_driver.core.fejemis import OrientedImuReading
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.session import Session
+from omnibot_driver.parameters import session_settings
+from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
+
+TICKS: Final = 5
+"""Of the simulated boards, in one read."""
+READ_S: Final = 0.01
+SETTLED_S: Final = 3.0
+STEER_EVERY_S: Final = 1.0
+SUMS: Final = (True, False)
+BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 10_000)}
+"""With sums: the least delivered, as a part, and one wrong in how many at most; 0: none."""
+ASTRAY_M: Final = 0.02
+
+Stream = list[dict[int, bytes]]
+"""What comes in each read, by channel."""
+
+
+@dataclass(slots=True)
+class Score:
+    """Counts; they add up. ``sent``: values of the whole lines. ``astray_m``: the largest."""
+
+    sent: int = 0
+    out: int = 0
+    wrong: int = 0
+    odometry: int = 0
+    astray_m: float = 0.0
+
+    def __iadd__(self, other: "Score") -> "Score":
+        for name in (field.name for field in fields(self)):
+            join = max if name == "astray_m" else float.__add__
+            mine, theirs = getattr(self, name), getattr(other, name)
+            setattr(self, name, type(mine)(join(float(mine), float(theirs))))
+        return self
+
+
+def session() -> Session:
+    """With the defaults, and without limits that would refuse what is driven."""
+    values = check_all({"board": "fejemis", "motion_monitor": False})
+    profile = load("fejemis")
+    settings = session_settings(values, profile.kinematics(values))
+    return Session(profile.make(values), settings, run=True)
+
+
+def drive(sums: bool, seed: int, seconds: float) -> Stream:
+    """What a pair sends that is driven by another twist each second."""
+    random = Random(f"{sums} {seed}")
+    firmware = Firmware(sums=sums)
+    pair = SimulatedFejemis(FejemisSettings(firmware=firmware, seed=seed, front_m=4.0))
+    ours, now, stream = session(), 1000.0, []
+    ours.opened(now)
+    twist = BodyTwist(0.0, 0.0, 0.0)
+    for read in range(round(seconds / READ_S)):
+        now += READ_S
+        if read * READ_S > SETTLED_S and read % round(STEER_EVERY_S / READ_S) == 0:
+            twist = BodyTwist(random.uniform(0.1, 0.4), 0.0, random.uniform(-0.4, 0.4))
+        if read % 10 == 0 and ours.state == "nominal":
+            ours.command_twist(twist, now)
+        packets = [packet for _ in range(TICKS) for packet in pair.advance()]
+        both = {channel: b"".join(d for c, d in packets if c == channel) for channel in (0, 1)}
+        stream.append(both)
+        for channel, data in both.items():
+            if data:
+                ours.receive(data, now, channel)
+        if now >= ours.wake_at:
+            ours.tick(now)
+        for channel, data in ours.take_output(now):
+            pair.receive(data, now, channel)
+        ours.take_events()
+    return stream
+
+
+def play(stream: Stream) -> Iterator[Event]:
+    """What is published of it."""
+    ours, now = session(), 1000.0
+    ours.opened(now)
+    for both in stream:
+        now += READ_S
+        for channel, data in both.items():
+            if data:
+                ours.receive(data, now, channel)
+        if now >= ours.wake_at:
+            ours.tick(now)
+        ours.take_output(now)
+        yield from ours.take_events()
+
+
+def damaged(stream: Stream, fault: Fault, random: Random) -> Stream:
+    """The same, less the bytes that are lost, with those that are added."""
+    result: Stream = [{} for _ in stream]
+    for channel in (0, 1):
+        whole = b"".join(both[channel] for both in stream)
+        ends, at = [], 0
+        for both in stream:
+            at += len(both[channel])
+            ends.append(at)
+        pieces, number = [bytearray() for _ in stream], 0
+        for origin in fault(len(whole), random):
+            while origin >= 0 and origin >= ends[number]:
+                number += 1
+            pieces[number].append(whole[origin] if origin >= 0 else random.randrange(256))
+        for both, piece in zip(result, pieces, strict=True):
+            both[channel] = bytes(piece)
+    return result
+
+
+def value_of(event: Event) -> str | None:
+    """What it says, without its stamp; None where that is not judged by itself."""
+    if isinstance(event, ImuEstimate):
+        return f"imu {event.specific_force} {event.angular_velocity}"
+    if isinstance(event, Extra) and isinstance(event.value, OrientedImuReading):
+        return f"orientation {event.value.orientation}"  # with the last sample that came
+    if isinstance(event, Extra):
+        return repr(event.value)
+    return None
+
+
+def score(truth: list[Event], found: list[Event]) -> Score:
+    """Each value once for each time that it was sent."""
+    left = Counter(filter(None, map(value_of, truth)))
+    result = Score(sent=sum(left.values()))
+    for value in filter(None, map(value_of, found)):
+        result.out += 1
+        left[value] -= 1
+        result.wrong += left[value] < 0
+    places = [event for event in truth if isinstance(event, OdometryEstimate)]
+    stamps = [place.stamp_s for place in places]
+    for event in found:
+        at = bisect_left(stamps, event.stamp_s) if isinstance(event, OdometryEstimate) else 0
+        if isinstance(event, OdometryEstimate) and 0 < at < len(places):
+            result.odometry += 1
+            near = min(places[at - 1 : at + 1], key=lambda p: abs(p.stamp_s - event.stamp_s))
+            a, b = near.pose, event.pose
+            off_m = ((a.x_m - b.x_m) ** 2 + (a.y_m - b.y_m) ** 2) ** 0.5
+            result.astray_m = max(result.astray_m, off_m)
+    return result
+
+
+def one(seconds: float, job: tuple[bool, int]) -> dict[tuple[str, bool], Score]:
+    """One stream with each fault."""
+    sums, seed = job
+    stream = drive(sums, seed, seconds)
+    truth = list(play(stream))
+    return {
+        (fault, sums): score(
+            truth, list(play(damaged(stream, line, Random(f"{sums} {seed} {fault}"))))
+        )
+        for fault, line in FAULTS.items()
+        if not fault.startswith("none")
+    }
+
+
+def measure(seconds: float, seeds: range) -> tuple[list[str], bool]:
+    """Rows of the table, and whether every bound holds."""
+    jobs = [(sums, seed) for seed in seeds for sums in SUMS]
+    total: dict[tuple[str, bool], Score] = {}
+    with Pool(os.cpu_count()) as pool:
+        for scores in pool.imap_unordered(partial(one, seconds), jobs):
+            for key, found in scores.items():
+                total.setdefault(key, Score()).__iadd__(found)
+    lines = [
+        f"{len(seeds)} drives of {seconds:g} s, with sums and without:",
+        "",
+        "| fault | lines | values delivered | values wrong | odometry off by at most | bound | |",
+        "|---" * 7 + "|",
+    ]
+    all_hold = True
+    for (fault, sums), found in total.items():
+        least, one_in = BOUNDS.get(fault, (0.0, 0)) if sums else (0.0, 0)
+        delivered = (found.out - found.wrong) / max(1, found.sent)
+        few = found.wrong * one_in <= found.out if one_in else not found.wrong
+        holds = not least or (few and delivered >= least and found.astray_m < ASTRAY_M)
+        all_hold &= holds
+        most = f"1 wrong in {one_in:,}" if one_in else "none wrong"
+        bound = f"{most}, {least:.0%} delivered, {1e3 * ASTRAY_M:g} mm" if least else "none"
+        wrong = f"1 in {found.out / found.wrong:,.0f}" if found.wrong else f"0 of {found.out:,}"
+        with_sums = "with sums" if sums else "without sums"
+        lines.append(
+            f"| {fault} | {with_sums} | {delivered:.2%} | {wrong} | {1e3 * found.astray_m:.0f} mm |"
+            f" {bound} | {'holds' if holds else '**missed**'} |"
+        )
+    return lines, all_hold
