@@ -58,6 +58,13 @@ class FrontWheel:
         self._doubted_deg: float | None = None
 
     @property
+    def trouble(self) -> str:
+        """What is wrong with the sensor, in a sentence; empty while it works."""
+        if not self.fault:
+            return ""
+        return f"the angle sensor of the front wheel reports: {self.fault}; check sensor and magnet"
+
+    @property
     def stale_at(self) -> float:
         """When the angle is too old, unless another comes."""
         return self.heard_at + OLDEST_S + 1e-6

@@ -150,7 +150,7 @@ def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]
     bench.estop(False)
     bench.run(3.0)
     assert not bench.robot.vehicle.brush
-    assert not bench.board._machine.active
+    assert not bench.board._upkeep.machine.active
 
 
 def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:

@@ -1,0 +1,43 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a user is told of this robot: each sentence at most once in a while.
+
+Knows sentences and times. A stop is never left out, only its sentence.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.readings import NoticeReading
+
+TELL_EVERY_S: Final = 10.0
+"""The same notice is repeated no more often."""
+
+
+class Told:
+    """``notices``: those that were not taken yet."""
+
+    def __init__(self) -> None:
+        self.notices: list[NoticeReading] = []
+        self._told_at: dict[str, float] = {}
+
+    def halt(self, text: str, now: float) -> None:
+        """The robot is stopped, and why."""
+        self.notices.append(NoticeReading(self._news(text, now), halt=True))
+
+    def tell(self, text: str, now: float) -> None:
+        """Something that stops nothing."""
+        if text := self._news(text, now):
+            self.notices.append(NoticeReading(text, halt=False))
+
+    def remark(self, text: str) -> None:
+        """Something that is told once."""
+        if text not in self._told_at:
+            self._told_at[text] = math.inf
+            self.notices.append(NoticeReading(f"{text} (said once)", halt=False))
+
+    def _news(self, text: str, now: float) -> str:
+        if now - self._told_at.get(text, -math.inf) < TELL_EVERY_S:
+            return ""
+        self._told_at[text] = now
+        return text

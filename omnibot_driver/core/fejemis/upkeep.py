@@ -1,0 +1,137 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What keeps both boards talking and configured, and what is asked of them besides motion.
+
+Composes subscriptions, polls, configuration, jobs and what turns on the front board. Knows which of
+them has something to send; not what is made of the answers.
+"""
+
+from typing import Final
+
+from omnibot_driver.core.fejemis.configuration import Configuration
+from omnibot_driver.core.fejemis.half import Half, Role
+from omnibot_driver.core.fejemis.jobs import Jobs
+from omnibot_driver.core.fejemis.machine import Machine
+from omnibot_driver.core.fejemis.messages import Message
+from omnibot_driver.core.fejemis.polls import Polls
+from omnibot_driver.core.fejemis.ports import ROLES, Ports
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.fejemis.steering import Geometry
+
+GEOMETRIES_DIFFER_M: Final = 0.002
+
+
+class Upkeep:
+    """``machine``: brush, lift, lights; ``jobs``: one at a time; the rest by role."""
+
+    def __init__(self, ports: Ports, settings: FejemisSettings) -> None:
+        self._ports, self._settings = ports, settings
+        self.machine, self.jobs = Machine(), Jobs()
+        self.configurations = {role: Configuration(role, settings.written) for role in ROLES}
+        self.polls = {role: Polls(role) for role in ROLES}
+
+    def configure(self, settings: FejemisSettings) -> None:
+        """Other settings; what is written to the boards follows while the robot stands."""
+        self._settings = settings
+        for configuration in self.configurations.values():
+            configuration.configure(settings.written)
+
+    def begin(self) -> None:
+        """The lines are new: all is off, and both boards are read and configured again."""
+        self.machine.off()
+        self.jobs.begin()
+        for role in ROLES:
+            self._begin(role)
+
+    def restarted(self, role: Role) -> None:
+        """A board forgot what was not saved; what turned is off, and stays so."""
+        self._begin(role)
+        self.machine.begin()
+        self.jobs.cancel(f"the {role} board has restarted")
+
+    def _begin(self, role: Role) -> None:
+        self.configurations[role].begin()
+        self.polls[role].begin()
+
+    @property
+    def geometry(self) -> Geometry:
+        """B and F, as the drive board computes with them where that is known."""
+        nominal = Geometry(self._settings.track_m, self._settings.wheelbase_m)
+        return self.configurations["drive"].geometry or nominal
+
+    def hear(self, role: Role, message: Message, now: float) -> None:
+        """What may answer any of them."""
+        configurations = self.configurations
+        self.jobs.hear(role, message, now)
+        configurations[role].hear(message)
+        self.polls[role].hear(message)
+        configurations["front"].turned = configurations["drive"].turned
+        if self.jobs.reload:
+            self.jobs.reload = False
+            for configuration in configurations.values():
+                configuration.begin()
+
+    @property
+    def wake_at(self) -> float:
+        """When ``due`` has something."""
+        times = [self.jobs.wake_at, self.machine.wake_at]
+        for half in self._ports.halves:
+            times.append(half.wake_at)
+            if half.role is not None and half.ready:
+                times += (self.configurations[half.role].wake_at, self.polls[half.role].wake_at)
+        return min(times)
+
+    def due(self, now: float, *, stands: bool) -> dict[Role, list[bytes]]:
+        """Lines to send now, to each board. ``stands``: no motion is commanded."""
+        texts: dict[Role, list[bytes]] = {"drive": [], "front": self.machine.due(now)}
+        for role, more in self.jobs.due(now).items():
+            texts[role] += more
+        for channel, half in enumerate(self._ports.halves):
+            texts[self._ports.role(channel)] += self._of_half(half, now, stands=stands)
+        return texts
+
+    def _of_half(self, half: Half, now: float, *, stands: bool) -> list[bytes]:
+        texts = half.due(now)
+        if half.role is not None and half.ready:
+            polls = self.polls[half.role]
+            polls.unknown(half.unknown_words)
+            texts += self.configurations[half.role].due(now, stands=stands)
+            texts += polls.due(now)
+        return texts
+
+    @property
+    def advice(self) -> str | None:
+        """What a user should set or update; None while all is well."""
+        for configuration in self.configurations.values():
+            if configuration.failed:
+                names = ", ".join(setting.command for setting in configuration.failed)
+                return (
+                    f"the {configuration.role} board does not keep what was written with {names};"
+                    " check the values, and its firmware"
+                )
+        for half in self._ports.halves:
+            if half.decoder.contradicted:
+                return (
+                    f"the lines of the {half.role} board contradict `line_sums`"
+                    f" ({self._settings.line_sums}): set it to auto"
+                )
+            if unknown := half.unknown_streams:
+                return (
+                    f"the firmware of the {half.role} board does not know {', '.join(unknown)}:"
+                    " what rests on it is missing; update the firmware"
+                )
+        one, other = (self.configurations[role].geometry for role in ROLES)
+        if one and other and _differ(one, other):
+            return (
+                "the boards are configured to different steering geometries (confs): drive has"
+                f" B {one.track_m:g} m and F {one.wheelbase_m:g} m, front has B {other.track_m:g} m"
+                f" and F {other.wheelbase_m:g} m; set both by the parameters of the geometry"
+            )
+        return None
+
+
+def _differ(one: Geometry, other: Geometry) -> bool:
+    return (
+        abs(one.track_m - other.track_m) > GEOMETRIES_DIFFER_M
+        or abs(one.wheelbase_m - other.wheelbase_m) > GEOMETRIES_DIFFER_M
+    )

@@ -1,0 +1,109 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the times say: a half that is silent, an angle or a pose that is too old to drive by.
+
+Knows when lines came; not what they say.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.fejemis.front_wheel import FrontWheel
+from omnibot_driver.core.fejemis.half import NEEDED, SILENT_S
+from omnibot_driver.core.fejemis.ports import PARAMETERS, Ports
+from omnibot_driver.core.fejemis.told import Told
+
+NO_POSE_S: Final = 0.25
+"""A robot whose pose is older is driven no further."""
+FLOWS_S: Final = 0.5
+UNHEARD_S: Final = 3.0
+"""A board that is silent for this time after the port was opened is reported."""
+SLACK_S: Final = 1e-6
+
+
+class Watch:
+    """``blind``: the angle of the front wheel is too old; ``unposed``: the pose is."""
+
+    def __init__(self, ports: Ports, front: FrontWheel, told: Told) -> None:
+        self._ports, self._front, self._told = ports, front, told
+        self.begin()
+
+    def begin(self) -> None:
+        """The lines are new."""
+        self.blind = self.unposed = False
+        self._begun_at = math.inf
+
+    def open(self, now: float) -> None:
+        """Input begins."""
+        self._begun_at = min(self._begun_at, now)
+
+    def look(self, now: float, *, driving: bool) -> bool:
+        """Halts what is to be stopped. Whether a half was lost."""
+        lost = [self._look_at(channel, now) for channel in (0, 1)]
+        self._look_at_age(now, driving=driving)
+        return any(lost)
+
+    @property
+    def wake_at(self) -> float:
+        """When an angle or a pose becomes too old."""
+        times = [math.inf]
+        drive = self._ports.half("drive")
+        if not self.blind:
+            times.append(self._front.stale_at)
+        if not self.unposed and drive is not None:
+            times.append(drive.came_at("pose") + NO_POSE_S + SLACK_S)
+        return min(times)
+
+    def _look_at(self, channel: int, now: float) -> bool:
+        half, parameter = self._ports.halves[channel], PARAMETERS[channel]
+        role = half.role
+        silent = now - half.heard_at > SILENT_S
+        if role is None:
+            other = self._ports.halves[1 - channel]
+            if silent and now - self._begun_at > UNHEARD_S and other.role is not None:
+                self._told.halt(
+                    f"nothing is heard from the {self._ports.role(channel)} board at"
+                    f" `{parameter}`; check its power and cable",
+                    now,
+                )
+            return False
+        unheard_s = now - half.came_at(NEEDED[role])
+        if unheard_s < FLOWS_S:
+            half.ready = half.heartbeat is not None
+        elif half.ready and unheard_s > SILENT_S:
+            what = "is silent" if silent else f"sends no `{NEEDED[role]}` any more"
+            self._told.halt(
+                f"the {role} board {what}; robot stopped. Check its power and the cable at"
+                f" `{parameter}`",
+                now,
+            )
+            half.subscribe_again()
+            return True
+        return False
+
+    def _look_at_age(self, now: float, *, driving: bool) -> None:
+        drive = self._ports.half("drive")
+        was_blind, was_unposed = self.blind, self.unposed
+        self.blind = not self._front.known(now)
+        self.unposed = drive is None or now - drive.came_at("pose") > NO_POSE_S
+        if not driving:
+            return
+        if fault := self._front.trouble:
+            self._told.halt(f"{fault}; robot stopped", now)
+        elif self.blind and not was_blind:
+            self._told.halt("no angle of the front wheel for 60 ms; robot stopped", now)
+        if self.unposed and not was_unposed:
+            self._told.halt("no pose from the drive board for 0.25 s; robot stopped", now)
+
+    @property
+    def refusal(self) -> str:
+        """Why the robot is not to be driven; empty if it may be."""
+        if trouble := self._ports.trouble or self._front.trouble:
+            return trouble
+        if self.blind:
+            return (
+                "nothing was heard of the angle of the front wheel for 60 ms; check the front board"
+            )
+        if self.unposed:
+            return "nothing was heard of the pose for 0.25 s; check the drive board and its cable"
+        return ""
