@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing import get_context
@@ -36,7 +36,7 @@ from walk import walk
 
 DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "internals" / "faults.md"
 BEGIN, END = "<!-- campaign: begin -->", "<!-- campaign: end -->"
-BOARDS: Final = ("omnibot", "lois_ecu", "fejemis")
+BOARDS: Final = ("omnibot", "lois_ecu", "mart", "fejemis")
 ROUNDS: Final = 2
 WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
@@ -146,7 +146,7 @@ class Campaign(Outcome):
 
     def faults_of_the_line(self) -> None:
         """Each fault in each round, in one driver's life."""
-        self._one_life(Rig, survivable, damaged_bytes=True)
+        self._one_life(Rig, self._kind.cases or survivable, damaged_bytes=True)
 
     def faults_of_the_network(self) -> None:
         self._one_life(NetworkRig, lambda _: NETWORK, damaged_bytes=False)
@@ -171,7 +171,11 @@ class Campaign(Outcome):
             )
 
     def _one_life(
-        self, kind: type[Rig], cases: Callable[[int], dict[str, Case[Any]]], *, damaged_bytes: bool
+        self,
+        kind: type[Rig],
+        cases: Callable[[int], Mapping[str, Case[Any]]],
+        *,
+        damaged_bytes: bool,
     ) -> None:
         own = dict(self._kind.cases) if kind is Rig else {}
         names = {**cases(0), **own}
@@ -299,7 +303,7 @@ def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
 def side_by_side(board: str, wanted: list[Piece], processes: int) -> Outcome:
     """Those that apply to the board. The longest come first."""
     total, without = Outcome(), load(board).without
-    wanted = [piece for piece in wanted if piece[0] not in without]
+    wanted = [piece for piece in wanted if without.isdisjoint((piece[0], *map(str, piece[1])))]
     with get_context("spawn").Pool(processes, maxtasksperchild=1) as pool:
         for outcome in pool.imap(partial(play, board), enumerate(wanted), chunksize=1):
             total.add(outcome)

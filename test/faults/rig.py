@@ -22,7 +22,7 @@ from commander import Hand, Stick
 from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import PATIENCE_S, Driver
 from nav_msgs.msg import Odometry
-from ports import Server, Terminal
+from ports import Terminal
 from probe import Probe
 from published import stamp_s
 from rig_board import RigBoard
@@ -85,12 +85,12 @@ class Rig:
         self._grace_s = grace_s + kind.off_within_s
         self._ends_within_s = ends_within_s + kind.ends_later_s
         self._before, self._parameters = before, {**kind.parameters, **parameters}
-        self.line = BreakableLine(kind, settings)
+        self.line: Any = (kind.line or BreakableLine)(kind, settings)
         self.findings = Findings()
-        self.port = str(folder / "omnibot")
+        self.port = kind.port(folder)
         self._stack = ExitStack()
         self._unplugged_at_s: float | None = None
-        self._terminal: Terminal | Server | None = None
+        self._terminal: Any = None
 
     def __enter__(self) -> Self:
         try:
@@ -156,8 +156,15 @@ class Rig:
                 self.line.advance()
         self._terminal = self._make_terminal().__enter__()
 
-    def _make_terminal(self) -> Terminal | Server:
-        return Terminal(self.line, self.port)  # type: ignore[arg-type]
+    @property
+    def terminal_lock(self) -> Any:
+        """Held while something is done to the board."""
+        return self._terminal.lock
+
+    def _make_terminal(self) -> Any:
+        if self.kind.serve is not None:
+            return self.kind.serve(self.line, self.port)
+        return Terminal(self.line, self.port)
 
     def reboot_board(self) -> None:
         """A power cycle."""
@@ -246,7 +253,9 @@ class Rig:
             self.findings.expect(seconds > 0, f"stamps of odom {seconds:g} s apart")
             a, b = before.pose.pose.position, after.pose.pose.position
             step_m = math.hypot(b.x - a.x, b.y - a.y)
-            possible = step_m <= FASTEST_MPS * max(seconds, 0.04) + 0.005
+            c = before.pose.covariance
+            doubt_m = self.kind.jump_stddevs * math.sqrt(c[0] + c[7])
+            possible = step_m <= FASTEST_MPS * max(seconds, 0.04) + 0.005 + doubt_m
             zeroed = (
                 math.hypot(b.x, b.y) < 0.05 + DRIVEN_MPS * seconds
                 and after.pose.covariance[0] < NEW_VARIANCE + (GAP_MPS2 * seconds**2) ** 2

@@ -5,6 +5,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
+from pathlib import Path
 from typing import Any, Final, cast
 
 Sent = Callable[[Any], list[bytes]]
@@ -21,7 +22,8 @@ class RigBoard:
     how long after a stop its motors are off; ``old_bytes_s``: how long it takes to hear
     what a full port has kept; ``ends_later_s``: how much longer its driver takes to end;
     ``deaf_s``: how long it may miss what is said on one line, so that the next one has to tell it.
-    ``imu``: whether it sends readings of one.
+    ``imu``: whether it sends readings of one; ``jump_stddevs``: by how many of its own standard
+    deviations an odometry that is predicted may be put right.
 
     ``ports``: the driver's parameters that name its ports, by the link to the terminal; ``cases``:
     faults that this board alone has.
@@ -29,6 +31,9 @@ class RigBoard:
     ``sent``: the frames of its last tick; ``not_sent``: of what was published, by kind, how many
     messages were never sent, and of how many. ``lossy``: settings of board number n for a line that
     loses bytes. ``without``: faults that do not apply, and pieces of the campaign.
+
+    ``line``, ``serve``, ``port``: in place of a breakable line of bytes, what carries it, and what
+    the driver's ``port`` is; ``cases``: all that one driver goes through, instead of the usual.
     """
 
     name: str
@@ -47,11 +52,16 @@ class RigBoard:
     ends_later_s: float = 0.0
     deaf_s: float = 0.0
     imu: bool
+    jump_stddevs: float = 0.0
     sent: Sent = lambda _board: []
     not_sent: Callable[[Iterable[Any], Iterable[Any], list[bytes]], list[tuple[str, int, int]]] = (
         lambda _imu, _odom, _sent: []
     )
     lossy: Callable[[int], Any] = lambda _number: None
+    line: Callable[[Any, Any], Any] | None = None
+    serve: Callable[[Any, str], Any] | None = None
+    port: Callable[[Path], str] = lambda folder: str(folder / "omnibot")
+    cases: Callable[[int], Mapping[str, Any]] | None = None
     without: frozenset[str] = frozenset()
 
 

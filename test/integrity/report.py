@@ -23,7 +23,7 @@ from truth import SCENARIOS, WITH_TEXTS
 DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "integrity.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 
-OTHERS = {"lois_ecu": "lois_ecu_report", "fejemis": "fejemis_report"}
+OTHERS = {"lois_ecu": "lois_ecu_report", "mart": "mart_report", "fejemis": "fejemis_report"}
 """By the name of the board: the module that measures its codec."""
 SEEDS_OF_THE_PLAIN_PARSER = 4
 """It is wrong so often that a few streams tell."""

@@ -168,7 +168,8 @@ class Conversation:
             self.discarded += 1
             if isinstance(reply, Ok):
                 self._owed_until_s.pop(reply.form, None)
-                self._disturbed_s = now
+                if reply.form is not Form.NAME:
+                    self._disturbed_s = now
             return None
         self.pending = None
         took_s = now - pending.sent_s

@@ -27,6 +27,8 @@ PIVOT: Final = 0.01
 """Part of the track by which the middle of a turn on the spot is off."""
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Of a straight controlled move, whose heading the server holds."""
+BEND_WALK: Final = 0.5
+"""Part of a guessed turn's error that is another's in each step."""
 ASTRAY: Final = 0.7
 """For rad² of the heading, part of the way that is none in the direction it is taken to be."""
 SPREAD: Final = 0.3
@@ -68,16 +70,17 @@ class Doubt:
         dx_m, dy_m = way_m * cos, way_m * sin
         walks = bool(way_m or turn_rad) and not on_the_spot
         turn_variance = GYRO_WALK**2 * seconds if walks else 0.0
+        half_m = self.settings.track_m / 2
+        bend_rad = bend * (way_m + turn_rad * half_m) / self.settings.track_m
+        bend_m = -bend_rad * half_m
         errors = [
             (WAY_STDDEV**2 * abs(way_m), cos, sin, 0.0),
             (aside_m * aside_m, -sin, cos, 0.0),
             (turn_variance, 0.0, 0.0, 1.0),
+            ((BEND_WALK * bend_rad) ** 2, -half_m * cos, -half_m * sin, 1.0),
         ]
         self._walk = self._walk.carried(dx_m, dy_m).with_errors(errors)
         drift_rad = seconds if way_m or turn_rad else 0.0
-        half_m = self.settings.track_m / 2
-        bend_rad = bend * (way_m + turn_rad * half_m) / self.settings.track_m
-        bend_m = -bend_rad * half_m
         astray = min(1.0, ASTRAY * self._walk.yaw_yaw)
         own = (
             (dx_m, dy_m, 0.0),

@@ -6,6 +6,7 @@ Knows the slower measurements and their limits; not what is done about them. Tim
 """
 
 import math
+from collections import deque
 from typing import Final
 
 from omnibot_driver.core.mart.goal import INCH_M
@@ -36,6 +37,9 @@ FRONT_IN, REAR_IN = 19, 15
 SEEN_FOR_S: Final = 2.0
 LOWEST_V, HIGHEST_V = 5.0, 40.0
 ENCODER_FAILS: Final = 3
+LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
+"""V and inches: two readings that are so near are alike."""
+SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 REFERENCE_FAILS: Final = 2
 """RM may fail once after a stop that took long, and the robot stands."""
@@ -62,10 +66,25 @@ class Health:
         self.volts: float | None = None
         self._status_before: int | None = None
         self._encoder_fails = 0
+        self._before: dict[Word, float] = {}
+        self._voltages: deque[float] = deque(maxlen=4)
         self._sonars_in: dict[Side, tuple[int, float]] = {}
 
-    def measured(self, word: Word, reply: Ok, now: float) -> list[Reading]:
-        """A reply to one of the slower queries."""
+    def measured(
+        self, word: Word, reply: Ok, now: float, *, uncertain: bool = False
+    ) -> list[Reading]:
+        """A reply to one of the slower queries. ``uncertain``: it may be that to another question,
+        so it is told when it comes twice.
+        """
+        if word is VOLTS:
+            self._voltages.append(reply.number)
+        if word in LIKE:
+            before = self._before.get(word)
+            self._before[word] = reply.number
+            if uncertain and (before is None or abs(reply.number - before) > LIKE[word]):
+                return []
+            if uncertain and word is not VOLTS and self._is_of_another(word, reply.number):
+                return []
         if word is MCSTAT:
             self._status(int(reply.number))
         elif word is VOLTS and LOWEST_V <= reply.number <= HIGHEST_V:
@@ -80,6 +99,15 @@ class Health:
             distance_m = inches * INCH_M if inches >= 0 else math.inf
             return [ExtraReading(SonarReading(side, distance_m))]
         return []
+
+    def _is_of_another(self, word: Word, inches: float) -> bool:
+        """What the other sonar has told too, and 0, is as likely another's answer."""
+        other = self._before.get(SRC if word is SFC else SFC)
+        return inches == 0 or (inches > 0 and inches == other)
+
+    def is_voltage(self, number: float) -> bool:
+        """Whether the battery has told just that lately."""
+        return any(abs(number - volts) < SAME_V for volts in self._voltages)
 
     def _status(self, bits: int) -> None:
         """It counts when it is reported twice: a late reply to ENC looks the same."""

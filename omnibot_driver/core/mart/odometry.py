@@ -20,6 +20,8 @@ SLOWING_S: Final = 0.12
 """Time constant of a robot that is being stopped."""
 ACCELERATION_MPS2, ACCELERATION_RADPS2 = 1.0, 3.0
 """Of a robot that is not heard."""
+FASTER_MPS, FASTER_RADPS = 0.1, 0.2
+"""A robot may be so much faster than its last counts tell."""
 BLIND_RADPS: Final = 1.5
 """A robot of which nothing is heard turns no faster."""
 SPEED_STDDEV_MPS, SPEED_STDDEV_RADPS = 0.02, 0.03
@@ -66,8 +68,8 @@ class MartOdometry(Reckoning):
             late_s += min(now - self.slowing_since_s, self.spread_s)
         square_s2 = ahead_s * ahead_s / 2
         errors = anywhere(
-            ACCELERATION_MPS2 * square_s2 + abs(speed_mps) * late_s,
-            ACCELERATION_RADPS2 * square_s2 + abs(rate_radps) * late_s,
+            ACCELERATION_MPS2 * square_s2 + (abs(speed_mps) + FASTER_MPS) * late_s,
+            ACCELERATION_RADPS2 * square_s2 + (abs(rate_radps) + FASTER_RADPS) * late_s,
         )
         if self.on_the_spot:
             errors += self.doubt.turn(self.spun_rad, self.told_rad)

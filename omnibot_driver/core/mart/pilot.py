@@ -239,12 +239,17 @@ class Pilot(Starts):
         if word is words.ENC:
             self._counted(signed(int(reply.number)), answer.when, now)
         elif word is words.RMRA:
+            if answer.when.is_uncertain and self.health.is_voltage(reply.number):
+                return
             changed = self.odometry.turned(reply.number, answer.when)
             certain = answer.when.from_s >= self._begun_s and not answer.when.doubtful
             if changed and certain and self.state in (State.REVERSING, State.TURNING):
                 self.health.heading_changed(self.motion)
         else:
-            self.readings += self.health.measured(word, reply, now)
+            if answer.when.doubtful and word is not words.MCSTAT:
+                return
+            uncertain = answer.when.is_uncertain
+            self.readings += self.health.measured(word, reply, now, uncertain=uncertain)
             self.loop.volts = self.health.volts_or(self._settings.nominal_volts)
 
     def _counted(self, count: int, when: Moment, now: float) -> None:

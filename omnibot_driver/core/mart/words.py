@@ -113,8 +113,8 @@ RMRA = _word("RMRA", Kind.QUERY, _DECIMAL, 0.05)
 VOLTS = _word("VOLTS", Kind.QUERY, _DECIMAL, 0.05, {""})
 MCSTAT = _word("MCSTAT", Kind.QUERY, _INTEGER, 0.25)
 DOCKED = _word("DOCKED", Kind.QUERY, {Form.TRUTH}, 0.05)
-SFC = _word("SFC", Kind.QUERY, _INTEGER, 0.15)
-SRC = _word("SRC", Kind.QUERY, _INTEGER, 0.15)
+SFC = _word("SFC", Kind.QUERY, _INTEGER, 0.15, least_s=0.03)
+SRC = _word("SRC", Kind.QUERY, _INTEGER, 0.15, least_s=0.03)
 TD = _word("TD", Kind.QUERY, _INTEGER, 0.05, {"in progress"})
 
 NO_IMU: Final = "could not init"
