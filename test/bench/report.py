@@ -23,7 +23,7 @@ from ratios import Figure, table
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "performance.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
-OTHERS = {"lois_ecu": "lois_ecu_bench"}
+OTHERS = {"lois_ecu": "lois_ecu_bench", "mart": "mart_bench"}
 """By the name of the board: the module that measures it."""
 SCALES = (1, 2, 4, 8, 16)
 

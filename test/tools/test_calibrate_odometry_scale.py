@@ -92,6 +92,38 @@ def test_both_scales_are_found_by_tape(subcommand: Any, before: float) -> None:
     assert all(0.0 < finding.sigma < 0.01 for finding in found.findings)
 
 
+class Encoder(TwoWheels):
+    """A robot whose driver has a way for each count; its heading is told by a gyro."""
+
+    def __init__(self, **parameters: Any) -> None:
+        super().__init__(**parameters)
+        for name in NAMES:
+            del self.parameters[name]
+        self.parameters |= {"metres_per_count": 0.0005, "linear_scale": 100.0}
+
+    def told(self) -> Pose:
+        linear = self.parameters["metres_per_count"] / 0.0004
+        return self.true.times(linear, linear, 1.0)
+
+
+def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
+    """By two lines; a driver that has it needs no factors of its odometry."""
+    robot = Encoder()
+    console = Console(
+        yes=False,
+        read=lambda question: (
+            "y"
+            if "Mark the floor" in question or "room" in question
+            else str(1000.0 * robot.true.way_m)
+        ),
+    )
+    found = scale.run(robot, console, arguments("scale"))
+    assert found.parameters == {
+        "metres_per_count": pytest.approx(0.0004, rel=1e-3),
+        "linear_scale": pytest.approx(125.0, rel=1e-3),
+    }
+
+
 def test_a_line_that_was_misread_is_told() -> None:
     """Two lines of the same length differ by more than the tape allows."""
     robot = TwoWheels()

@@ -6,7 +6,7 @@ Knows the slower measurements and their limits; not what is done about them. Tim
 """
 
 import math
-from collections import deque
+from collections import Counter, deque
 from typing import Final
 
 from omnibot_driver.core.mart.goal import INCH_M
@@ -39,6 +39,8 @@ LOWEST_V, HIGHEST_V = 5.0, 40.0
 ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
 """V and inches: two readings that are so near are alike."""
+OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
+"""So many alike in a row are believed, on a network where each may be another's."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 REFERENCE_FAILS: Final = 2
@@ -67,6 +69,7 @@ class Health:
         self._status_before: int | None = None
         self._encoder_fails = 0
         self._before: dict[Word, float] = {}
+        self._alike: Counter[Word] = Counter()
         self._voltages: deque[float] = deque(maxlen=4)
         self._sonars_in: dict[Side, tuple[int, float]] = {}
 
@@ -74,14 +77,16 @@ class Health:
         self, word: Word, reply: Ok, now: float, *, uncertain: bool = False
     ) -> list[Reading]:
         """A reply to one of the slower queries. ``uncertain``: it may be that to another question,
-        so it is told when it comes twice.
+        so it is told when it has come again.
         """
         if word is VOLTS:
             self._voltages.append(reply.number)
         if word in LIKE:
             before = self._before.get(word)
+            alike = before is not None and abs(reply.number - before) <= LIKE[word]
+            self._alike[word] = self._alike[word] + 1 if alike else 1
             self._before[word] = reply.number
-            if uncertain and (before is None or abs(reply.number - before) > LIKE[word]):
+            if uncertain and self._alike[word] < OFTEN[word]:
                 return []
             if uncertain and word is not VOLTS and self._is_of_another(word, reply.number):
                 return []

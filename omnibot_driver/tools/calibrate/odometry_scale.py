@@ -1,7 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
 """``calibrate geometry`` and ``scale`` of a base that only drives straight and turns: what its
-odometry has to be multiplied by, by a tape measure. Must not know its wheels.
+odometry has to be multiplied by, by a tape measure. Where the driver has a way for a count of its
+encoder instead, that is found. Must not know its wheels.
 """
 
 import argparse
@@ -28,6 +29,8 @@ LINES: Final = 2
 UNLIKE: Final = 4.0
 """Standard deviations by which two ratios differ that are not the same."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
+COUNT, UNITS = "metres_per_count", "linear_scale"
+"""A longer count makes the same speed fewer units of the motors."""
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive mark where the"
     " robot's centre is and where the front points; after it you are asked how far it has come, or"
@@ -66,6 +69,8 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     """Raises ToolError."""
     console.say(INTRODUCTION)
     drives = plan(arguments.side, arguments.turns)
+    if COUNT in robot.parameters:
+        drives = [drive for drive in drives if not drive.turns]
     console.confirm(
         f"The robot will make {len(drives)} drives, within {arguments.side:g} m of where each one"
         f" begins, at up to {arguments.speed:g} m/s. Is there room for it?"
@@ -128,21 +133,22 @@ def _measure(console: Console, drive: Drive, path: Column, arguments: argparse.N
 def result(ratios: Sequence[Ratio], now: Mapping[str, Any]) -> Result:
     """What to show and to write of these; ``now`` are the driver's parameters."""
     findings, parameters, notes = [], {}, []
-    for name, turns in zip(NAMES, (False, True), strict=True):
+    names = ((COUNT, False),) if COUNT in now else tuple(zip(NAMES, (False, True), strict=True))
+    for name, turns in names:
         mine = [one for one in ratios if one.drive.turns is turns]
         weights = np.array([one.value_sigma**-2 for one in mine])
         mean = float(weights @ [one.value for one in mine] / weights.sum())
         sigma = float(weights.sum() ** -0.5)
-        parameters[name] = now[name] * mean
-        findings.append(
-            Finding(
-                name=name,
-                value=now[name] * mean,
-                sigma=now[name] * sigma,
-                unit="rad/rad" if turns else "m/m",
-                before=now[name],
+        unit = "m" if name == COUNT else "rad/rad" if turns else "m/m"
+        found = {name: (now[name] * mean, now[name] * sigma, unit)}
+        if name == COUNT:
+            before = now[UNITS]
+            found[UNITS] = before / mean, before * sigma / mean**2, "unit/(m/s)"
+        for each, (value, value_sigma, of) in found.items():
+            parameters[each] = value
+            findings.append(
+                Finding(name=each, value=value, sigma=value_sigma, unit=of, before=now[each])
             )
-        )
         one, other = mine
         if abs(one.value - other.value) > UNLIKE * math.hypot(one.value_sigma, other.value_sigma):
             notes.append(

@@ -32,7 +32,7 @@ UNLIKE: Final = 4.0
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     """Raises ToolError."""
     now = robot.parameters
-    if "linear_scale" not in now:
+    if "angular_scale" not in now:
         return odometry_scale.run(robot, console, arguments)
     scales = (now["linear_scale"], now["linear_scale"], now["angular_scale"])
     linear = min(arguments.speed, now["max_linear_speed"])

@@ -1,0 +1,52 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Commands two MART robots in turn: another speed once a second, at times none.
+
+Arguments: seconds, namespaces. Prints one JSON array per namespace: pairs of the steady clock's
+time in s at which a speed was first published, and the speed in m/s.
+"""
+
+import json
+import sys
+import time
+
+import rclpy
+from geometry_msgs.msg import Twist
+from rclpy.node import Node
+
+SPEEDS = (0.15, 0.35, 0.2, 0.4, 0.15, 0.3, 0.0, 0.0)
+"""m/s; at the end the robot stands long enough to start anew."""
+HOLD_S, REPEAT_S = 1.0, 0.1
+AHEAD_S = 3.0
+
+
+def main() -> None:
+    """Both hear each speed at the same time, but for the one that is first."""
+    seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
+    rclpy.init()
+    node = Node("hand", start_parameter_services=False, enable_rosout=False)
+    publishers = [node.create_publisher(Twist, f"{name}/cmd_vel", 1) for name in namespaces]
+    while any(publisher.get_subscription_count() == 0 for publisher in publishers):
+        time.sleep(0.01)
+    time.sleep(1.0)
+    sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]
+    begun, number = time.monotonic(), 0
+    while time.monotonic() < begun + seconds:
+        twist = Twist()
+        twist.linear.x = SPEEDS[number % len(SPEEDS)]
+        until = time.monotonic() + (AHEAD_S if number % len(SPEEDS) == 0 else HOLD_S)
+        until += 0.0137 * (number % 7)  # no multiple of any poll
+        first = True
+        while time.monotonic() < until:
+            for which, publisher in enumerate(publishers):
+                if first:
+                    sent[which].append((time.monotonic(), twist.linear.x))
+                publisher.publish(twist)
+            first = False
+            time.sleep(REPEAT_S)
+        number += 1
+    print(json.dumps(sent), flush=True)
+
+
+if __name__ == "__main__":
+    main()
