@@ -8,7 +8,6 @@ It may hold other names as well, which are left as they are; comments in it do n
 
 import contextlib
 import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -60,6 +59,8 @@ def save(path: Path, values: Mapping[str, Any]) -> None:
     A reader, or a power failure, meanwhile finds the old file or the new one. Comments in it do
     not survive; a symbolic link does.
     """
+    import tempfile  # takes 1 MB, and few drivers ever save
+
     content = {**_read(path), **values}
     path = path.resolve()
     path.parent.mkdir(parents=True, exist_ok=True)

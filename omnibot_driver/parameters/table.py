@@ -6,7 +6,6 @@ Knows no board by name: a board's profile makes its table, of what the board can
 that it brings.
 """
 
-import difflib
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
@@ -168,6 +167,8 @@ def table(
 
 def nearest(name: str, names: Iterable[str]) -> str:
     """The one of these names that is most like it, however little."""
+    import difflib  # for a name that is wrong, so hardly ever
+
     return difflib.get_close_matches(name, list(names), n=1, cutoff=0.0)[0]
 
 

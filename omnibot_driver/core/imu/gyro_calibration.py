@@ -12,7 +12,6 @@ This module knows readings and times. It reads no clock, and does not know when 
 
 import math
 from collections.abc import Sequence
-from statistics import fmean
 from typing import Final
 
 from omnibot_driver.core.readings import Vector3
@@ -170,7 +169,7 @@ class GyroCalibration:
 
 def mean(vectors: Sequence[Vector3]) -> Vector3:
     """Of at least one, axis by axis."""
-    x, y, z = map(fmean, zip(*vectors, strict=True))
+    x, y, z = (math.fsum(row) / len(vectors) for row in zip(*vectors, strict=True))
     return x, y, z
 
 
