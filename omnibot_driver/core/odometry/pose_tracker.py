@@ -16,7 +16,7 @@ from omnibot_driver.core.odometry.covariance import NOTHING, OdometryNoise, Unce
 
 Factors = tuple[float, float, float]
 """Of x, y and yaw."""
-AS_TOLD: Final[Factors] = (1.0, 1.0, 1.0)
+AS_TOLD: Final[tuple[float, ...]] = (1.0, 1.0, 1.0)
 
 
 class PoseTracker:

@@ -59,7 +59,7 @@ ENDS_IN_NOISE: Final = 2.0
 
 # What the board sends. A true IMU frame adds up to 6.5 at most, a delta or a
 # pose to 4.5.
-LEAPS: Final = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
+LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
 """Number of words far from the ones before them. One makes a frame odd, a shock moves several."""
 AFTERSHOCK: Final = 1.5
 """All that can be said against an IMU frame after one that was odd already: a shock rings."""

@@ -68,7 +68,7 @@ class Walk:
         self.frames: list[Frame] = []
         self.ends: list[int] = []
         self.lessons: list[tuple[int, ImuFrame, ImuFrame]] = []
-        self.known: list[tuple[int, tuple[Any, ...]]] = [(0, context)]
+        self.known: list[tuple[int, Any]] = [(0, context)]
 
     def add(self, end: int, frame: Frame, before: Context) -> None:
         """One more."""
@@ -82,7 +82,10 @@ class Walk:
 
     def known_after(self, count: int, expectation: Expectation) -> Context:
         """What was known after this many frames."""
-        at, fields = next(known for known in reversed(self.known) if known[0] <= count)
+        place = len(self.known) - 1
+        while self.known[place][0] > count:
+            place -= 1
+        at, fields = self.known[place]
         context = Context._make(fields)
         for frame in self.frames[at:count]:
             _, context = expectation.weigh(frame, context)
@@ -124,6 +127,12 @@ def take_run(
     size = len(held)
     final = size - 1
     frame: Any
+    x: int  # a struct has no types, and compiled code is quicker with whole numbers
+    y: int
+    z: int
+    u: int
+    v: int
+    w: int
     while at < final and held[at] == _FIRST:
         kind = held[at + 1]
         if kind == _IMU_KIND:
@@ -183,21 +192,21 @@ def take_run(
             end = at + POSE_LENGTH
             if end > size or pose is None or turned is None:
                 break
-            x, y, theta, count = _POSE[order](held, at + 2)
+            x_mm, y_mm, theta, count = _POSE[order](held, at + 2)
             if (
                 count != (pose.seq + 1) & 255
-                or not -FARTHEST_POSE < x < FARTHEST_POSE
-                or not -FARTHEST_POSE < y < FARTHEST_POSE
+                or not -FARTHEST_POSE < x_mm < FARTHEST_POSE
+                or not -FARTHEST_POSE < y_mm < FARTHEST_POSE
                 or not -FARTHEST_POSE < theta < FARTHEST_POSE
-                or not -LONGEST_STEP <= x - pose.x <= LONGEST_STEP
-                or not -LONGEST_STEP <= y - pose.y <= LONGEST_STEP
+                or not -LONGEST_STEP <= x_mm - pose.x <= LONGEST_STEP
+                or not -LONGEST_STEP <= y_mm - pose.y <= LONGEST_STEP
                 or not -LONGEST_STEP <= theta - pose.theta <= LONGEST_STEP
                 or not -ROUNDING <= 10.0 * (theta - pose.theta) - turned <= ROUNDING
                 or (end == size and count in LENT)
             ):
                 break
             frame = UnfrozenPose()
-            frame.x, frame.y, frame.theta, frame.seq = x, y, theta, count
+            frame.x, frame.y, frame.theta, frame.seq = x_mm, y_mm, theta, count
             frame.__class__ = PoseFrame
             pose, deltas, turned = frame, 0, 0
         else:

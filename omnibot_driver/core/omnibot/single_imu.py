@@ -38,6 +38,12 @@ def take_single(
         or pause_s > LATE_S
     ):
         return None
+    x: int  # as in ``fast_path``
+    y: int
+    z: int
+    u: int
+    v: int
+    w: int
     header, x, y, z, u, v, w = _WORDS(data)
     last, seq, pose, imus, deltas, _, turned = decoder.context
     if header != _HEADER or last is None:

@@ -276,7 +276,7 @@ class _Search:
         sure = [True] * len(path)
         best = cost[self._end]
         for edge in reversed(self._edges):
-            start, end, price, _, _ = edge
+            start, end, price, frame, _ = edge
             onward = price + rest[end]
             if onward == inf:
                 continue
@@ -284,7 +284,7 @@ class _Search:
                 rest[start] = onward
             if cost[start] + onward - best < SURE:
                 for number in range(bisect_left(starts, start >> 1), bisect_left(starts, end >> 1)):
-                    sure[number] = sure[number] and path[number] is edge
+                    sure[number] = sure[number] and path[number][3] is frame
         return [
             Segment(start >> 1, end >> 1, frame, self._context(start), after, is_sure)
             for (start, end, _, frame, after), is_sure in zip(path, sure, strict=True)
