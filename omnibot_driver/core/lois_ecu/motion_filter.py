@@ -12,6 +12,7 @@ commanded course and the firmware's counters; no messages.
 """
 
 import math
+from collections import deque
 from typing import Final
 
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
@@ -33,10 +34,15 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
     X,
     Y,
 )
+from omnibot_driver.core.odometry.covariance import Covariance
 
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
 """What was not heard of for longer is not predicted any further."""
+KEPT: Final = 32
+"""Groups that may come until a restart is noticed."""
+ROLLED_OUT_S: Final = 0.15
+"""At the speed that it had, a wheel without power rolls on for about this time."""
 LATE_PART: Final = 0.6
 """Of the controller's period: standard deviation of the time at which a command takes effect."""
 START_TICKS: Final = 0.5
@@ -67,6 +73,7 @@ class MotionFilter:
         self.differing_mps = math.inf
         """The least difference of both measured speeds since this was last set."""
         self._kinds: tuple[str, str] | None = None
+        self._kept: deque[tuple[float, list[float], list[list[float]]]] = deque(maxlen=KEPT)
 
     @property
     def yaw_rad(self) -> float:
@@ -93,6 +100,19 @@ class MotionFilter:
         held = self.filter.mean[PER_WHEEL * wheel + HELD] - self.rounded_mps(wheel)
         return self.wheels[wheel].course.measured_sign * max(held, 0.0)
 
+    def pose_covariance(self) -> Covariance:
+        """Of x, y and yaw."""
+        matrix, turn = self.filter.covariance, self.turn_sign / self.track_m
+        left, right = WAY, PER_WHEEL + WAY
+        return Covariance(
+            matrix[X][X],
+            matrix[X][Y],
+            turn * (matrix[X][right] - matrix[X][left]),
+            matrix[Y][Y],
+            turn * (matrix[Y][right] - matrix[Y][left]),
+            turn * turn * (matrix[left][left] + matrix[right][right] - 2 * matrix[left][right]),
+        )
+
     @property
     def resting(self) -> bool:
         """Whether nothing is commanded and nothing moves."""
@@ -113,6 +133,37 @@ class MotionFilter:
             end_s = max(min(at_s + STEP_S, to_s, change_s), at_s + 1e-4)
             self._step(end_s - at_s)
             at_s = end_s
+
+    def forget_kept(self) -> None:
+        """What was remembered is in another frame."""
+        self._kept.clear()
+
+    def keep(self, now: float) -> None:
+        """Remember how it is now, for ``restart``."""
+        estimate = self.filter
+        covariance = [list(row) for row in estimate.covariance]
+        self._kept.append((now, list(estimate.mean), covariance))
+
+    def restart(self, then_s: float) -> None:
+        """The board restarted then, and the wheels have rolled out since.
+
+        What was believed of the time after is taken back, and no set-point is in force. Where ticks
+        count both ways they have begun at zero, and tell how far the wheels rolled out.
+        """
+        while len(self._kept) > 1 and self._kept[-1][0] > then_s:
+            self._kept.pop()
+        if not self._kept:
+            return
+        kept_s, self.filter.mean, self.filter.covariance = self._kept.pop()
+        powered_s = max(min(then_s - kept_s, LONGEST_STEP_S), 0.0)
+        for index, wheel in enumerate(self.wheels):
+            speed = self.speed_mps(index)
+            rolled_s = 0.0 if self.signed else ROLLED_OUT_S
+            self.shift(index, speed * (powered_s + rolled_s), abs(speed) * ROLLED_OUT_S)
+            if not self.signed:
+                wheel.begin_again()
+            for state in (SPEED, PUSH, HELD):
+                self.filter.forget(wheel.base + state, 0.0, 0.0)
 
     def shift(self, index: int, way_m: float, stddev_m: float) -> None:
         """This wheel rolled so much further than believed."""

@@ -9,7 +9,6 @@ nothing, are kept apart. Time is an argument; all times are arrival times.
 """
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
@@ -18,11 +17,11 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu.board_odometry import OdometryReader, Told
 from omnibot_driver.core.lois_ecu.comparison import Comparison
 from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry, Source
-from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Ticks
-from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
+from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Stream, Ticks
+from omnibot_driver.core.lois_ecu.motion_filter import LONGEST_STEP_S, MotionFilter
 from omnibot_driver.core.lois_ecu.plausibility import wrapped
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
-from omnibot_driver.core.lois_ecu.size_errors import SizeErrors
+from omnibot_driver.core.lois_ecu.size_errors import LoisOdometrySettings, SizeErrors
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, SPEED, WAY, X, Y
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, Uncertainty
@@ -37,18 +36,11 @@ UNCOUNTED_M: Final = 0.06
 """After this much motion, a wheel that did not count backwards cannot do so."""
 LATE_S: Final = 0.012
 """Standard deviation of an arrival, where nothing better is known."""
+UNHEARD_S: Final = 0.6
+UNHEARD_GROUPS: Final = 3
+"""After so long without a word the pose is not predicted any further: the board may be off."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LoisOdometrySettings:
-    """Of the wheels on the ground: a random walk in m after 1 m, and standard deviations of a
-    wheel's relative size, and of the part that slip takes from both."""
-
-    wheel_drift: float = 0.0035
-    wheel_scale: float = 0.01
-    wheel_slip: float = 0.005
 
 
 class LoisOdometry:
@@ -78,6 +70,8 @@ class LoisOdometry:
         """From the next group on."""
         motion, yaw_rad = self._motion, self._motion.yaw_rad
         self._settings = settings
+        period_s = settings.periods_ms.get(Stream.TICKS, 0) / 1e3
+        self._unheard_s = max(UNHEARD_S, UNHEARD_GROUPS * period_s)
         motion.tick_m, motion.rpm_mps = settings.tick_m, settings.rim_mps_per_rpm
         motion.track_m = settings.track_m
         motion.turn_sign = -1.0 if settings.inverted else 1.0
@@ -112,13 +106,21 @@ class LoisOdometry:
         self._uncertainty = Uncertainty(self._uncertainty.noise)
         self._sizes = SizeErrors(self._noise.wheel_scale, self._noise.wheel_slip)
         self._pose, self._ways_m = Pose(), (0.0, 0.0)
+        self._motion.forget_kept()
 
     def connect(self) -> None:
         """The line is new: counters may have begun anew, the pose goes on."""
         self._ticks = None
         self._board.begin()
-        self._at_s = self._odometry_at_s = -math.inf
+        self._at_s = self._odometry_at_s = self._heard_at_s = -math.inf
         self._heading_compared = False
+
+    def restarted(self, now: float, age_s: float | None) -> None:
+        """The board started anew ``age_s`` ago, if that is known: it has no set-point since."""
+        self._motion.restart(self._heard_at_s if age_s is None else now - age_s)
+        self.connect()
+        self._ticks = Ticks(0, 0, 0)
+        self._comparison.begin_counts()
 
     # What goes out
 
@@ -151,6 +153,7 @@ class LoisOdometry:
             if not self._begun:
                 self._begun = True
                 self.reset()
+            self._keep(now)
             return []
         counts = wrapped(ticks.left - before.left), wrapped(ticks.right - before.right)
         if max(map(abs, counts)) * self._settings.tick_m > FASTEST_MPS * (now - from_s + 1.0):
@@ -160,12 +163,16 @@ class LoisOdometry:
             self._motion.signed = self._seen_signed = True
         for index, count in enumerate(counts):
             self._comparison.count(index, count, late_s)
+        self._keep(now)
         return [self._estimate()]
 
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
         """0x20, or what came behind 0x12. It corrects what is predicted and told next."""
         told = self._board.take(group)
         if self._ticks is None:
+            return
+        if now > self._heard_at_s + self._unheard_s > -math.inf:
+            self._after_silence(now)
             return
         self._advance(now)
         if group.appended and not self.appends:
@@ -178,14 +185,29 @@ class LoisOdometry:
             self._watch_motion(told)
             return
         self._comparison.odometry(told, duration_s, late_s)
+        self._keep(now)
         self._heading_compared = True
 
     def predict(self, now: float) -> FusedOdometry | None:
         """Where it should be now; None before the first ticks."""
         if self._ticks is None:
             return None
-        self._advance(now)
-        return self._fused(predicted=True)
+        self._advance(min(now, self._heard_at_s + self._unheard_s))
+        return self._fused(predicted=True, stamp_s=max(now, self._at_s))
+
+    def _keep(self, now: float) -> None:
+        """This was heard: what is predicted from now on may be taken back."""
+        self._heard_at_s = now
+        self._motion.keep(now)
+
+    def _after_silence(self, now: float) -> None:
+        """What the wheels did in a long silence is not known; nor what 0x20 was compared with."""
+        self._advance(self._heard_at_s + self._unheard_s)
+        unheard_s = min(now - self._at_s, LONGEST_STEP_S)
+        for index in range(2):
+            self._motion.doubt(index, abs(self._motion.speed_mps(index)) * unheard_s)
+        self._at_s = now
+        self._comparison.begin_odometry()
 
     def _advance(self, now: float) -> None:
         since_s = now - 0.5 if self._at_s == -math.inf else self._at_s
@@ -242,21 +264,22 @@ class LoisOdometry:
         self._pose, self._ways_m = fused.pose, ways_m
         return fused
 
-    def _fused(self, *, predicted: bool) -> FusedOdometry:
+    def _fused(self, *, predicted: bool, stamp_s: float | None = None) -> FusedOdometry:
         motion = self._motion
         mean = motion.filter.mean
         pose = Pose(mean[X], mean[Y], motion.yaw_rad)
         ways_m = motion.way_m(0) - self._ways_m[0], motion.way_m(1) - self._ways_m[1]
         speeds = self._tangent((motion.speed_mps(0), motion.speed_mps(1)))
         twist = BodyTwist(speeds.x_m, 0.0, speeds.yaw_rad)
-        covariance, variances = self._covariance(pose.yaw_rad, twist), self._twist_variances()
+        stamp_s = self._at_s if stamp_s is None else stamp_s
+        covariance = self._covariance(pose.yaw_rad, twist, stamp_s - self._at_s)
         displacement = self._pose.way_to(pose)
         return FusedOdometry(
-            self._at_s,
+            stamp_s,
             pose,
             twist,
             covariance,
-            variances,
+            self._twist_variances(),
             displacement,
             ways_m,
             self._source,
@@ -267,20 +290,11 @@ class LoisOdometry:
         turn = self._motion.turn_sign * (ways_m[1] - ways_m[0]) / self._settings.track_m
         return Pose((ways_m[0] + ways_m[1]) / 2, 0.0, turn)
 
-    def _covariance(self, yaw_rad: float, twist: BodyTwist) -> Covariance:
-        matrix, turn = self._motion.filter.covariance, self._motion.turn_sign / self._motion.track_m
-        left, right = WAY, PER_WHEEL + WAY
-        filtered = Covariance(
-            matrix[X][X],
-            matrix[X][Y],
-            turn * (matrix[X][right] - matrix[X][left]),
-            matrix[Y][Y],
-            turn * (matrix[Y][right] - matrix[Y][left]),
-            turn * turn * (matrix[left][left] + matrix[right][right] - 2 * matrix[left][right]),
-        )
+    def _covariance(self, yaw_rad: float, twist: BodyTwist, unheard_s: float) -> Covariance:
+        filtered = self._motion.pose_covariance()
         whole = self._uncertainty.total(Pose()) + self._sizes.covariance(yaw_rad) + filtered
-        late_m = self.late_stddev_s * twist.vx_mps
-        late_rad = self.late_stddev_s * twist.yaw_rate_radps
+        late_s = math.hypot(self.late_stddev_s, unheard_s)
+        late_m, late_rad = late_s * twist.vx_mps, late_s * twist.yaw_rate_radps
         along = (late_m**2, math.cos(yaw_rad), math.sin(yaw_rad), 0.0)
         return whole.with_errors([along, (late_rad**2, 0.0, 0.0, 1.0)])
 

@@ -19,6 +19,8 @@ FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
+HIDDEN_PART: Final = 0.3
+"""While no speeds are told, time passes as if it went so much slower."""
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
@@ -50,8 +52,8 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """A speed that was not told, but is about this."""
-        self._pass(since_s)
+        """A speed that was not told, but is about this. What was told stays of interest."""
+        self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 
     def tell(self, rpm: float, since_s: float) -> None:

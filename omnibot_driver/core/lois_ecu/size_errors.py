@@ -8,6 +8,7 @@ of where these robots end is the covariance. Knows ways of wheels; no board and 
 """
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.geometry.se2 import Pose
@@ -15,6 +16,16 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 KINDS: Final = 3
 """Left wheel, right wheel, both alike."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoisOdometrySettings:
+    """Of the wheels on the ground: a random walk in m after 1 m, and standard deviations of a
+    wheel's relative size, and of the part that slip takes from both."""
+
+    wheel_drift: float = 0.0035
+    wheel_scale: float = 0.01
+    wheel_slip: float = 0.005
 
 
 class SizeErrors:

@@ -8,7 +8,7 @@ Also finds out that the board has restarted: its ticks are zero again, or its cl
 import math
 from typing import Final
 
-from omnibot_driver.core.lois_ecu.board_time import BoardTime
+from omnibot_driver.core.lois_ecu.board_time import UNIT_S, BoardTime
 from omnibot_driver.core.lois_ecu.heading_filter import HeadingFilter
 from omnibot_driver.core.lois_ecu.messages import (
     BoardOdometry,
@@ -139,14 +139,13 @@ class Translation:
             self.ticked_at_s = now
         self._unit = clock_unit or self._unit  # it is forgotten when the board begins anew
         late = self._unit == "ms" and wrapped(ticks.time_counts - before.time_counts) < 0
-        rolled = RESTARTED_TICKS + RESTARTED_TICKS_PER_S * duration_s
-        fewer = max(
-            abs(before.left) - abs(ticks.left),
-            abs(before.right) - abs(ticks.right),
-        )
-        if late or fewer > rolled:
+        rolled = RESTARTED_TICKS_PER_S * duration_s
+        left, right = abs(before.left) - abs(ticks.left), abs(before.right) - abs(ticks.right)
+        fewer = max(left - rolled, right - rolled, left + right - 2 * rolled)
+        if late or fewer > RESTARTED_TICKS:
             self.restarts += 1
-            self.odometry.connect()
+            age_s = ticks.time_counts * UNIT_S["ms"] if self._unit == "ms" else None
+            self.odometry.restarted(now, age_s)  # ns wrap each 4.3 s
             self._time.begin()
             self.headings.forget()
             return [DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True)]

@@ -37,11 +37,11 @@ class WheelModel:
     stays as it was, but ticks under negative duty lower it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, step_s: float = STEP_S) -> None:
         self.kind: CommandKind = "rpm"
         self.target_mps = 0.0
         self.hidden_mps = 0.0
-        self.step_s = STEP_S
+        self.step_s = step_s
         """What was heard takes effect with the controller's next step, half of this on average."""
         self._effects: deque[_Effect] = deque(maxlen=128)
         self._heard: tuple[CommandKind, float] = ("rpm", 0.0)

@@ -66,6 +66,11 @@ class Wheel:
     def __init__(self, base: int) -> None:
         self.base = base
         self.course = WheelModel()
+        self.begin_again()
+
+    def begin_again(self) -> None:
+        """The board has just started."""
+        self.course = WheelModel(self.course.step_s)
         self.restless_mps = 0.0
         """Size of the last changes of speed, fading."""
         self.wound_m = 0.0

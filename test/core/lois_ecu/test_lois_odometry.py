@@ -230,6 +230,33 @@ def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
     assert after.pose.yaw_rad == pytest.approx(place.pose.yaw_rad, abs=1e-9)
 
 
+@BOTH
+@pytest.mark.parametrize("pair", [(20, 20), (-20, -20), (-15, 15)])
+def test_a_board_that_restarts_ends_the_motion_in_odom(
+    firmware: Firmware, pair: tuple[int, int]
+) -> None:
+    """Although set-points go on, until it is heard again: the robot stands."""
+    rig = settled(firmware)
+    rig.order(*pair, 4.0)
+    first = rig.driver.predicted(rig.now)
+    before = rig.place
+    assert first is not None
+    rig.board.reboot()
+    for _ in range(8 if firmware == "documented" else 44):
+        rig.order(*pair, 0.05)
+        shown = rig.driver.predicted(rig.now)
+        assert shown is not None
+        if firmware == "firmware":
+            assert first.pose.way_to(shown.pose).way_m < 0.35
+    rig.order(*STOP, 3.0)
+    last = rig.driver.predicted(rig.now)
+    assert last is not None
+    assert rig.driver.translation.restarts == 1
+    believed, true = first.pose.way_to(last.pose), before.way_to(rig.place)
+    assert believed.way_to(true).way_m < 0.12
+    assert believed.yaw_rad == pytest.approx(true.yaw_rad, abs=math.radians(12))
+
+
 def test_other_wheels_count_from_the_next_group_on() -> None:
     """The way until then stays."""
     ours = LoisEcuSettings()
