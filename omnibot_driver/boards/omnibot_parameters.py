@@ -15,8 +15,7 @@ OMNIBOT: Final = (
         "control_method",
         "velocity",
         "",
-        "Where the board's own switch stands: whether it takes velocities (cmd_vel, wheel_cmd) or"
-        " poses to drive to (cmd_pose).",
+        "Position of the board's own switch: velocity (cmd_vel, wheel_cmd) or position (cmd_pose).",
         choices=("velocity", "position"),
         fixed=True,
         calibrated=True,
@@ -59,7 +58,7 @@ OMNIBOT: Final = (
         "delta_frame",
         "earth",
         "",
-        "What the board's odometry deltas are: differences of two positions in its earth frame,"
+        "Meaning of the board's odometry deltas: differences of two positions in its earth frame,"
         " motion along its own axes, or (older firmware) counts of its wheels.",
         choices=("earth", "body", "wheel_counts"),
         fixed=True,
@@ -69,8 +68,8 @@ OMNIBOT: Final = (
         "delta_period",
         0.04,
         "s",
-        "Time from one of the board's odometry deltas to the next. The manual has 25 Hz in one"
-        " place, 10 Hz in another; the driver says so if the board keeps to another.",
+        "Period of the board's odometry deltas. The manual has 25 Hz in one place and 10 Hz in"
+        " another; the driver says so if the board uses another one.",
         choices=DELTA_PERIODS_S,
         fixed=True,
     ),
@@ -78,8 +77,7 @@ OMNIBOT: Final = (
         "use_board_pose",
         True,
         "",
-        "Let the board's own pose settle lost motion and rounding; otherwise only its first"
-        " heading is taken.",
+        "Correct the odometry by the board's own pose. If false, only its first heading is used.",
     ),
     Parameter(
         "pose_byte_order",
@@ -119,7 +117,7 @@ OMNIBOT: Final = (
         "accel_range",
         2,
         "g",
-        "Full scale that the accelerometer is set to.",
+        "Full scale of the accelerometer.",
         choices=tuple(ACCEL_COUNTS_PER_G),
         fixed=True,
     ),
@@ -127,7 +125,7 @@ OMNIBOT: Final = (
         "gyro_range",
         250,
         "°/s",
-        "Full scale that the gyro is set to.",
+        "Full scale of the gyro.",
         choices=tuple(GYRO_COUNTS_PER_DPS),
         fixed=True,
     ),

@@ -40,21 +40,23 @@ LINE: Final = (
         "auto_start",
         True,
         "",
-        "Start the board whenever it is there and not running.",
+        "Start the board whenever it is connected and does not run.",
         fixed=True,
     ),
     Parameter(
         "on_exit",
         "stop",
         "",
-        "What the board is left in when the driver ends; the robot is stopped in any case.",
+        "State in which the driver leaves the board when it ends. The robot is stopped in any"
+        " case.",
         choices=("stop", "pause", "reset"),
     ),
     Parameter(
         "reconnect_interval",
         0.5,
         "s",
-        "Time until a lost port is opened again; it grows by half with each failure, to 2 s.",
+        "Time until the driver opens a lost port again. It grows by half with each failure, up to"
+        " 2 s.",
         low=0.05,
         high=60.0,
     ),
@@ -62,15 +64,15 @@ LINE: Final = (
         "guard",
         True,
         "",
-        "Have a small process of its own stop the robot when the driver is killed or hangs.",
+        "Run a guard process that stops the robot when the driver is killed or hangs.",
         fixed=True,
     ),
     Parameter(
         "publish_raw",
         False,
         "",
-        "Publish what every read and every write of the port brought, on ~/raw_rx and ~/raw_tx: a"
-        " bag then holds the wire itself, and replay:// plays it.",
+        "Publish the bytes of every read and write of the port on ~/raw_rx and ~/raw_tx. replay://"
+        " plays a bag of them.",
         fixed=True,
     ),
 )
@@ -80,14 +82,14 @@ COMMANDS: Final = (
         "enable_stamped_cmd_vel",
         False,
         "",
-        "Take geometry_msgs/TwistStamped on cmd_vel instead of geometry_msgs/Twist.",
+        "Subscribe cmd_vel as geometry_msgs/TwistStamped instead of geometry_msgs/Twist.",
         fixed=True,
     ),
     Parameter(
         "max_linear_speed",
         0.5,
         "m/s",
-        "Longest linear velocity that is commanded; longer ones keep their direction.",
+        "Largest linear speed that is commanded. A faster command keeps its direction.",
         low=0.0,
         high=10.0,
     ),
@@ -103,7 +105,7 @@ COMMANDS: Final = (
         "max_wheel_speed",
         17.0,
         "rad/s",
-        "Rate of the fastest wheel that wheel_cmd may command; the others keep their ratio.",
+        "Largest wheel rate that wheel_cmd may command. The other wheels keep their ratio.",
         low=0.0,
         high=200.0,
     ),
@@ -111,8 +113,8 @@ COMMANDS: Final = (
         "max_linear_acceleration",
         0.0,
         "m/s²",
-        "How fast cmd_vel may change the linear velocity, as a vector; 0 is at once. A command to"
-        " stand still, or to single wheels, is never slowed.",
+        "Largest acceleration of the linear velocity by cmd_vel, as a vector. 0 turns the limit"
+        " off. Zero commands and wheel_cmd are not limited.",
         low=0.0,
         high=100.0,
     ),
@@ -120,7 +122,7 @@ COMMANDS: Final = (
         "max_angular_acceleration",
         0.0,
         "rad/s²",
-        "The same for the yaw rate.",
+        "Largest acceleration of the yaw rate by cmd_vel. 0 turns the limit off.",
         low=0.0,
         high=1000.0,
     ),
@@ -136,7 +138,8 @@ COMMANDS: Final = (
         "command_rate",
         20.0,
         "Hz",
-        "How often the current command is repeated; Stop and the emergency stop at 20 Hz at least.",
+        "How often the current command is repeated. Stop and the emergency stop are repeated at 20"
+        " Hz at least.",
         low=1.0,
         high=50.0,
     ),
@@ -144,27 +147,34 @@ COMMANDS: Final = (
         "motion_monitor",
         True,
         "",
-        "Stop a robot that moves otherwise than commanded, and refuse motion; off, it drives on.",
+        "Stop a robot that does not move as commanded, and refuse motion afterwards.",
     ),
 )
 
 FRAMES: Final = (
-    Parameter("odom_frame", "odom", "", "Frame that the odometry is given in.", fixed=True),
-    Parameter("base_frame", "base_link", "", "Frame that the odometry moves.", fixed=True),
+    Parameter("odom_frame", "odom", "", "Frame in which the odometry is given.", fixed=True),
+    Parameter(
+        "base_frame",
+        "base_link",
+        "",
+        "Frame of the robot's base, which the odometry moves.",
+        fixed=True,
+    ),
     Parameter("imu_frame", "imu_link", "", "Frame of the IMU's axes.", fixed=True),
     Parameter(
         "frame_prefix",
         "",
         "",
-        "Text put before every frame name, without adding a slash, like robot_state_publisher's;"
-        " for example robot1/.",
+        "Prefix of every frame name, such as robot1/. No slash is added, as with"
+        " robot_state_publisher.",
         fixed=True,
     ),
     Parameter(
         "publish_tf",
         True,
         "",
-        "Publish the transform from odom_frame to base_frame on /tf; false with an EKF that does.",
+        "Publish the transform from odom_frame to base_frame on /tf. Set it to false if an EKF"
+        " publishes it.",
         fixed=True,
     ),
 )

@@ -14,7 +14,7 @@ ROBOT: Final = (
         "axis_signs",
         [1, 1, 1],
         "",
-        "For x, y and yaw: -1 turns the board's axis round, in commands and in odometry.",
+        "Signs of x, y and yaw. -1 reverses the board's axis, in commands and in odometry.",
         choices=(1, -1),
         fixed=True,
         calibrated=True,
@@ -24,7 +24,7 @@ ROBOT: Final = (
         1.0,
         "m/m",
         "True distance divided by the distance that the board reports (it assumes nominal wheels);"
-        " calibrate geometry finds it.",
+        " calibrate geometry measures it.",
         low=0.5,
         high=2.0,
         calibrated=True,
@@ -33,7 +33,8 @@ ROBOT: Final = (
         "odom_angular_scale",
         1.0,
         "rad/rad",
-        "The same for turning.",
+        "True angle divided by the angle that the board reports (it assumes nominal wheels);"
+        " calibrate geometry measures it.",
         low=0.5,
         high=2.0,
         calibrated=True,
@@ -42,9 +43,8 @@ ROBOT: Final = (
         "fastest_linear_speed",
         2.0,
         "m/s",
-        "What the robot can never exceed, pushed by hand too: no faster displacement and no pose"
-        " further away is believed, no correction of odom is faster. It must not be below"
-        " max_linear_speed.",
+        "Physical limit of the linear speed, also when pushed by hand. Faster displacements are"
+        " rejected, and corrections of odom are not faster. It must not be below max_linear_speed.",
         low=0.1,
         high=10.0,
     ),
@@ -52,7 +52,8 @@ ROBOT: Final = (
         "fastest_angular_speed",
         8.0,
         "rad/s",
-        "The same for turning. It must not be below max_angular_speed.",
+        "Physical limit of the yaw rate, also when pushed by hand. Faster displacements are"
+        " rejected. It must not be below max_angular_speed.",
         low=0.1,
         high=100.0,
     ),
@@ -60,8 +61,8 @@ ROBOT: Final = (
         "fastest_linear_acceleration",
         15.0,
         "m/s²",
-        "What the robot can never exceed, bumped too: a displacement that leaps further and is back"
-        " with the next is refused.",
+        "Physical limit of the linear acceleration, also in a bump. A displacement that exceeds it"
+        " for one sample is rejected.",
         low=0.1,
         high=1000.0,
     ),
@@ -69,7 +70,8 @@ ROBOT: Final = (
         "fastest_angular_acceleration",
         50.0,
         "rad/s²",
-        "The same for turning, and for single spikes of the gyro.",
+        "Physical limit of the angular acceleration, also in a bump. A displacement or gyro"
+        " reading that exceeds it for one sample is rejected.",
         low=1.0,
         high=10_000.0,
     ),
@@ -77,8 +79,8 @@ ROBOT: Final = (
         "largest_force_step",
         4.0,
         "m/s²",
-        "A single leap of one axis of the accelerometer that is larger, of the size of a changed"
-        " bit, and back with the next reading, is refused.",
+        "Largest spike of one accelerometer axis that is published. A larger one that lasts one"
+        " reading and has the size of a changed bit is rejected.",
         low=0.1,
         high=1000.0,
     ),
@@ -86,7 +88,7 @@ ROBOT: Final = (
         "calibration_file",
         "",
         "",
-        "YAML file that calibrations write; what they found replaces what is given here"
+        "YAML file that calibrations write. Its values replace the parameters given at start"
         " (docs/tools/calibrate.md).",
         fixed=True,
     ),
@@ -97,8 +99,8 @@ IMU: Final = (
         "gyro_bias",
         [0.0, 0.0, 0.0],
         "rad/s",
-        "What the gyro reads at rest, in its own axes; taken off. The service ~/calibrate_gyro"
-        " finds it.",
+        "Reading of the gyro at rest, in its own axes, which is subtracted. ~/calibrate_gyro"
+        " measures it.",
         low=-1.0,
         high=1.0,
         calibrated=True,
@@ -107,7 +109,7 @@ IMU: Final = (
         "accel_bias",
         [0.0, 0.0, 0.0],
         "m/s²",
-        "What the accelerometer reads too much, in its own axes; taken off.",
+        "Offset of the accelerometer, in its own axes, which is subtracted.",
         low=-5.0,
         high=5.0,
         calibrated=True,
@@ -116,8 +118,8 @@ IMU: Final = (
         "auto_gyro_bias",
         False,
         "",
-        "Refine the gyro's bias slowly whenever the robot stands still. Do not use it on what turns"
-        " itself (ship, turntable).",
+        "Refine the gyro's bias slowly while the robot stands still. Do not use it on a moving"
+        " base (ship, turntable).",
     ),
 )
 
@@ -144,7 +146,8 @@ NOISE: Final = (
         "odom_wheel_drift",
         0.0035,
         "m/√m",
-        "Standard deviation of a wheel's way after 1 m; it grows with the root of the way.",
+        "Standard deviation of a wheel's distance after 1 m. It grows with the square root of the"
+        " distance.",
         low=1e-6,
         high=10.0,
     ),
@@ -152,7 +155,7 @@ NOISE: Final = (
         "odom_wheel_scale",
         0.01,
         "m/m",
-        "Standard deviation of a wheel's relative size error; it counts for the whole way.",
+        "Standard deviation of a wheel's relative size error. It applies to the whole distance.",
         low=0.0,
         high=1.0,
     ),
@@ -160,7 +163,8 @@ NOISE: Final = (
         "odom_wheel_slip",
         0.02,
         "m/m",
-        "Mean part of the way that slip takes from all wheels alike; it counts for the whole way.",
+        "Mean fraction of the distance that all wheels lose to slip. It applies to the whole"
+        " distance.",
         low=0.0,
         high=1.0,
     ),
@@ -168,7 +172,7 @@ NOISE: Final = (
         "odom_gap_acceleration",
         1.0,
         "m/s²",
-        "How hard the robot may speed up and brake while its odometry frames are lost.",
+        "Largest acceleration that is assumed while odometry frames are lost.",
         low=0.0,
         high=100.0,
     ),
@@ -176,7 +180,7 @@ NOISE: Final = (
         "odom_gap_angular_acceleration",
         5.0,
         "rad/s²",
-        "The same for turning.",
+        "Largest angular acceleration that is assumed while odometry frames are lost.",
         low=0.0,
         high=1000.0,
     ),

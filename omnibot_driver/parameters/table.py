@@ -26,7 +26,7 @@ COMMON: Final = {
     "Frames": operating.FRAMES,
     "The robot": robot.ROBOT,
     "The IMU": robot.IMU,
-    "How sure the measurements are": robot.NOISE,
+    "Measurement uncertainty": robot.NOISE,
 }
 
 
