@@ -15,7 +15,7 @@ WARNED = "calibration_file {} does not exist, so nothing is loaded from it; chec
 def said_of(path: Path, start_driver: Start) -> str:
     """By a driver that has read it: one line, no more."""
     driver = start_driver("/dev/null", calibration_file=path)
-    driver.wait_for_line("no serial port")
+    driver.wait_for_line("is not a serial port")
     (line,) = [line for line in driver.lines if "calibration_file" in line]
     return line
 

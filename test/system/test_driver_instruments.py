@@ -196,7 +196,7 @@ def test_measurements_wait_for_simulated_time_and_it_is_said(
     probe = probe_of(driver)
     probe.wait_for_state("nominal")
     imu = probe.listen(Imu, "imu/data_raw")
-    driver.wait_for_line("use_sim_time is set and nothing publishes /clock")
+    driver.wait_for_line("use_sim_time is set but nothing publishes /clock")
     assert not imu
     clock = probe.publisher(Clock, "/clock")
     clock.publish(Clock(clock=Time(sec=1000)))

@@ -104,7 +104,7 @@ OPENS_NOTHING = "import serial; serial.serial_for_url = None"
 
 @pytest.mark.parametrize(
     ("first_line", "said", "told"),
-    [("/other/omnibot_driver", "for this node", 1), ("/**", "port '/dev/null' is not", 0)],
+    [("/other/omnibot_driver", "for this node,", 1), ("/**", "port '/dev/null' is not", 0)],
 )
 def test_a_parameter_file_for_another_node_is_told(
     start_driver: Start, tmp_path: Path, first_line: str, said: str, told: int
@@ -115,7 +115,7 @@ def test_a_parameter_file_for_another_node_is_told(
     driver: Driver = start_driver(None, before=OPENS_NOTHING, more=["--params-file", str(path)])
     driver.wait_for_line(said)
     assert driver.end(signal.SIGINT) == 0
-    sentence = f"which is /{driver.namespace}/omnibot_driver: let the file begin with /**:"
+    sentence = f"for this node, /{driver.namespace}/omnibot_driver; begin the file with /**:"
     assert driver.output.count(sentence) == told
 
 

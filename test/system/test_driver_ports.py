@@ -88,12 +88,12 @@ def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
     [
         ("nonsense://board", "not valid.*socket://"),
         ("/", ": / is not a serial port.*by-id"),
-        ("/dev/null", "no serial port.*by-id"),
+        ("/dev/null", "is not a serial port.*by-id"),
         ("socket://nohost", "not valid.*socket://"),
         ("socket://localhost:99999", "not valid.*socket://"),
         (
             "socket://localhost:1",
-            "cannot open socket://localhost:1: Connection refused: is the server running",
+            "cannot open socket://localhost:1: Connection refused: check that the server",
         ),
     ],
 )

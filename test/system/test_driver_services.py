@@ -115,7 +115,7 @@ def test_estop_latches_and_releases_to_standing_still(probe: Probe, board: PtyBo
     assert board.wait_for(still, 20.0)
     answer = probe.call(SetBool, "estop", data=False)
     assert answer.success
-    assert "new command" in answer.message
+    assert "next command" in answer.message
     probe.wait_for(lambda: not active[-1].data)
     assert board.wait_for(lambda b: b.commands[-1].kind == "wheels", 20.0)
     assert board.wait_for(still, 20.0)
@@ -223,7 +223,7 @@ def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: S
         assert "port is not open" in answer.message
     answer = probe.call(SetBool, "estop", data=True)
     assert answer.success
-    assert "as soon as" in answer.message
+    assert "when it opens" in answer.message
 
 
 def test_the_twist_after_a_pause_is_that_of_the_robot(probe: Probe) -> None:

@@ -55,7 +55,7 @@ def test_a_biased_gyro_is_told_with_the_service_that_mends_it(drive: Drive) -> N
 def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
     """While the accelerometer is alive."""
     drive.imu.values[500:700, :3] = drive.imu.values[500, :3]
-    stuck = said(drive, "IMU", "exactly the same")
+    stuck = said(drive, "IMU", "identical readings")
     assert stuck.level is Level.BAD
     assert "gyro" in stuck.text
     assert "accelerometer" not in stuck.text
@@ -133,7 +133,7 @@ def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
     rows = drive.odom.stamp_s > 12.0
     drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]
     drive.odom.values[rows, 3:] = 0.0
-    stands = said(drive, "Commands", "stood 1 time")
+    stands = said(drive, "Commands", "stood still 1 time")
     assert stands.level is Level.BAD
     assert "first at 12.0 s" in stands.text
 
