@@ -63,7 +63,7 @@ def _alone(node: Node, hardware_id: str) -> Publish:
 
 
 def _through_updater(node: Node, hardware_id: str) -> tuple[Publish, float] | None:
-    """With the library's period, which is a parameter of its own; None where it is missing."""
+    """Use diagnostic_updater with its own period parameter; returns None if it is not installed."""
     try:
         from diagnostic_updater import Updater
     except ImportError:

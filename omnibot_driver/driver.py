@@ -59,7 +59,7 @@ class Ending:
         return bool(select.select([self._wakes], [], [], 0)[0])
 
     def wait(self) -> None:
-        """Until a signal arrives or somebody calls ``begin``."""
+        """Wait for a signal or a call of ``begin``."""
         os.read(self._wakes, 1)
 
 
@@ -154,7 +154,7 @@ def _run(ending: Ending, args: list[str]) -> None:
 
 
 def _set_deadline() -> None:
-    """Nothing that hangs may hold the end up; without the process the guard stops the robot."""
+    """End the process if the shutdown hangs; the guard then stops the robot."""
 
     def give_up() -> None:
         try:

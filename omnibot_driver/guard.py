@@ -42,7 +42,7 @@ Words = list[tuple[int, bytes]]
 
 
 def watch(stop: Words, emergency_stop: Words) -> None:
-    """Until the driver is gone, and then a second longer unless it said that it goes."""
+    """Watch the driver until it has gone, and a second longer unless it announced its end."""
     patience_s: float | None = LIMIT_S
     latched, rest = False, b""
     while True:

@@ -128,7 +128,7 @@ class Keeper:
         self._process, self._broken = None, False
 
     def _addressed(self, packets: Packets) -> str:
-        """As the guard takes them; what is for a line that is missing is left out."""
+        """Encode the last words for the guard, without the lines that are missing."""
         return ",".join(
             f"{line}:{data.hex()}"
             for channel, data in packets

@@ -167,7 +167,7 @@ class Link:
         return self._shared.stood
 
     def _stop_for_good(self) -> None:
-        """With the lock held: wait, while the pacer repeats Stop, until the robot stands."""
+        """Under the lock, wait until the robot stands while the pacer repeats Stop."""
         self._session.leave(now := time.monotonic())
         self._shared.settle()
         alone = (

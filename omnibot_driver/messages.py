@@ -65,7 +65,7 @@ class MessageSettings:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], wheels: Kinematics) -> "MessageSettings":
-        """From checked parameter values; ``wheels``: of the board's profile."""
+        """Build from checked parameter values; ``wheels``: of the board's profile."""
         prefix = values["frame_prefix"]
         return cls(
             odom_frame=prefix + values["odom_frame"],

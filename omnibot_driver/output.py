@@ -20,7 +20,7 @@ CHUNK_BYTES: Final = 4096
 
 
 class UnblockedOutput:
-    """While entered, writing to the standard output and error of this process never waits."""
+    """A context in which writes to standard output and standard error never block."""
 
     def __enter__(self) -> Self:
         _fill_gaps()

@@ -130,7 +130,7 @@ class Publishing:
             self._handlers[type(event)](event, clock_offset_ns)
 
     def publish_state(self) -> None:
-        """For the first time, before there are events."""
+        """Publish the state for the first time, before any event."""
         self._show(StateChanged(*self._session.shown))
 
     def report_port(self, trouble: str | None) -> None:
@@ -145,7 +145,7 @@ class Publishing:
             self._node.get_logger().error(f"{trouble} (retrying)")
 
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
-        """By a clock that goes in steps, may jump back, and is 0 until somebody simulates it."""
+        """Deliver by a simulated clock, which steps, may jump back, and is 0 until it begins."""
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
             self._stamped_ns = {}
@@ -170,7 +170,7 @@ class Publishing:
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[Packet], None]:
-        """Of each channel: by its name, where it has one."""
+        """A publisher for each channel, with the channel's name if it has one."""
         publishers = [
             self._node.create_publisher(UInt8MultiArray, f"{topic}/{name}".rstrip("/"), RAW_DEPTH)
             for name in self._channels

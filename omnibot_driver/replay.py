@@ -81,7 +81,7 @@ class Replay:
 
     @property
     def blocked(self) -> bool:
-        """Nothing is written, so nothing is in its way."""
+        """Always empty: nothing is written, so nothing blocks."""
         return False
 
     def command(

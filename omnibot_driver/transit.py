@@ -143,7 +143,7 @@ class _Sender:
         return late_s if late_s >= 0.0 else -CLOCK_RETREATS * late_s
 
     def hear(self, differences_s: Differences, at_s: float, longest_s: float) -> float:
-        """It sent a message: for how long that was under way."""
+        """Note a message and return its delay."""
         self.heard += 1
         return min(
             offset.hear(difference_s, at_s, longest_s)
@@ -160,7 +160,7 @@ class _Offset:
         self._late_since_s = self._least_late_s = math.inf
 
     def late_s(self, difference_s: float, at_s: float) -> float:
-        """By how much this difference is above the smallest one; negative for one below it."""
+        """The difference above the smallest one; negative for one below it."""
         drift_s = LARGEST_DRIFT * max(0.0, at_s - self._least_at_s)
         return difference_s - self._least_s - drift_s
 

@@ -56,5 +56,5 @@ def kinematics(values: Mapping[str, Any]) -> OmniKinematics:
 
 
 def extras(_node: Any, _link: Any, _values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """It has nothing that other boards have not."""
+    """No extras: this board has no topics or services of its own."""
     return {}

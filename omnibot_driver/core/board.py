@@ -99,7 +99,10 @@ class Board(Protocol):
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Where the last read ended. None while the framing is in doubt, or it told nothing new."""
+        """The place where the last read ended.
+
+        None while the framing is in doubt, or without news.
+        """
         return None
 
     @property
@@ -134,11 +137,11 @@ class Board(Protocol):
         return []
 
     def silence(self) -> None:
-        """Nothing was understood for so long that the mode is unknown again."""
+        """The silence has lasted so long that the mode is unknown again."""
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has to be asked again; infinity where a board needs nothing of its own."""
+        """The time at which ``due`` must be called again; infinity if the board needs no calls."""
         return math.inf
 
     def due(self, now: float) -> Packets:

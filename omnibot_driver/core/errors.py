@@ -8,7 +8,7 @@ users ask for and cannot have. Each message says what is wrong and what to do ne
 
 
 class OmniBotError(Exception):
-    """Whatever this package raises on purpose."""
+    """Base class of all exceptions that this package raises on purpose."""
 
 
 class FrameError(OmniBotError):

@@ -46,7 +46,7 @@ class Liveness:
         return True
 
     def wake_at(self, *, driven: bool) -> float:
-        """When it has to be asked again. ``driven``: whether a command is carried out."""
+        """The time of the next check. ``driven``: whether a command is carried out."""
         unheard_at = self.heard_at + self.unheard_s if driven else math.inf
         if self._silent_since == self.heard_at:
             return unheard_at

@@ -31,7 +31,10 @@ class LongTask:
         return self.wake_at < math.inf
 
     def begin(self, name: str, token: object, limit_s: float, now: float) -> None:
-        """From now on. ``name`` reads well after "a". Raises RequestRefused while another is."""
+        """Begin a task.
+
+        ``name`` reads well after "a". Raises RequestRefused while another one runs.
+        """
         if self.active:
             raise RequestRefused(
                 f"a {self._name} is under way; wait for its answer, then call again"
@@ -44,13 +47,13 @@ class LongTask:
         return self.active and self._token is token
 
     def end(self, token: object, success: bool, message: str) -> None:
-        """It is done, or failed; nothing where it has ended before."""
+        """End the task as done or failed. No effect if it has ended before."""
         if self.is_current(token):
             self.answers.append(RequestDone(token, success, message))
             self._token, self._begun_at, self.wake_at = None, math.inf, math.inf
 
     def give_up(self, reason: str) -> None:
-        """Nothing comes of it; nothing where none is under way."""
+        """Fail the task with a reason. No effect without a task."""
         if self.active:
             self.end(self._token, False, f"the {self._name} failed: {reason}")
 

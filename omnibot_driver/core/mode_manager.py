@@ -81,7 +81,7 @@ class ModeManager:
 
     @property
     def wake_at(self) -> float:
-        """When ``tick`` has something to do."""
+        """The time at which ``tick`` has something to do."""
         if self.phase is SETTLED:
             return self._deadline
         next_at = math.inf

@@ -57,7 +57,7 @@ class SafetyStops:
         """By its last event, which may be from before the line was lost."""
 
     def react(self, measured: list[Measured], now: float) -> None:
-        """To what was measured, in its order."""
+        """React to these measurements, in their order."""
         notify, commanding = self._reporter.notify, self._commanding
         for reading, estimates in measured:
             self._reporter.events += estimates
@@ -123,7 +123,7 @@ class SafetyStops:
         self._policy.halt(now)
 
     def tick(self, now: float) -> None:
-        """To the board's silence: a short one ends a command, a long one all belief."""
+        """React to silence: a short one ends a command, a long one makes the mode unknown."""
         if self._policy.current and self._liveness.unheard(now):
             self._policy.halt(now)
         if not self._liveness.fell_silent(now):

@@ -94,7 +94,7 @@ class Session:
 
     @property
     def shown(self) -> tuple[str, bool]:
-        """Both of these, as of the last ``take_events``."""
+        """State and e-stop as of the last ``take_events``."""
         return self._reporter.shown
 
     @property
@@ -113,7 +113,7 @@ class Session:
 
     @property
     def wake_at(self) -> float:
-        """When ``tick`` must be called at the latest; infinity when nothing is due."""
+        """The latest time for the next ``tick``; infinity if nothing is due."""
         if self._mode_manager.phase is CLOSED:
             return math.inf
         return min(
@@ -193,7 +193,7 @@ class Session:
         return []
 
     def overran(self, count: int) -> None:
-        """So often the port has lost bytes since it was opened: they never came to us."""
+        """The port has lost bytes this many times since it was opened; they were never read."""
         self._reporter.overruns = count
 
     def process(self, now: float) -> bool:
@@ -283,7 +283,7 @@ class Session:
         return self._task.is_current(token)
 
     def end_task(self, token: object, success: bool, message: str) -> None:
-        """It is done, or has failed."""
+        """The task is done, or has failed."""
         self._task.end(token, success, message)
 
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
@@ -319,7 +319,7 @@ class Session:
 
     @property
     def board(self) -> Board:
-        """For what its profile alone knows of."""
+        """The board, for its own profile."""
         return self._board
 
     @property

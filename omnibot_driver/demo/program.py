@@ -75,6 +75,6 @@ class Program:
 
 
 def end_with_parent() -> None:
-    """In a new process: let its parent's end be its own."""
+    """Let a new process end with its parent."""
     pr_set_pdeathsig = 1
     ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGTERM)

@@ -58,7 +58,7 @@ class Parameter:
 
     @property
     def lengths(self) -> tuple[int, int]:
-        """Of a list: the fewest and the most items."""
+        """The least and the largest number of items of a list."""
         assert isinstance(self.default, list)
         return self.length or (len(self.default),) * 2
 
@@ -110,7 +110,7 @@ class Parameter:
 
     @property
     def _shape(self) -> str:
-        """Of a list, in words."""
+        """The shape of a list, in words."""
         things = "strings" if self.kind is str else "numbers"
         fewest, most = self.lengths
         count = NUMBERS[most] if most < len(NUMBERS) else str(most)
@@ -132,7 +132,7 @@ class Parameter:
 
 
 def _converted(value: object, kind: type) -> object:
-    """As YAML means it: 1 for a double, 1.0 for an integer."""
+    """Convert as YAML does: 1 for a double, 1.0 for an integer."""
     if kind is float and type(value) is int:
         return float(value)
     if kind is int and isinstance(value, float) and value.is_integer():

@@ -58,7 +58,7 @@ class Transport(Protocol):
         """
 
     def write_if_room(self, packets: Packets) -> int:
-        """As much as is taken at once, be it nothing; returns how many bytes."""
+        """Write what is accepted at once, perhaps nothing; returns the number of bytes."""
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, where it can be ended."""

@@ -116,14 +116,14 @@ class SerialPort:
             raise LinkError(f"lost {self._url} while writing: {error}") from error
 
     def write_if_room(self, packets: Packets) -> int:
-        """As much of it as is taken at once."""
+        """Write what is accepted at once."""
         if self._descriptor is not None:
             with contextlib.suppress(OSError):
                 return os.write(self._descriptor, joined(packets))
         return 0
 
     def drop_output(self) -> None:
-        """Nothing of what was written and is still here is sent."""
+        """Drop the written bytes that are not sent yet."""
         with contextlib.suppress(OSError, termios.error):
             self._serial.reset_output_buffer()
 
@@ -244,7 +244,7 @@ def _explain(url: str, parameter: str, error: Exception) -> str:
 
 
 def _owner(path: str) -> str:
-    """Who holds the lock on this file, in brackets; nothing where it cannot be known."""
+    """The owner of the lock on this file, in brackets; empty if unknown."""
     with contextlib.suppress(OSError):
         status = os.stat(path)
         device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}"

@@ -27,7 +27,7 @@ class ByteLine(Transport, Protocol):
     """A ``Transport`` of one channel of bytes."""
 
     def drop_output(self) -> None:
-        """Nothing of what was written and is still here is sent."""
+        """Drop the written bytes that are not sent yet."""
 
 
 Opener = Callable[[], ByteLine]
@@ -72,12 +72,12 @@ class Several:
 
     @property
     def ends_with_us(self) -> bool:
-        """Where that is so of every line."""
+        """Whether all lines do."""
         return all(port.ends_with_us for port in self._ports)
 
     @property
     def overruns(self) -> int | None:
-        """Of those that are there, if each counts."""
+        """The sum of the lines' counts, if each present line has one."""
         counts = [port.overruns for port in self._ports]
         return None if None in counts else sum(filter(None, counts))
 
@@ -112,7 +112,7 @@ class Several:
             return 0, b""
 
     def write(self, packets: Packets) -> None:
-        """To each line what is its own; what it does not take at once follows when it does."""
+        """Write its part to each line; what is not accepted at once follows later."""
         now = time.monotonic()
         with self._writing:
             for line, data in self._shared_out(packets):
@@ -123,7 +123,7 @@ class Several:
             self._wake_up.ring()
 
     def write_if_room(self, packets: Packets) -> int:
-        """To each line what is its own."""
+        """Write to each line what it accepts of its part."""
         with self._writing:
             return sum(
                 line.port.write_if_room(((0, data),))
@@ -146,13 +146,13 @@ class Several:
         return [line.port for line in self._lines if line.port is not None]
 
     def _shared_out(self, packets: Packets) -> "Iterator[tuple[Line, bytes]]":
-        """To each line its own, the first to be written to first."""
+        """Split the packets by line, in the order of the first write."""
         for channel in dict.fromkeys(channel for channel, _ in packets):
             own = tuple(packet for packet in packets if packet[0] == channel)
             yield self._lines[channel], joined(own)
 
     def _open_missing(self) -> None:
-        """Those that it is time for. One that took nothing is given back first."""
+        """Open the missing lines whose time has come. One that accepted no data is closed first."""
         now = time.monotonic()
         for channel, line in enumerate(self._lines):
             if not line.trouble or now < line.retry_at:
@@ -232,7 +232,7 @@ class Line:
         self._full_since = 0.0
 
     def begin(self, port: ByteLine) -> None:
-        """It is there."""
+        """The line is present."""
         assert port.descriptors is not None
         self.port, (self.descriptor,) = port, port.descriptors
         self.trouble, self.waits, self.watched = "", b"", False
@@ -262,6 +262,6 @@ class Line:
         return True
 
     def end(self) -> ByteLine | None:
-        """It is not there any more; returns what is to be closed."""
+        """The line is lost; returns what is to be closed."""
         port, self.port, self.descriptor, self.waits = self.port, None, None, b""
         return port

@@ -92,7 +92,7 @@ class UdpPorts:
             raise failed
 
     def write_if_room(self, packets: Packets) -> int:
-        """Those that are taken at once."""
+        """Write the datagrams that are accepted at once."""
         taken = 0
         for channel, data in packets:
             with contextlib.suppress(OSError):

@@ -22,7 +22,7 @@ class WakeUp:
             os.write(self._far, b"\0")
 
     def answer(self) -> None:
-        """It has rung, and was heard."""
+        """Note that the wake-up was received."""
         os.read(self.descriptor, 1000)
 
     def close(self) -> None:

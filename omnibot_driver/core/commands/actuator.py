@@ -32,7 +32,7 @@ class Actuator(Protocol):
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has to be asked again; infinity while nothing is due."""
+        """The time at which ``due`` must be called again; infinity while nothing is due."""
 
     def is_zero(self, order: Order) -> bool:
         """Whether the board would stand still by it. Raises CommandRefused if it can't say it."""

@@ -109,7 +109,7 @@ def slow(values: Sequence[float], limit: float) -> tuple[float, ...]:
 
 
 def _step(now: Sequence[float], wanted: Sequence[float], longest: float) -> tuple[float, ...]:
-    """From one vector towards another, by no more than ``longest``."""
+    """Move one vector towards another, by at most ``longest``."""
     way = tuple(there - here for here, there in zip(now, wanted, strict=True))
     if math.hypot(*way) <= longest:
         return tuple(wanted)

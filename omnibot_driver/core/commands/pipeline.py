@@ -100,7 +100,7 @@ class CommandPipeline:
         return []
 
     def figures(self, now: float) -> CommandFigures:
-        """Who commands, and how."""
+        """Return the current authority and its counters."""
         current = self.policy.current
         return CommandFigures(
             source=current.authority.value if current else None,

@@ -58,7 +58,7 @@ class CommandPolicy:
         self._stopping_since: float | None = None
 
     def configure(self, settings: CommandSettings) -> None:
-        """From the next command and repetition on."""
+        """Use these settings from the next command or repetition on."""
         self.settings = settings
         self._actuator.rate_hz = settings.rate_hz
 
@@ -93,7 +93,7 @@ class CommandPolicy:
         self._actuator.apply(EMERGENCY_STOP if self.latched else STOP, now)
 
     def fall_silent(self, now: float) -> None:
-        """Nothing goes out any more, and whether the last Stop arrived is to be seen anew."""
+        """Send nothing more, and prove the last Stop again."""
         self.discard(now)
         self.quiet = True
         self.proof.begin()
@@ -124,7 +124,7 @@ class CommandPolicy:
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has to be asked again; infinity while the line is quiet."""
+        """The time at which ``due`` must be called again; infinity while the line is quiet."""
         if self.current is not None:
             return min(self._actuator.wake_at, self._expires_at)
         if self._stopping_since is not None:

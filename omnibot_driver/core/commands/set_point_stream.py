@@ -62,11 +62,11 @@ class SetpointStream:
         self.connect()
 
     def is_zero(self, order: Order) -> bool:
-        """By its frames, which may round to Stop."""
+        """Whether its frames are Stop; rounding may make them so."""
         return self._encoder.encode(order) == self._encoder.stop()
 
     def connect(self) -> None:
-        """Nothing has been said."""
+        """Start anew: nothing has been sent on this connection."""
         self._motion: Setpoint | None = None
         self._standing: Stop | EmergencyStop | None = None
         self._fresh = self._urgent = self._switching = False
@@ -121,7 +121,7 @@ class SetpointStream:
 
     @property
     def wake_at(self) -> float:
-        """When the next frame is due."""
+        """The time at which the next frame is due."""
         motion = self._motion
         if self._urgent:
             return -math.inf

@@ -27,7 +27,7 @@ LEAVING_RAD: Final = 2.0
 
 
 class Authority(Enum):
-    """Who commands; the value is the topic's name. One at a time, the newest."""
+    """The topic that commands the robot; the value is its name. One at a time, the newest."""
 
     BASE = "cmd_vel"
     WHEELS = "wheel_cmd"

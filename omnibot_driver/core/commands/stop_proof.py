@@ -43,7 +43,7 @@ class StopProof:
         self.begin()
 
     def begin(self) -> None:
-        """Nothing is known of the robot."""
+        """Start a proof: nothing is known of the robot's motion yet."""
         self.proved = self.measured = False
         self._stopped_at = math.inf
         self._still_s, self._still = 0.0, 0

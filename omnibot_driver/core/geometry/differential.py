@@ -24,11 +24,11 @@ class DifferentialKinematics:
 
     @property
     def rims(self) -> "DifferentialKinematics":
-        """With wheels of 1 m: rates are speeds of the rims."""
+        """Kinematics of wheels of 1 m, whose rates are the speeds of the rims."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
-        """Without its sideways part."""
+        """The twist without its sideways part."""
         return BodyTwist(twist.vx_mps, 0.0, twist.yaw_rate_radps)
 
     def wheel_rates(self, twist: BodyTwist) -> tuple[float, float]:

@@ -28,7 +28,7 @@ class OmniKinematics:
 
     @property
     def rims(self) -> "OmniKinematics":
-        """With wheels of 1 m: rates are speeds of the rims."""
+        """Kinematics of wheels of 1 m, whose rates are the speeds of the rims."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:

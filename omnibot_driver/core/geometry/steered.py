@@ -29,11 +29,11 @@ class SteeredKinematics:
 
     @property
     def rims(self) -> "SteeredKinematics":
-        """With wheels of 1 m: rates are speeds of the rims."""
+        """Kinematics of wheels of 1 m, whose rates are the speeds of the rims."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
-        """Without its sideways part."""
+        """The twist without its sideways part."""
         return self._axle.feasible(twist)
 
     def wheel_rates(self, twist: BodyTwist) -> tuple[float, float]:

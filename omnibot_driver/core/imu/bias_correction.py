@@ -22,7 +22,7 @@ class ImuCorrection:
 
 @value(frozen=True, slots=True)
 class ImuEstimate:
-    """At ``stamp_s``: specific force in m/s², angular velocity in rad/s, in the sensor's axes."""
+    """Specific force in m/s² and angular velocity in rad/s at ``stamp_s``, in the sensor's axes."""
 
     stamp_s: float
     specific_force: Vector3
@@ -59,7 +59,7 @@ class BiasCorrector:
 
     @property
     def advice(self) -> str:
-        """Which setting gravity contradicts, in a sentence; empty while all is well."""
+        """A sentence on the setting that gravity contradicts; empty if there is none."""
         gravity_mps2 = self.calibration.gravity_mps2
         return "" if gravity_mps2 is None else self._board.gravity_advice(gravity_mps2)
 

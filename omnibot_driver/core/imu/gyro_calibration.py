@@ -64,7 +64,7 @@ class Look:
 
     @property
     def length_s(self) -> float:
-        """From the first reading to the last."""
+        """Time from the first reading to the last."""
         return self.last_s - self.began_s if self.rates else 0.0
 
     @property

@@ -72,7 +72,7 @@ class MeasurementPipeline:
 
     @property
     def refused_displacements(self) -> int:
-        """Of these, those that no robot can have made."""
+        """The number of displacements that were rejected as impossible."""
         return self._outliers.refused_displacements
 
     @property
@@ -112,7 +112,7 @@ class MeasurementPipeline:
 
     @property
     def tally(self) -> StreamStatistics:
-        """Of all that was heard so far."""
+        """Statistics of everything that was received so far."""
         for readings, delay_s in self._uncounted:
             self._tally.read(readings, delay_s)
         self._uncounted.clear()

@@ -115,7 +115,7 @@ class MotionMonitor:
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:
-        """Once, until the robot has obeyed again."""
+        """Whether to report this fault: once, until the robot has obeyed again."""
         told, self._told = self._told, self._told | {fault}
         return fault not in told
 

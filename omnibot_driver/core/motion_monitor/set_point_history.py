@@ -39,7 +39,7 @@ class SetpointHistory:
         self.clear()
 
     def clear(self) -> None:
-        """Nothing is known of what was commanded before."""
+        """Forget all earlier commands."""
         self.current: CommandedTwist = None
         self._entries: deque[tuple[float, BodyTwist]] = deque()
         self._known_from_s = math.inf

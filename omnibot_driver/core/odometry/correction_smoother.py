@@ -23,7 +23,7 @@ class CorrectionSmoother:
 
     @property
     def wrong(self) -> Pose:
-        """By how much ``pose`` is known to be off."""
+        """The known error of ``pose``."""
         return self.target - self.pose
 
     def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:

@@ -46,7 +46,7 @@ class OdometryNoise:
 
 @value(frozen=True, slots=True)
 class Covariance:
-    """Of (x, y, yaw) in the odometry frame: m², m·rad, rad²; symmetric."""
+    """A covariance of (x, y, yaw) in the odometry frame: m², m·rad, rad²; symmetric."""
 
     xx: float = INITIAL_VARIANCE
     xy: float = 0.0
@@ -57,11 +57,11 @@ class Covariance:
 
     @classmethod
     def diagonal(cls, m2: float, rad2: float) -> "Covariance":
-        """Of independent errors."""
+        """A covariance of independent errors."""
         return cls(m2, 0.0, 0.0, m2, 0.0, rad2)
 
     def __add__(self, other: "Covariance") -> "Covariance":
-        """Of the sum of two independent errors."""
+        """The covariance of the sum of two independent errors."""
         return Covariance(
             self.xx + other.xx,
             self.xy + other.xy,
@@ -93,7 +93,9 @@ class Covariance:
         )
 
     def carried(self, dx_m: float, dy_m: float) -> "Covariance":
-        """After a displacement given in the odometry frame: a wrong yaw makes a wrong way."""
+        """The covariance after a displacement, in the odometry frame; a yaw error moves the
+        position.
+        """
         return Covariance(
             xx=self.xx - 2 * dy_m * self.x_yaw + dy_m * dy_m * self.yaw_yaw,
             xy=self.xy + dx_m * self.x_yaw - dy_m * self.y_yaw - dx_m * dy_m * self.yaw_yaw,
@@ -171,7 +173,7 @@ class Uncertainty:
         self._walk, self.gap = self._walk + self.gap, NOTHING
 
     def total(self, open_error: Pose) -> Covariance:
-        """Of a pose that is known to be off by ``open_error`` and otherwise at its best."""
+        """The covariance of a pose with the error ``open_error`` in addition to its best."""
         noise, levers = self.noise, self._levers
         scale = noise.wheel_scale * noise.wheel_scale
         slip = noise.wheel_slip * noise.wheel_slip

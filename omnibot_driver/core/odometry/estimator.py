@@ -96,7 +96,7 @@ class Odometry:
         return self._belief.refused
 
     def configure(self, settings: OdometrySettings) -> None:
-        """From the next displacement on."""
+        """Use these settings from the next displacement on."""
         self._settings = settings
         self._track.configure(
             settings.noise,

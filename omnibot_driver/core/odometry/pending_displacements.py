@@ -12,7 +12,7 @@ from omnibot_driver.core.readings import DisplacementReading
 
 
 class PendingDisplacements:
-    """In the order in which they came, each with its stamp."""
+    """Displacements in order of arrival, each with its stamp."""
 
     def __init__(self) -> None:
         self._waiting: list[tuple[DisplacementReading, float]] = []
@@ -70,7 +70,7 @@ class PendingDisplacements:
         return min(unheard_s, max(0.0, stamp_s - last_stamp_s - reading.duration_s))
 
     def before(self, board: Pose) -> Pose:
-        """Where they began if they lead to this pose."""
+        """The pose at which they began if they end at this pose."""
         start = Pose(yaw_rad=board.yaw_rad - sum(reading.dyaw_rad for reading, _ in self._waiting))
         end = start
         for reading, _ in self._waiting:
@@ -79,7 +79,7 @@ class PendingDisplacements:
 
 
 def chord(reading: DisplacementReading) -> Pose:
-    """As it stands in its own frame."""
+    """The displacement in its own frame."""
     return Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad)
 
 

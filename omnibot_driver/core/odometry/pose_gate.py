@@ -44,7 +44,7 @@ class PoseGate:
             self.doubted = self.doubted.moved(chord)
 
     def passed(self, seconds: float) -> None:
-        """Of board time."""
+        """A span of board time has passed."""
         self._unproved_s += seconds
 
     def possible(self, told: Pose) -> bool:
@@ -65,7 +65,7 @@ class PoseGate:
         self.proved, self.doubted, self._unproved_s = board, None, 0.0
 
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
-        """From the last pose that was believed, at these speeds, and this many seconds more."""
+        """Whether the pose can be reached from the last accepted one, at these speeds."""
         if self.proved is None:
             return False
         way = self.proved.way_to(told)

@@ -44,7 +44,7 @@ class PoseTracker:
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(self.uncertainty.noise)
 
     def rates(self, tangent: Pose, seconds: float) -> tuple[BodyTwist, BodyTwist]:
-        """Of this motion in this time: in REP-103's axes, and in the board's."""
+        """The twist of this motion in this time: in REP-103's axes, and in the board's."""
         rolling = _times(tangent, self._size).over(seconds)
         if self._signed_size == self._size:
             return rolling, rolling
@@ -77,7 +77,7 @@ class PoseTracker:
         self.uncertainty.settle()
 
     def _part(self, tangent: Pose) -> Pose:
-        """It was rolled, and is uncertain; in REP-103's axes."""
+        """Add to the rolled motion and its uncertainty; returns the motion in REP-103's axes."""
         self.rolled += _times(tangent, self._size)
         signed = _times(tangent, self._signed_size)
         self.uncertainty.move(self.follower.target.yaw_rad, signed)

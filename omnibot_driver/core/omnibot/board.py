@@ -113,7 +113,7 @@ class OmniBot:
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """By the IMU frame in hand, whole or begun, and the bytes after it."""
+        """The boundary by the IMU frame in hand, complete or begun, and the bytes after it."""
         if self._decoder.at_rest:
             return self._nothing_begun
         begun = self._decoder.begun
@@ -140,12 +140,12 @@ class OmniBot:
         )
 
     def gravity_advice(self, gravity_mps2: float) -> str:
-        """By the accelerometer's range."""
+        """Advice on the accelerometer's range."""
         return gravity_advice(gravity_mps2, self._settings.imu.accel_range_g)
 
     @property
     def advice(self) -> str | None:
-        """Which parameter is set wrong, by what the board sends."""
+        """A sentence on the parameter that contradicts what the board sends."""
         return self._translation.suspicion.advice
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
@@ -161,7 +161,7 @@ class OmniBot:
         return self._translation.readings(found, self._decoder.skipped, now)
 
     def silence(self) -> None:
-        """Nothing was understood for so long that the mode is unknown again."""
+        """The silence has lasted so long that the mode is unknown again."""
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def due(self, now: float) -> Packets:
@@ -173,7 +173,7 @@ class OmniBot:
         return []
 
     def reset_odometry(self) -> None:
-        """It has none of its own."""
+        """No effect: the board has no such request."""
 
     def actuator(self, proof: StopProof) -> SetpointStream:
         """Frames, repeated."""

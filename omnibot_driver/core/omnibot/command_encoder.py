@@ -90,7 +90,7 @@ class CommandEncoder:
         return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """By the mode and the words of the last command frame."""
+        """The motion that the last command frame means, by its mode and words."""
         settings = self._settings
         mode, a, b, c = frames.last_command(packets[-1][1])
         linear = settings.linear_scale

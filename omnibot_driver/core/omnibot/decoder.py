@@ -166,7 +166,7 @@ class FrameDecoder:
                 return
 
     def _walk(self, found: list[Frame], closed: bool) -> bool:
-        """In step: take the frames that nothing speaks against. Whether no doubt is left."""
+        """Take frames in step until there is a doubt; returns whether there is none."""
         held, gaps, expectation = self._held, self.pauses.gaps, self.expectation
         order, context = self._pose_byte_order, self.context
         at, size, walk = 0, len(held), Walk(context)
@@ -208,7 +208,7 @@ class FrameDecoder:
         return True
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Where it breaks, the last two frames are in doubt as well."""
+        """Accept the frames of a run except the last two, which are in doubt; returns False."""
         believed = len(walk.frames) - 2
         if believed > 0:
             self._take(walk, believed, walk.known_after(believed, self.expectation), found)
@@ -236,7 +236,7 @@ class FrameDecoder:
         self._wait_for = 0
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
-        """In doubt: take what is sure, drop what stays doubtful. Whether anything was settled."""
+        """Take what is certain, drop what stays doubtful; returns whether that settled anything."""
         state = self.context, self.expectation, self.pauses, self._pose_byte_order
         pieces = read(stretch, *state, in_step=self._in_step, closed=closed)
         half = len(stretch) // 2 if len(stretch) == DOUBT_BYTES else 0

@@ -44,7 +44,7 @@ def _nominal(imus_per_delta: int, deltas_per_pose: int) -> Cycle:
 
 
 class FrameSchedule:
-    """Where in its cycle a board is; one for each stretch in which it runs."""
+    """The position of a running board in its cycle of frames."""
 
     def __init__(self, schedule: Schedule = USUAL) -> None:
         self._nominal = _nominal(schedule.imus_per_delta, schedule.deltas_per_pose)

@@ -47,7 +47,7 @@ class InterFrameGaps:
         self.doubt()
 
     def doubt(self) -> None:
-        """They may have deceived us."""
+        """Forget the pauses, which may have been misleading."""
         self.sharp = self.between = self.certain = False
         self._sharp = self._between = 0
 
@@ -120,7 +120,7 @@ class InterFrameGaps:
         self.gaps, self._reads = [], []
 
     def _within(self, start: int, end: int) -> Iterator[Gap]:
-        """Those that stand between the first and the last of these bytes."""
+        """The pauses between the first and the last of these bytes."""
         gaps = self.gaps
         for number in range(bisect_right(gaps, start, key=_FIRST), len(gaps)):
             if gaps[number].first >= end:

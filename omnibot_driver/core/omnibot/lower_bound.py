@@ -53,7 +53,7 @@ def least_costs(data: bytes) -> list[float]:
 
 
 def _undamaged(data: bytes) -> dict[int, int]:
-    """Where whole frames lead that begin here, one after the other; the last place first."""
+    """The ends of whole frames that begin here, one after the other; the last one first."""
     size = len(data)
     ends: dict[int, int] = {}
     for found in reversed([*_BEGINNING.finditer(data)]):

@@ -248,7 +248,7 @@ class _Search:
         self._edges.append(edge)
 
     def _context(self, node: int) -> Context:
-        """On the cheapest way to this node; after a bad run or a damaged frame little is known."""
+        """What is known on the cheapest way to this node; after damage it is little."""
         found, damaged, at = self._contexts.get(node), False, node
         while found is None:
             edge = self._by[at]

@@ -43,7 +43,7 @@ OF_KIND: Final[Mapping[RateName, tuple[str, ...]]] = {
 
 
 class Level(IntEnum):
-    """As in diagnostic_msgs/DiagnosticStatus."""
+    """The levels of diagnostic_msgs/DiagnosticStatus."""
 
     OK = 0
     WARN = 1
@@ -231,7 +231,7 @@ class Diagnosis:
         )
 
     def _waiting_share(self, link: LinkFigures, now: float) -> float:
-        """Of the recent time that the reader was ready to run and did not."""
+        """The part of the recent time in which the reader was ready to run and did not."""
         if link.waited_s is None:
             return 0.0
         self._waits.append((now, link.waited_s))
@@ -245,7 +245,7 @@ class Diagnosis:
         return self._window[-1][0] - self._window[0][0]
 
     def _rates_hz(self) -> dict[RateName, float] | None:
-        """Of the readings in this state; None before there was time to count any."""
+        """Rates of the readings in this state; None until there was time to count."""
         if not self._span_s:
             return None
         old, new = self._window[0][1].tally, self._window[-1][1].tally

@@ -29,7 +29,7 @@ class ArrivalClock:
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """In the order of the readings, each later than the one before."""
+        """Stamps in the order of the readings, each later than the one before."""
         stamps = []
         for left in range(len(readings) - 1, -1, -1):
             at_s = now - left * SMALLEST_STEP_S

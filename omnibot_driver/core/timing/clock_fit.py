@@ -107,7 +107,7 @@ class ClockFit:
         return min(max(slope_s, least), most)
 
     def _lay_between(self) -> bool:
-        """In the middle of all bounds, unless they contradict: then the earliest are forgotten."""
+        """Lay the line in the middle of all bounds; if they contradict, forget the earliest."""
         flattest, steepest = -math.inf, math.inf
         above = _hull([at for at, _ in self._latest])
         below = [(tick, -time) for tick, time in _hull([(t, -s) for t, s in self._earliest])]

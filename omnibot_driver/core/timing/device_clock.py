@@ -81,7 +81,7 @@ class DeviceClock:
 
     @property
     def skew_ppm(self) -> float:
-        """By how much the board's clock is faster than ours, by what has been seen so far."""
+        """How much faster the board's clock is than the host's, as seen so far."""
         line = self._line
         return 0.0 if line is None else 1e6 * (self._period_s / line.slope_s - 1.0)
 

@@ -65,7 +65,7 @@ class ServedBoard(RunningBoard[B]):
 
     @property
     def addresses(self) -> list[str]:
-        """By channel, what the driver's parameter is set to: a path, or udp://127.0.0.1:PORT."""
+        """Values of the driver's port parameters by channel: a path, or udp://127.0.0.1:PORT."""
         return [carrier.address for carrier in self._carriers]
 
     @property
@@ -115,7 +115,7 @@ class PtyBoard(ServedBoard[B]):
 
     @property
     def path(self) -> str:
-        """Of the pseudo-terminal; empty until it is opened."""
+        """Path of the pseudo-terminal; empty until it is opened."""
         return self.addresses[0] if self._carriers else ""
 
     @property

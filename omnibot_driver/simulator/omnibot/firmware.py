@@ -151,7 +151,7 @@ class SimulatedBoard:
 
     @property
     def truth(self) -> TruePose:
-        """Where the robot truly is and how it truly moves."""
+        """The true pose and motion of the robot."""
         return self._world.truth
 
     @property
@@ -238,7 +238,7 @@ class SimulatedBoard:
         return b"".join(sent)
 
     def advance(self) -> list[Packet]:
-        """As `step`; a packet, unless nothing is sent."""
+        """Like `step`, as a packet; None if nothing is sent."""
         data = self.step()
         return [(0, data)] if data else []
 

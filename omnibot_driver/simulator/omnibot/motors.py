@@ -39,7 +39,7 @@ class MotorConstants:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WheelGains:
-    """Of the wheel's speed controller (manual, Controller parameters)."""
+    """Gains of the wheel's speed controller (manual, Controller parameters)."""
 
     feed_forward: float = 40.0
     proportional: float = 10.0

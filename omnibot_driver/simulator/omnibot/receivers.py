@@ -44,7 +44,7 @@ _NOTHING: Final[Step] = (b"", None, False)
 
 
 def counting(held: bytes, byte: int, pause_s: float) -> Step:
-    """After FF FE it counts seven more bytes, for ever; FF FF FE is a header."""
+    """A receiver that counts seven more bytes after FF FE, for ever; FF FF FE is a header."""
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         held = b""
     if not held and byte != _FIRST:
@@ -53,14 +53,14 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """As `counting`, but the byte after an FF is gone unless it is FE; FF FF FE is not a header."""
+    """A receiver like `counting` that drops the byte after FF unless it is FE."""
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         return b"", None, True
     return counting(held, byte, pause_s)
 
 
 def idle_gap(held: bytes, byte: int, pause_s: float) -> Step:
-    """As `counting`, but a pause ends a frame that is not complete."""
+    """A receiver like `counting` in which a pause ends an incomplete frame."""
     return counting(b"" if pause_s >= IDLE_GAP_S else held, byte, pause_s)
 
 

@@ -93,7 +93,7 @@ class World:
 
     @property
     def truth(self) -> TruePose:
-        """Where the robot truly is and how it truly moves."""
+        """The true pose and motion of the robot."""
         return TruePose(*self._pose, *self._twist)
 
     @property

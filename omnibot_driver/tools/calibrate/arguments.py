@@ -43,7 +43,7 @@ def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:
 
 
 def command_line() -> argparse.ArgumentParser:
-    """Of all subcommands; ends with 2 and a sentence on wrong usage."""
+    """Parse the command line; exits with 2 and a message on wrong usage."""
     parser = argparse.ArgumentParser(
         prog="calibrate",
         description="Finds what the driver's parameters ought to be, with uncertainties.",

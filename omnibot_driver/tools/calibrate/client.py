@@ -80,7 +80,7 @@ class Client:
         return self._node.get_namespace().rstrip("/")
 
     def _table(self) -> Table:
-        """Of the board that the driver has."""
+        """The parameter table of the driver's board."""
         board = self._get_parameters(["board"])["board"]
         if board not in boards.PROFILES:
             raise ToolError(
@@ -100,7 +100,7 @@ class Client:
         }
 
     def set_parameters(self, values: Mapping[str, Value]) -> None:
-        """In the running driver. Raises ToolError with its reason for a refusal."""
+        """Set parameters of the running driver. Raises ToolError with the reason of a refusal."""
         messages = [
             Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
         ]

@@ -88,7 +88,7 @@ class Walk:
     # What the data tell
 
     def board(self, found: Found) -> None:
-        """Where the switch stands, and what the deltas are."""
+        """Find the position of the switch and the meaning of the deltas."""
         say = self._console.say
         slow_mps = SLOW_LSB / self._robot.parameters["linear_scale"]
         say("The mode switch: forward slowly, then twice as fast.")
@@ -135,7 +135,7 @@ class Walk:
     # What eyes tell
 
     def wheels(self, found: Found) -> None:
-        """Which wheel is which, and the signs of the axes."""
+        """Find the order of the wheels and the signs of the axes."""
         self._console.say(
             "Look at each wheel from outside, towards the robot's centre. By the manual A is front"
             " right, B front left, C at the back.\nAnswer with three signs, for A, B and C:"

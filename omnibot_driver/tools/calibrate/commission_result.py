@@ -109,7 +109,7 @@ def _remarks(found: Found) -> list[str]:
 
 
 def draw(figure: "Figure", found: Found) -> None:
-    """From above: the axes that the board calls x and y, and those of the IMU."""
+    """Draw, from above, the axes that the board calls x and y, and those of the IMU."""
     left, right = figure.subplots(1, 2)
     for axes in (left, right):
         axes.add_artist(Circle((0.0, 0.0), 1.0, fill=False, color="0.7"))

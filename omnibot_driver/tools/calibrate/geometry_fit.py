@@ -66,7 +66,7 @@ class Geometry:
 
     @property
     def unlike_sigma(self) -> Column:
-        """Of each wheel's difference from the mean."""
+        """Standard deviation of each wheel's difference from the mean."""
         slopes = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, -1, -1]], dtype=float)
         return np.array([_sigma(slope, self.covariance) for slope in slopes])
 

@@ -123,7 +123,7 @@ class Listener(Client):
 
 
 def silent(heard_s: Mapping[str, float], wanted: Sequence[str], now_s: float) -> list[str]:
-    """Which of the wanted topics were heard too long ago."""
+    """The wanted topics without a recent message."""
     return [topic for topic in wanted if now_s - heard_s[topic] > LOST_S]
 
 

@@ -51,7 +51,7 @@ class Drift:
 
     @property
     def direction_rad(self) -> float:
-        """In the body's plane."""
+        """Direction of the motion in the body's plane."""
         return math.atan2(self.vy_mps, self.vx_mps)
 
 

@@ -82,7 +82,7 @@ def bias(imu: Imu) -> Array:
 
 
 def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
-    """From three directions straight up, of unit length. Raises Contradiction."""
+    """The mounting from three unit vectors that point up. Raises Contradiction."""
     nose_rad, left_rad = _tilt(level, nose_up, "front"), _tilt(level, left_up, "left side")
     forward, left = _level_part(level, nose_up), _level_part(level, left_up)
     square_rad = math.atan2(float(level @ np.cross(forward, left)), float(forward @ left))
@@ -144,7 +144,7 @@ def _tilt(level: Array, tilted: Array, what: str) -> float:
 
 
 def _level_part(level: Array, tilted: Array) -> Array:
-    """Where the tilt points to, in the level plane; of unit length."""
+    """Unit vector of the tilt in the level plane."""
     part = tilted - (tilted @ level) * level
     return np.asarray(part / np.linalg.norm(part))
 

@@ -98,7 +98,7 @@ class Traits:
 
 
 def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
-    """Of an answer; the speed that it comes to is the mean of its last quarter."""
+    """Traits of an answer; its final speed is the mean of its last quarter."""
     comes_to = rpm[-len(rpm) // 4 :].mean(axis=0)
     overshoot = np.maximum(rpm.max(axis=0) / np.maximum(comes_to, target_rpm) - 1.0, 0.0)
     outside = np.abs(rpm - comes_to) > band * np.maximum(comes_to, 1e-9)

@@ -36,7 +36,7 @@ class Measured:
 
     @property
     def overshoot(self) -> float:
-        """Of the mean of the steps over 0.2 s, as the highest of many noisy ones is too high."""
+        """Overshoot of the steps' mean over 0.2 s; the peak of noisy samples is too high."""
         grid_s = np.arange(0.0, min(one.times_s[-1] for one in self.steps), 0.02)
         mean = np.mean([np.interp(grid_s, one.times_s, one.rpm) for one in self.steps], axis=0)
         calm = np.convolve(mean, np.full(10, 0.1), "valid")

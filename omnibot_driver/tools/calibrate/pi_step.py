@@ -87,7 +87,7 @@ class _Bench:
         self.robot.rest(WRITTEN_WITHIN_S)
 
     def record(self, topic: str, command: Sequence[float], count: int = 1) -> Records:
-        """From standstill, each of them."""
+        """Record starts, each from standstill."""
         found: Records = {side: [] for side in SIDES}
         for _ in range(count):
             for side, column in read(self.robot.record("record_rpm", topic, command)).items():
@@ -97,7 +97,7 @@ class _Bench:
         return found
 
     def steps(self, rpm: Sequence[float]) -> Records:
-        """Of the set-point."""
+        """Record steps of the set-point."""
         rates = [one * 2 * np.pi / 60 for one in rpm]
         return self.record("wheel_cmd", rates, self._responses)
 
@@ -148,7 +148,7 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 
 
 def _plant(found: PlantFit, free: Levels) -> Plant:
-    """With the static speeds at two duties: a line, which meets standstill at the dead zone."""
+    """The plant by the static speeds at two duties: a line from the dead zone on."""
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:
         raise ToolError(

@@ -59,7 +59,7 @@ class Rest:
 
     @property
     def level_sigma_rad(self) -> float:
-        """Of each, by the noise alone."""
+        """Standard deviation of each angle by the noise alone."""
         return float(self.force_sigma.max() / self.gravity_mps2)
 
 

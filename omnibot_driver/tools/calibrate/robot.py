@@ -184,7 +184,7 @@ class Robot(Listener):
 
     @contextmanager
     def _unmonitored(self) -> Iterator[None]:
-        """Without the driver's motion monitor, which stops a robot whose settings are wrong."""
+        """A context without the motion monitor, which would stop a robot with wrong settings."""
         before = {"motion_monitor": self.parameters["motion_monitor"]}
         self.set_parameters({"motion_monitor": False})
         try:
@@ -286,7 +286,7 @@ class Robot(Listener):
 
 
 def _values(message: Any) -> tuple[float, ...]:
-    """Of a command, as it is on the wire."""
+    """The numbers of a command as they are on the wire."""
     if isinstance(message, Float32MultiArray):
         return tuple(message.data)
     twist = message.twist if isinstance(message, TwistStamped) else message

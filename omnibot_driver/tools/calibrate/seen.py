@@ -35,7 +35,7 @@ def understand(answer: str) -> Pattern | None:
 
 
 def in_words(pattern: Sequence[int]) -> str:
-    """For a person."""
+    """Describe it for a person."""
     return ", ".join(f"{wheel} {WORDS[sign]}" for wheel, sign in zip(WHEELS, pattern, strict=True))
 
 

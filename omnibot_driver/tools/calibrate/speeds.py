@@ -145,7 +145,7 @@ def _way(pose: Column, axis: int) -> Column:
 
 
 def _slope(stamp_s: Column, way: Column) -> tuple[float, float]:
-    """Of the straight line through the way over time, with its standard deviation."""
+    """Slope of the straight line of distance over time, with its standard deviation."""
     off_s = stamp_s - stamp_s.mean()
     speed = float(off_s @ way / (off_s @ off_s))
     left = way - way.mean() - speed * off_s

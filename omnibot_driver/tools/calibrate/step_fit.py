@@ -194,7 +194,7 @@ class WheelFound:
 
     @property
     def motor(self) -> Motor:
-        """In ticks."""
+        """Parameters of the motor, in ticks."""
         _gain, pwm_per_count, time_constant_s, delay_s = self.motor_fit.values
         return Motor(pwm_per_count, time_constant_s / TICK_S, delay_s / TICK_S)
 
@@ -229,7 +229,7 @@ def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
 
 
 def alike(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """Without those that differ from all others."""
+    """The steps without those that differ from all others."""
     guess = fit(model, steps)
     misfits = [_misfit(guess, step) for step in steps]
     most = UNLIKE * sorted(misfits)[len(misfits) // 2]

@@ -35,7 +35,7 @@ class Model:
     turned: Turned
 
     def mean(self, parameters: Array, end_s: Array) -> Array:
-        """Of the unit step's answer, over the deltas that end at these times."""
+        """Mean of the unit step's answer over the deltas that end at these times."""
         turned = self.turned(parameters, np.concatenate((end_s, end_s - SPAN_S)))
         return np.asarray((turned[: len(end_s)] - turned[len(end_s) :]) / SPAN_S)
 

@@ -131,7 +131,7 @@ def _remarks(wheel: WheelFound) -> list[str]:
 
 
 def _told(wheels: list[Behaviour]) -> str:
-    """Of the worst wheel, each figure by itself."""
+    """Describe the worst wheel, figure by figure."""
     rise_ms, command_ms, load_ms = (
         1000 * max(float(value) for value in values)
         for values in (

@@ -46,7 +46,7 @@ class Plant:
     dead_zone_percent: float = 0.0
 
     def final_rpm(self, duty_percent: float) -> float:
-        """After a long time."""
+        """Speed after a long time."""
         return self.rpm_per_percent * max(duty_percent - self.dead_zone_percent, 0.0)
 
 
@@ -214,7 +214,7 @@ def _neighbours(residuals: Column, lengths: Sequence[int]) -> float:
 
 
 def _whitener(correlation: float, length: int) -> Column:
-    """Of a row of residuals whose neighbours are so correlated: the Cholesky factor, as bands."""
+    """Whiten residuals with correlated neighbours: the Cholesky factor, as bands."""
     bands = np.vstack([np.ones(length), np.full(length, correlation)])
     return np.asarray(cholesky_banded(bands, lower=True))
 

@@ -26,7 +26,7 @@ SMOOTHED: Final = 4
 
 
 def read(path: Path) -> dict[str, Column]:
-    """By side: times between ticks in s. Raises ToolError for a file that tells too little."""
+    """Read a file: times between ticks in s, by side. Raises ToolError if it has too few."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
@@ -100,7 +100,7 @@ class Response:
 
 
 def response(ticks_s: Column, ticks_per_revolution: int) -> Response:
-    """Without the first tick, in whose time the wheel stood."""
+    """The response without the first tick, whose time contains the standstill."""
     times_s = ticks_s[1:].copy()
     times_s[~np.isfinite(times_s)] = np.nanmedian(times_s)
     ends_s = np.concatenate(([0.0], np.cumsum(times_s)))

@@ -33,7 +33,7 @@ def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
 
 
 def straight(way_m: float, speed: float) -> Law:
-    """So far ahead in x alone, as a base with two wheels can; ``speed`` in m/s."""
+    """A waypoint ahead in x alone, for a base with two wheels; ``speed`` in m/s."""
 
     def law(_seconds: float, pose: Pose) -> Vector3 | None:
         left_m = way_m - pose.x_m
@@ -45,7 +45,7 @@ def straight(way_m: float, speed: float) -> Law:
 
 
 def turn(angle_rad: float, turning: float) -> Law:
-    """On the spot, to the left where it is positive; ``turning`` in rad/s."""
+    """A turn on the spot, to the left if positive; ``turning`` in rad/s."""
     sign = math.copysign(1.0, angle_rad)
 
     def law(_seconds: float, pose: Pose) -> Vector3 | None:

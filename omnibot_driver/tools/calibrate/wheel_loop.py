@@ -21,7 +21,7 @@ TICK_S: Final = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Motor:
-    """Of first order: what a count per tick needs, how slowly it follows, how late it begins."""
+    """A motor of first order: effort per count, time constant, dead time."""
 
     pwm_per_count: float
     time_constant_ticks: float
@@ -100,7 +100,7 @@ def sensitivity_peak(motor: Motor, gains: Gains, points: int = 400) -> Array:
 
 
 def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """From effort to the counts of the next ticks, at points z of the unit circle."""
+    """The transfer function from effort to counts, at points z of the unit circle."""
     whole, part = divmod(motor.delay_ticks, 1.0)
     lag = motor.time_constant_ticks
     decay = np.exp(-1.0 / lag)

@@ -112,7 +112,7 @@ def _run(options: argparse.Namespace, ros_arguments: list[str]) -> int:
 
 
 def _find(feed: "Feed", timeout_s: float) -> None:
-    """Until the driver says its state; raises ToolError, which names those that are there."""
+    """Wait until the driver publishes its state; ToolError names the drivers found."""
     if _comes_about(lambda: bool(feed.view().state), timeout_s):
         return
     there = feed.drivers()

@@ -110,7 +110,7 @@ class Monitor(App[None]):
         self._parts = {name: Static(id=name, markup=False) for name in PARTS}
 
     def compose(self) -> ComposeResult:
-        """From top to bottom."""
+        """Build the screen from top to bottom."""
         parts = self._parts
         yield from (parts["title"], parts["estop"])
         yield Horizontal(parts["path"], parts["figures"], id="middle")
@@ -205,13 +205,13 @@ class Monitor(App[None]):
             self._robot.dead_man.stop()
 
     def action_estop(self) -> None:
-        """At once, whatever else is on the screen."""
+        """Latch the e-stop at once, whatever else is on the screen."""
         self._robot.estop()
         if isinstance(self.screen, Release):
             self.screen.dismiss(False)
 
     def action_release(self) -> None:
-        """After a question."""
+        """Release the e-stop after a question."""
         self.push_screen(Release(), lambda sure: self._robot.release() if sure else None)
 
     def action_start(self) -> None:

@@ -136,7 +136,7 @@ class Feed:
     # What a person wants
 
     def estop(self) -> None:
-        """By topic and by service, and again until the driver shows that it has heard."""
+        """Latch by topic and by service, and repeat until the driver shows it."""
         if self.dead_man:
             self.dead_man.stop()
         self._model.estop_asked = True
@@ -188,7 +188,7 @@ class Feed:
         self._learned = False
 
     def _learn(self) -> None:
-        """Once with each state, as it may be another driver's: what its board has."""
+        """Read what the board has, at each change of state, as another driver may have started."""
         if not self._learned and self._list.service_is_ready():
             self._learned = True
             listing = self._list.call_async(ListParameters.Request())
@@ -279,7 +279,7 @@ class Feed:
             self._model.estop_asked = False
 
     def say(self, text: str) -> None:
-        """In the line where answers are shown."""
+        """Show a message in the line of answers."""
         with self._lock:
             self._model.said = text
 

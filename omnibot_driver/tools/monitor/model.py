@@ -200,5 +200,5 @@ class Model:
 
 
 def level(byte: int) -> Level:
-    """As in diagnostic_msgs/DiagnosticStatus; what is none counts as the worst."""
+    """The level of diagnostic_msgs/DiagnosticStatus; an unknown one counts as the worst."""
     return Level(byte) if byte in tuple(Level) else Level.ERROR

@@ -66,16 +66,16 @@ class DeadMan:
         return True
 
     def stop(self) -> None:
-        """Whatever is held: stand still."""
+        """Command a standstill, whatever key is held."""
         self._held = NOTHING
 
     def change_speed(self, steps: int) -> None:
-        """By tenths of the fastest, from one to ten."""
+        """Change the speed in tenths of the fastest, from one to ten."""
         self.level = min(max(self.level + steps, 1), LEVELS)
 
     @property
     def speeds(self) -> tuple[float, float]:
-        """In m/s and rad/s, at this level."""
+        """Speeds at this level, in m/s and rad/s."""
         part = self.level / LEVELS
         return part * self.fastest[0], part * self.fastest[1]
 

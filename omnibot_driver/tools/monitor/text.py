@@ -27,12 +27,12 @@ COUNTS: Final = (
 
 
 def clean(text: str) -> str:
-    """Without what would move a terminal's cursor."""
+    """The text without terminal control characters."""
     return "".join(char if char.isprintable() else "?" for char in text)
 
 
 def number(value: float | None, places: int = 2) -> str:
-    """In seven columns, whatever it is."""
+    """The number in seven columns."""
     if value is None:
         return "–".rjust(WIDTH)
     if 999.9 < abs(value) < math.inf:
@@ -46,7 +46,7 @@ def numbers(values: Iterable[float] | None) -> str:
 
 
 def title(view: View) -> str:
-    """Who, in which mode, over which link."""
+    """The title line: driver, mode and link."""
     if view.silent:
         return f"{view.driver}  nothing heard for {view.silent_s:.0f} s (was {view.state})"
     return clean(f"{view.driver}  {view.state}  {view.link}".rstrip())

@@ -93,5 +93,5 @@ class VelocityTopic:
 
 
 def body_twist(twist: Any) -> BodyTwist:
-    """As it came: NaN is something to be shown."""
+    """The twist as received; NaN is shown."""
     return BodyTwist(twist.linear.x, twist.linear.y, twist.angular.z)

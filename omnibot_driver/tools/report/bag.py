@@ -63,7 +63,7 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
 def _messages(
     reader: Reader, topics: Collection[str], troubles: list[str]
 ) -> Iterator[tuple[Connection, int, bytes]]:
-    """As far as it can be read."""
+    """Messages of the bag, as far as it can be read."""
     wanted = [item for item in reader.connections if item.topic in topics]
     if not wanted:
         return

@@ -25,7 +25,7 @@ POINTS: Final = 3000
 
 
 def new_figure(height_in: float) -> Figure:
-    """As wide as all."""
+    """A new figure with the common width."""
     return Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
 
 
@@ -40,7 +40,7 @@ def dress(axes: Axes, label: str, title: str = "") -> None:
 
 
 def legend(axes: Axes) -> None:
-    """In a corner that is kept free."""
+    """Draw the legend in a corner that is kept free."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", ncols=4, frameon=False, fontsize=9, borderaxespad=0.1)
 
@@ -53,7 +53,7 @@ def legend_below(axes: Axes) -> None:
 
 
 def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
-    """As many points as are seen: least and greatest of each stretch, in the order of time."""
+    """Reduce to the visible number of points: minimum and maximum of each stretch, in order."""
     if len(times_s) <= POINTS:
         return times_s, values
     size = -(-len(times_s) // (POINTS // 2))

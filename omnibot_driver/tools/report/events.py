@@ -20,7 +20,7 @@ SILENT_S: Final = 2.0
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """In this order."""
+    """Run all checks in this order."""
     yield from _states(log)
     yield from _estop(log)
     yield from _diagnostics(log)
@@ -59,7 +59,7 @@ def _states(log: Log) -> Iterator[Finding]:
 
 
 def _lost(states: list[Span]) -> list[Span]:
-    """While the board was out of reach, whether or not its port was open meanwhile."""
+    """Spans in which the board was out of reach, with an open port or without."""
     lost: list[Span] = []
     for state in states:
         if state.what in OUT_OF_REACH and state.end_s > FIRST_SECONDS:

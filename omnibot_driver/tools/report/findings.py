@@ -48,5 +48,5 @@ def span(seconds: float) -> str:
 
 
 def counted(number: int, thing: str) -> str:
-    """With its plural."""
+    """A number with its noun in singular or plural."""
     return f"{number} {thing}{'' if number == 1 else 's'}"

@@ -60,7 +60,7 @@ def _scales(log: Log) -> tuple[str, str]:
 
 
 def pairs(log: Log) -> list[Pair]:
-    """Those of which the log has both sides, without what is not finite."""
+    """Pairs of commands and measurements that the log has, finite values only."""
     count = len(log.wheels)
     wheels = Pair(
         "wheel_cmd",
@@ -75,13 +75,13 @@ def pairs(log: Log) -> list[Pair]:
 
 
 def wheel_name(joint: str) -> str:
-    """For people: wheel A, left wheel."""
+    """Name of the wheel for people: wheel A, left wheel."""
     words = joint.removesuffix("_joint").split("_")
     return " ".join(word.upper() if len(word) == 1 else word for word in words)
 
 
 def shown(log: Log) -> list[Pair]:
-    """Those, or what was measured without a command."""
+    """Pairs to show: these, or measurements without commands."""
     return pairs(log) or [twists(log)]
 
 
@@ -172,7 +172,7 @@ def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
 
 
 def _stopped(log: Log, at_s: Array) -> Mask:
-    """While commands were not carried out, and shortly after."""
+    """Spans in which commands were not carried out, and shortly after."""
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [
         Span(item.begin_s, item.end_s + COMMAND_TIMEOUT_S, "") for item in (*off, *log.latched)

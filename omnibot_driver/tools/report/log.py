@@ -53,7 +53,7 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """From when to when something was so, and what."""
+    """A state and the time in which it held."""
 
     begin_s: float
     end_s: float
@@ -104,11 +104,11 @@ class Log:
 
     @property
     def latched(self) -> list[Span]:
-        """While the e-stop was."""
+        """Spans in which the e-stop was latched."""
         return [span for span in self.estops if span.what == "latched"]
 
     def within(self, spans: list[Span], at_s: Array) -> Mask:
-        """Which of these times lie in one of the spans."""
+        """Which of these times lie in a span."""
         inside = np.zeros(len(at_s), dtype=bool)
         for span in spans:
             inside |= (at_s >= span.begin_s) & (at_s < span.end_s)

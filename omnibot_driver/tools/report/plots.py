@@ -43,7 +43,7 @@ SHOWN: Final = 1.5
 
 
 def path(log: Log) -> Figure:
-    """From above, coloured by time, with the heading; beside it x, y and yaw over time."""
+    """Draw the path from above, coloured by time, and x, y and yaw over time."""
     figure = new_figure(5.2)
     left, right = np.ravel(np.asarray(figure.subfigures(1, 2, width_ratios=(1.2, 1.0))))
     above = left.subplots()
@@ -260,7 +260,7 @@ def _name_states(axes: Axes, log: Log) -> None:
 
 
 def _stretches(series: Series) -> list[Span]:
-    """While a command was in force."""
+    """Spans in which a command was in force."""
     if not len(series):
         return []
     times_s = series.arrived_s

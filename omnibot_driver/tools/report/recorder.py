@@ -134,7 +134,7 @@ class Recorder:
         self.count += 1
 
     def _rates(self, message: Any) -> Row:
-        """Of the wheels, as they are called in the first message that has any, in that order."""
+        """Rates of the wheels, by the names and order of the first message."""
         self._wheels = self._wheels or tuple(name for name in message.name if WHEEL in name)
         rates = dict(zip(message.name, message.velocity, strict=False))
         return tuple(rates.get(wheel, math.nan) for wheel in self._wheels)

@@ -43,7 +43,7 @@ class Stream:
     rates: tuple[str, ...]
 
     def promised(self, log: Log) -> "Stream":
-        """With the rate that the driver of this log last said that it should have."""
+        """Set the expected rate to the last one that the driver published."""
         if not log.alone:
             return self
         for key in self.rates:
@@ -93,7 +93,7 @@ class FrameSchedule:
 
 
 def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
-    """By stamps; what has none is left out."""
+    """Measure the rhythm by stamps; messages without a stamp are left out."""
     stream = stream.promised(log)
     stamped = series.only(np.isfinite(series.stamp_s))
     at_s, steps_s = stamped.stamp_s[:-1], np.diff(stamped.stamp_s)
@@ -129,7 +129,7 @@ def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
 
 
 def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
-    """From the last message to the end of the log, where more should have come."""
+    """The gap from the last message to the end of the log, if more should have come."""
     rest = Span(float(stamped.arrived_s[-1]), log.duration_s, "")
     if rest.length_s < LONG_GAP_S or log.interrupted(rest.begin_s, rest.end_s, stream.running):
         return None

@@ -17,7 +17,7 @@ Topics = dict[str, str]
 
 
 def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
-    """By namespace ("/" for none): what each robot has, from pairs of topic and type."""
+    """Find robots by namespace ("/" for none), from pairs of topic and type."""
     pairs = set(topics)
     drivers = drivers_among(pairs)
     robots: dict[str, Topics] = {}
@@ -33,7 +33,7 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """By role that its name allows: the namespace, and whether the type allows it too."""
+    """The namespace by each role of this topic, and whether its type fits."""
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
         if topic.endswith(f"/{role}"):

@@ -46,7 +46,7 @@ def rate_hz(imu: Series) -> float:
 
 
 def at_rest(log: Log, imu: Series) -> Mask:
-    """By the wheels; where there are none, by the IMU itself, second by second."""
+    """Rest as seen by the wheels; without wheels by the IMU, second by second."""
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) > 1:
         unheard = np.diff(odom.stamp_s) > SHORT_GAP_S

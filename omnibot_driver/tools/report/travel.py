@@ -44,7 +44,7 @@ class Steps:
 
 
 def steps(odom: Series) -> Steps:
-    """Of at least two finite messages."""
+    """Steps between at least two finite messages."""
     steps_s = np.diff(odom.stamp_s)
     x, y, yaw = odom.values[:, :3].T
     turned = np.remainder(np.diff(yaw) + np.pi, 2 * np.pi) - np.pi
