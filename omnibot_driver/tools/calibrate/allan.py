@@ -48,7 +48,7 @@ class Noise:
 
 
 def allan(readings: Column, period_s: float) -> Allan:
-    """Allan deviation of (n,) evenly spaced readings; averaging times are a quarter octave apart."""
+    """Allan deviation of (n,) evenly spaced readings, at times a quarter octave apart."""
     whole = np.concatenate(([0.0], np.cumsum(readings - readings.mean()) * period_s))
     longest = len(readings) // FEWEST_CLUSTERS
     octaves = np.arange(0.0, np.log2(max(1, longest)) + 1e-9, 0.25)

@@ -1,0 +1,46 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Several drivers, each in a process of its own, from one import.
+
+``python fleet_of_drivers.py NUMBER PREFIX`` runs the drivers ``/PREFIX0``, ``/PREFIX1`` and so on
+until its input is closed, and prints their process numbers. Their port does not exist, so they cost
+little; for discovery that is enough. Each has its own DDS participant, as on several robots.
+"""
+
+import os
+import signal
+import sys
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+
+from omnibot_driver.node import OmniBotDriver
+
+
+def drive(name: str) -> None:
+    """Run one driver until this process is killed."""
+    arguments = ["-r", f"__ns:=/{name}", "-p", "port:=/dev/no_such_port", "-p", "guard:=false"]
+    rclpy.init(args=["--ros-args", *arguments])
+    executor = SingleThreadedExecutor()
+    executor.add_node(OmniBotDriver())
+    executor.spin()
+
+
+def main() -> None:
+    """Fork the drivers, print their process numbers, and kill them when the input ends."""
+    children = []
+    for index in range(int(sys.argv[1])):
+        if not (child := os.fork()):
+            drive(f"{sys.argv[2]}{index}")
+            os._exit(0)
+        children.append(child)
+    print(*children, flush=True)
+    sys.stdin.read()
+    for child in children:
+        os.kill(child, signal.SIGKILL)
+    for child in children:
+        os.waitpid(child, 0)
+
+
+if __name__ == "__main__":
+    main()
