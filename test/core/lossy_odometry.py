@@ -97,7 +97,7 @@ class Line:
 
     @property
     def error(self) -> Pose:
-        """Of odom at its last displacement against the board's own pose, from where we attached."""
+        """Difference of odom at its last displacement from the board's own pose."""
         wanted = self.attached.way_to(self.told)
         got = self.estimates[-1].pose
         off = got - wanted

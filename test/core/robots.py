@@ -53,6 +53,6 @@ def reconnect(bench: Bench) -> None:
 
 
 def push(bench: Bench, x_m: float, y_m: float, yaw_rad: float) -> None:
-    """By hand, within one tick: the wheels roll, and the board notices."""
+    """Push the robot by hand within one tick: the wheels roll, and the board notices."""
     odometry = bench.board._odometry
     odometry.pose = odometry.pose.moved(x_m, y_m, yaw_rad)

@@ -134,7 +134,7 @@ class Bench:
         self.settle()
 
     def read_deltas_as(self, frame: Literal["earth", "body"]) -> None:
-        """Whatever frame the board sends them in."""
+        """Read deltas as if they were in this frame."""
         self.session.configure(self._settings, self.now, board=OmniBotSettings(delta_frame=frame))
 
     def last_words(self, on_exit: OnExit) -> bytes:

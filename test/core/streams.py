@@ -108,7 +108,7 @@ def decoded(chunks: Iterable[bytes], *, step_s: float = TICK_S) -> list[Frame]:
 
 
 def byte_by_byte(ticks: Sequence[bytes]) -> list[Frame]:
-    """As a line at 115200 baud brings them."""
+    """Deliver the bytes one by one, at the pace of 115200 baud."""
     made, found = FrameDecoder(), []
     for number, tick in enumerate(ticks):
         for place in range(len(tick)):

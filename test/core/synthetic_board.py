@@ -27,7 +27,7 @@ def close(values: Triple, tolerance: float = 1e-9) -> object:
 
 
 def arc(vx: float, vy: float, turn: float) -> tuple[float, float]:
-    """Where a constant twist leads, by the textbook's integral of the rotation matrix."""
+    """Displacement under a constant twist, by the integral of the rotation matrix."""
     if abs(turn) < 1e-6:
         return vx - vy * turn / 2, vy + vx * turn / 2
     a, b = math.sin(turn) / turn, (1 - math.cos(turn)) / turn

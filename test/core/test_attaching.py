@@ -114,7 +114,7 @@ def test_two_surprising_poses_that_disagree_confirm_nothing() -> None:
 
 
 def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> None:
-    """From +π to −π is not a jump."""
+    """A step from +π to −π is not a jump."""
     odometry = Odometry(SETTINGS)
     attach(odometry, heading(math.pi - 0.01))
     odometry.displace(earth(0.0, 0.0, 0.02), 0.0)
@@ -135,7 +135,7 @@ def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
-    """Before the first good one, and after it."""
+    """It is ignored before the first valid one and after it."""
     odometry = Odometry(SETTINGS)
     odometry.displace(earth(0.0, 0.1), 0.0)
     assert odometry.settle(PoseReading(0.0, 0.0, bad)) == []
@@ -188,7 +188,7 @@ def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
 
 
 def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> None:
-    """Also where it still waited for the board's first pose."""
+    """This includes motion that still waited for the board's first pose."""
     odometry, trip = Odometry(SETTINGS), Trip(0.7)
     for _ in range(3):
         odometry.displace(trip.move(0.02, 0.0, 0.1), 0.0)
@@ -218,7 +218,7 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 
 
 def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
-    """Not before two of them agree, not after a long gap until the next, not while assumed."""
+    """It is unknown before two of them agree, after a long gap, and while it is assumed."""
     odometry = Odometry(SETTINGS)
     assert not odometry.heading_known
     attach(odometry, heading(1.0))

@@ -84,7 +84,7 @@ def tell(bench: AnyBench, *readings: Reading) -> None:
 
 
 def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: AnyBench) -> None:
-    """At its own rate, with its own covariance and variances of the twist."""
+    """It has its own rate, covariance and variances of the twist."""
     before = len(bench.odometry)
     bench.drive_on(0.3, 2.0)
     told = bench.odometry[before:]
@@ -113,7 +113,7 @@ def test_resetting_odometry_resets_the_boards(bench: AnyBench) -> None:
 
 
 def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: AnyBench) -> None:
-    """Both are reported."""
+    """Both events are published."""
     bench.drive_on()
     tell(bench, EStopButtonReading(True))
     assert bench.session.estop_active
@@ -127,7 +127,7 @@ def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: 
 
 
 def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
-    """Not by what was on its way when it was asked for."""
+    """Data that was on its way at the request does not count."""
     bench.session.request(Request.RESET, "token", bench.now)
     bench.settle()
     tell(bench, ResetReading())
@@ -141,7 +141,7 @@ def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
 
 
 def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
-    """However many come."""
+    """The number of displacements does not matter."""
     proof = StopProof()
     proof.stopped(0.0)
     for step in range(1, 20):
@@ -150,7 +150,7 @@ def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
 
 
 def test_a_proof_takes_as_long_as_the_board_needs() -> None:
-    """Three displacements of 0.2 s where that is 0.6 s."""
+    """The board needs three displacements of 0.2 s, which is 0.6 s."""
     proof = StopProof(0.6)
     proof.stopped(0.0)
     proved = []
@@ -161,7 +161,7 @@ def test_a_proof_takes_as_long_as_the_board_needs() -> None:
 
 
 def test_the_estop_is_not_released_while_the_button_is_held(bench: AnyBench) -> None:
-    """By its last event, also from before the line was lost; the refusal says what to do."""
+    """The button's last event counts, even from before a lost line; the refusal says what to do."""
     tell(bench, EStopButtonReading(True))
     with pytest.raises(RequestRefused, match="release the button, then call again"):
         bench.estop(False)

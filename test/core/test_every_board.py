@@ -97,7 +97,7 @@ EVENTS: dict[str, Callable[[AnyBench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: AnyBench, event: Callable[[AnyBench], object]
 ) -> None:
-    """Whatever was commanded before."""
+    """The kind of command before the event does not matter."""
     bench.drive_on()
     event(bench)
     bench.settle()
@@ -150,7 +150,7 @@ def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
 
 
 def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
-    """As the link does it: Stop until it is seen to stand, then the last words."""
+    """Stop is sent until the robot is seen to stand, then the last words."""
     bench.drive_on()
     bench.session.leave(bench.now)
     bench.settle()

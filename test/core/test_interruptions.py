@@ -76,7 +76,7 @@ def test_a_restart_leaves_its_doubt_in_the_covariance_for_good() -> None:
 
 
 def test_a_driver_that_restarts_begins_at_the_identity() -> None:
-    """Whatever the board's pose is, and follows it from there."""
+    """The board's pose at that time does not matter; odom follows it from there."""
     on = line(1)
     on.translation, on.odometry = Translation(OmniBotSettings()), Odometry(OdometrySettings())
     on.attached = on.told

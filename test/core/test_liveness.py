@@ -14,7 +14,7 @@ UNHEARD_S, SILENCE_S = 0.5, 2.0
 
 @pytest.fixture
 def liveness() -> Liveness:
-    """Of a line that was opened at 10 s."""
+    """A liveness whose line was opened at 10 s."""
     made = Liveness(
         Traits(
             imu_period_s=None,
@@ -29,7 +29,7 @@ def liveness() -> Liveness:
 
 
 def test_a_silence_is_found_once(liveness: Liveness) -> None:
-    """From the limit on."""
+    """It is found when the limit has passed."""
     assert [liveness.fell_silent(now) for now in (11.9, 12.0, 12.1, 99.0)] == [
         False,
         True,
@@ -47,7 +47,7 @@ def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
 
 
 def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
-    """However long it was."""
+    """The length of the silence does not matter."""
     assert liveness.fell_silent(12.0)
     liveness.begin(12.0)
     assert liveness.wake_at(driven=False) == 14.0
@@ -62,7 +62,7 @@ def test_a_stall_is_no_silence_of_the_board(liveness: Liveness) -> None:
 
 
 def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None:
-    """Nothing was heard, so there is nothing to find again."""
+    """No data arrived meanwhile, so it is not reported again."""
     assert liveness.fell_silent(12.0)
     liveness.stalled(50.0)
     assert not liveness.fell_silent(99.0)

@@ -29,7 +29,7 @@ def test_it_is_answered_once() -> None:
 
 
 def test_a_second_one_is_refused() -> None:
-    """With a sentence."""
+    """The refusal has a reason."""
     task = LongTask()
     task.begin("record of RPM", "one", 120.0, 0.0)
     with pytest.raises(RequestRefused, match="a record of RPM is under way"):
@@ -38,7 +38,7 @@ def test_a_second_one_is_refused() -> None:
 
 
 def test_it_ends_when_its_time_is_over() -> None:
-    """Not before."""
+    """It does not end before."""
     task = LongTask()
     task.begin("record", "token", 120.0, 5.0)
     assert task.wake_at == 125.0
@@ -51,7 +51,7 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """Only one that was driven can be stopped."""
+    """Only a robot that was driven can be stopped."""
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)
     for driven in (False, False, True, True):
@@ -73,7 +73,7 @@ ENDS: dict[str, Callable[[AnyBench], object]] = {
 
 @pytest.mark.parametrize("words", ENDS)
 def test_a_stop_an_estop_and_a_lost_board_end_it(words: str) -> None:
-    """At once, with a sentence."""
+    """It ends at once, with a reason."""
     bench = nominal(NAME)
     if "stopped" in words:
         bench.drive_on()

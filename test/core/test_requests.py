@@ -25,7 +25,7 @@ def bench() -> Bench:
 def test_on_a_silent_board_every_request_is_answered_in_time(
     request_: Request, limit_s: float
 ) -> None:
-    """With a sentence that says what to look at."""
+    """The answer says what to check."""
     bench = Bench()
     bench.speaks = False
     bench.open()
@@ -53,7 +53,7 @@ def test_one_request_is_under_way_at_a_time(bench: Bench) -> None:
 
 
 def test_requests_without_a_port_are_refused() -> None:
-    """At once, not after a timeout."""
+    """The refusal is immediate, not after a timeout."""
     with pytest.raises(RequestRefused, match="port is not open"):
         Bench().session.request(Request.START, object(), 0.0)
 
@@ -78,7 +78,7 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """While a board is started, paused or reset, one that does not answer too."""
+    """This holds while a board is started, paused or reset, and for a silent one."""
     bench = Bench()
     bench.speaks = speaks
     bench.open()
@@ -157,7 +157,7 @@ def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
 
 
 def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) -> None:
-    """Nothing has restarted, so the pause that somebody wanted is still wanted."""
+    """There was no restart, so the earlier request to pause still holds."""
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
     assert not bench.ask(Request.RESET, 10.0).success

@@ -84,7 +84,7 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
 
 
 def test_a_reversal_is_ramped_through_zero() -> None:
-    """From forward to back by no more than the acceleration, each frame after the other."""
+    """The ramp runs from forward to backward, and no step exceeds the acceleration limit."""
     bench = running(limits=GENTLE)
     for _ in range(8):
         bench.drive(0.5)

@@ -38,7 +38,7 @@ def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
 
 
 def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> None:
-    """Only a release ends it, and then the robot stands until a newer command."""
+    """Only a release ends it, and the robot then waits for a newer command."""
     bench.session.estop(True, bench.now)
     bench.settle()
     bench.close()
@@ -119,7 +119,7 @@ def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> N
 
 
 def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) -> None:
-    """However often they say it."""
+    """Repetitions of the call are not reported."""
     for active, by in ((True, "a topic"), (True, "a service"), (False, "Ann"), (False, "Bob")):
         bench.session.estop(active, bench.now, by=by)
         bench.settle()

@@ -43,7 +43,7 @@ def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
 def test_a_shortened_vector_keeps_its_direction_and_the_limit(
     vector: list[float], limit: float
 ) -> None:
-    """However long it was."""
+    """The length of the original vector does not matter."""
     short = shorten(vector, limit)
     assert math.hypot(*short) <= limit * ULPS
     assert limit == 0 or same_direction(short, vector)
@@ -53,7 +53,7 @@ def test_a_shortened_vector_keeps_its_direction_and_the_limit(
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=3), limits)
 def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: float) -> None:
-    """To the last bit, and a longer one ends at the limit."""
+    """The vector is equal bit by bit; a longer one is cut to the limit."""
     length = math.hypot(*vector)
     if length <= limit / ULPS:
         assert shorten(vector, limit) == tuple(vector)
@@ -97,7 +97,7 @@ def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
-    """Not even without limits."""
+    """This holds without limits, too."""
     values = [0.0, 0.1, -0.1]
     values[place] = bad
     none = SpeedLimits(linear_mps=math.inf, angular_radps=math.inf)
@@ -118,7 +118,7 @@ def test_wheels_are_limited_by_the_fastest() -> None:
 
 
 def test_a_limit_of_zero_lets_nothing_through() -> None:
-    """Neither linear nor yaw nor wheel."""
+    """The limit holds for linear velocity, yaw rate and wheels."""
     none = SpeedLimits(linear_mps=0.0, angular_radps=0.0, wheel_radps=0.0)
     assert none.twist(BodyTwist(1.0, -1.0, 1.0)) == BodyTwist(0.0, 0.0, 0.0)
     assert none.wheels((1.0, -2.0, 3.0)) == (0.0, 0.0, 0.0)
@@ -127,7 +127,7 @@ def test_a_limit_of_zero_lets_nothing_through() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_what_is_not_finite_is_refused_by_name(bad: float, place: int) -> None:
-    """In every position; the message says what to fix."""
+    """The value may be in any position; the message says what to fix."""
     values = [0.0, 1e308, -1.0]
     values[place] = bad
     with pytest.raises(CommandRefused, match=r"cmd_vel.*NaN or infinity"):

@@ -13,7 +13,7 @@ def arrives(interlock: MotionInterlock, now: float, *, stands: bool = False) -> 
 
 
 def test_motion_is_allowed_until_something_trips() -> None:
-    """However often it is commanded."""
+    """The number of commands does not matter."""
     interlock = MotionInterlock()
     assert all(arrives(interlock, 0.1 * step) for step in range(20))
     assert interlock.reason(TIMEOUT_S) == ""
@@ -72,7 +72,7 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """After the second trip; a release before it changes nothing."""
+    """This holds after the second trip; a release before it changes nothing."""
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)
     interlock.release()

@@ -43,7 +43,7 @@ EVENTS: dict[str, Callable[[Bench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """Whatever the board did with earlier commands."""
+    """What the board did with earlier commands does not matter."""
     bench.drive(0.4)
     event(bench)
     bench.run(3.0)
@@ -92,7 +92,7 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 
 @pytest.mark.parametrize("request_", [Request.PAUSE, Request.RESET])
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
-    """Also where the board does not hear it and drives on."""
+    """This holds for a board that does not receive the request and drives on."""
     bench.drive(0.4)
     start = len(bench.written)
     bench.hears = False
@@ -132,7 +132,7 @@ def test_the_robot_stands_still_after_the_timeout(bench: Bench) -> None:
 
 
 def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(bench: Bench) -> None:
-    """Only the direction from the board is cut: it still receives, so Stop is sent."""
+    """Only the direction from the board is cut; the board still receives, so Stop is sent."""
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = False

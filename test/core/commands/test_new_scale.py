@@ -68,7 +68,7 @@ def test_a_goal_that_the_new_scale_cannot_say_ends_with_stop_and_a_sentence() ->
 
 
 def test_a_ramp_goes_on_from_where_it_was() -> None:
-    """In the new scale, without a step back or forwards."""
+    """The ramp continues in the new scale, without a step."""
     bench = Bench(BoardSettings(running=True), limits=RAMP)
     bench.open()
     bench.run_until_state("nominal")

@@ -41,7 +41,7 @@ def where(bench: Bench) -> tuple[float, float, float]:
 
 
 def words(bench: Bench) -> list[int]:
-    """Of the frame written last."""
+    """The words of the last frame written."""
     data = bare(bench.written[-1][1])
     assert data[:3] == b"\xff\xfe\x01"
     return [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)]
@@ -101,7 +101,7 @@ def test_a_goal_beyond_the_words_is_refused_and_the_old_one_stays(bench: Bench) 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
-    """In any of its numbers."""
+    """Any of its numbers may be wrong."""
     for goal in ((bad, 0.0, 0.0), (0.0, bad, 0.0), (0.0, 0.0, bad)):
         with pytest.raises(CommandRefused, match="NaN or infinity"):
             bench.go_to(*goal)
@@ -129,7 +129,7 @@ def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
 
 @pytest.mark.parametrize("options", [{"imu_only": True}, {"use_board_pose": False}])
 def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str, bool]) -> None:
-    """Without its poses a place in odom cannot be converted to the board's frame."""
+    """The driver needs the board's poses to convert a place in odom to the board's frame."""
     bench = at_position_control(**options)  # type: ignore[arg-type]
     with pytest.raises(CommandRefused, match="not known"):
         bench.go_to(1.0, 0.0, 0.0)
@@ -189,7 +189,7 @@ def test_whatever_discards_a_command_discards_a_goal(
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """Never zeros in mode one: they are the way back to the origin."""
+    """Zeros in mode one would mean: drive to the origin."""
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
     start = len(bench.written)

@@ -124,7 +124,7 @@ def test_within_the_pace_only_the_newest_command_goes_out(stream: Stream) -> Non
 
 
 def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> None:
-    """Nothing acknowledges a command, so it is said again."""
+    """The board acknowledges nothing, so the driver repeats each command."""
     order(stream, GO, 1.0)
     written = run(stream, 1.0, 1.449)
     assert [frame for _, frame in written] == [GO] * 9
@@ -136,7 +136,7 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> 
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """For a second at least, for five at most, 20 times a second; then the line is quiet."""
+    """Stop is repeated 20 times a second, for 1 s to 5 s; then the line is quiet."""
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
     stops = [at for at, frame in run(stream, 1.0, 1.6) if frame == STOP]
@@ -151,7 +151,7 @@ def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
 
 
 def test_stop_never_waits(stream: Stream) -> None:
-    """Not even for the pace of a command that has just gone out."""
+    """It does not wait for the pace of the command before it."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, STOP, 1.001)
@@ -168,7 +168,7 @@ def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
 
 
 def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
-    """At a command rate of 1 Hz too: one Stop may be lost."""
+    """This holds at a command rate of 1 Hz, since one Stop may be lost."""
     stream = Stream(CommandSettings(rate_hz=1.0))
     order(stream, STOP, 1.0)
     assert len(run(stream, 1.0, 1.49)) == pytest.approx(10, abs=1)
@@ -185,7 +185,7 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
 
 
 def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
-    """Twice, whenever it was said last."""
+    """It is sent twice, even if it was sent just before."""
     stream.latch(1.0)
     stream.write(1.0)
     stream.connect(1.001)
@@ -193,7 +193,7 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
-    """Once Stop is out, saying it a thousand times a second would only fill the line."""
+    """After the first Stop, a thousand more a second would only fill the line."""
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001
@@ -205,7 +205,7 @@ def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
 def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
     stream: Stream,
 ) -> None:
-    """At the command rate once it has arrived."""
+    """After it has arrived, it is repeated at the command rate."""
     stream.command(Climbing(4), 1.0, expires_at=1.5)
     written = run(stream, 1.0, 1.1)
     assert [frame[-1] for _, frame in written] == [3, 2, 1, 0]
@@ -223,7 +223,7 @@ def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream
 def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
     stream: Stream,
 ) -> None:
-    """Also where the one in the middle was never written."""
+    """This holds although the command in the middle was never written."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -266,7 +266,7 @@ def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """Neither the Stop between them nor the newer one."""
+    """Neither the Stop between them nor the newer command is sent."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -329,7 +329,7 @@ def test_a_release_without_a_latch_does_nothing(stream: Stream) -> None:
 
 
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:
-    """After the process stood still for long, earlier commands have no effect."""
+    """Commands from before a long stall of the process have no effect."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(60.0) == STOP

@@ -37,7 +37,7 @@ def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
 
 
 def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench) -> None:
-    """With the switch on positional control those would mean: drive to the origin."""
+    """With the switch on positional control, zeros in mode one mean: drive to the origin."""
     bench.drive(0.3)
     start = len(bench.written)
     bench.drive()

@@ -64,7 +64,7 @@ def test_a_farewell_under_estop_repeats_the_estop(bench: Bench) -> None:
 
 
 def left(bench: Bench) -> None:
-    """As the link does it, until the robot is seen to stand."""
+    """Leave as the link does it: wait until the robot is seen to stand."""
     bench.session.leave(bench.now)
     bench.settle()
     while not bench.session.stands:

@@ -27,7 +27,7 @@ def moved(speed_mps: float = 0.0, rate_radps: float = 0.0, lost: int = 0) -> Dis
 
 
 def shown(proof: StopProof, *speeds: float, begin_s: float = 10.0) -> bool:
-    """After displacements, one each 40 ms, the first of them 0.1 s after Stop."""
+    """The proof after displacements, one each 40 ms, the first 0.1 s after Stop."""
     for number, speed in enumerate(speeds):
         proof.look(moved(speed), begin_s + 0.1 + number * PERIOD_S)
     return proof.proved
@@ -47,7 +47,7 @@ def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof)
 
 
 def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProof) -> None:
-    """Where they come each 0.4 s, the first one after Stop may still be one of motion."""
+    """With displacements each 0.4 s, the first one after Stop may still contain motion."""
     assert proof.takes_s < 0.3
     rare = DisplacementReading(0.04, 0.0, 0.0, frame="body", duration_s=0.4, lost=0)
     proof.look(rare, 10.3)
@@ -75,7 +75,7 @@ def test_without_stop_standing_still_proves_nothing() -> None:
 
 
 def test_a_command_to_move_ends_the_proof(proof: StopProof) -> None:
-    """Whatever the displacements go on to show, until Stop."""
+    """Later displacements do not matter until the next Stop."""
     assert shown(proof, 0.0, 0.0, 0.0)
     proof.moved()
     assert not proof.proved
@@ -105,7 +105,7 @@ def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProo
 def test_a_robot_that_moves_is_not_proved_to_stand(
     proof: StopProof, moving: DisplacementReading
 ) -> None:
-    """Also one that was, and is pushed."""
+    """This includes a robot that stood and is pushed."""
     assert shown(proof, 0.0, 0.0, 0.0)
     proof.look(moving, 11.0)
     assert not proof.proved

@@ -28,7 +28,7 @@ DRIVES = Bench.drive, (0.4,)
 def test_what_was_commanded_under_looser_ones_ends(
     command: Callable[..., None], values: tuple[float, ...], changed: dict[str, object]
 ) -> None:
-    """With Stop at once, and a sentence; the next command holds again."""
+    """Stop is sent at once with a message; the next command is accepted."""
     bench = driving()
     command(bench, *values)
     bench.run(0.05)
@@ -65,7 +65,7 @@ def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
 
 
 def test_a_robot_that_stands_is_told_nothing() -> None:
-    """Nothing is current, or a wish to stand."""
+    """There is no current command, or it is a zero command."""
     bench = driving()
     bench.drive()
     bench.configure(limits=SpeedLimits(linear_mps=0.1))

@@ -43,7 +43,9 @@ def test_the_wheel_is_steered_across_the_line_to_the_centre_of_rotation(
 
 
 def test_what_the_steered_wheel_does_to_the_body() -> None:
-    """At 45° and 1 m/s its contact point goes 0.707 m/s ahead and 0.707 m/s across, 0.5 m ahead."""
+    """At 45° and 1 m/s its contact point moves 0.707 m/s ahead and 0.707 m/s across, 0.5 m
+    ahead.
+    """
     twist = ROBOT.steered_twist(1.0, math.pi / 4)
     assert triple(twist) == pytest.approx((math.sqrt(0.5), 0.0, math.sqrt(2.0)))
 
@@ -62,7 +64,7 @@ def test_wheels_and_back_is_the_feasible_part(robot: SteeredKinematics, twist: B
 
 @given(sizes, twists)
 def test_the_steered_wheel_tells_the_same_twist(robot: SteeredKinematics, twist: BodyTwist) -> None:
-    """By its angle and the speed of its contact point, which is negative backwards."""
+    """The twist follows from its angle and the signed speed of its contact point."""
     wanted = robot.feasible(twist)
     speed_mps = math.hypot(wanted.vx_mps, robot.wheelbase_m * wanted.yaw_rate_radps)
     speed_mps = math.copysign(speed_mps, wanted.vx_mps) if wanted.vx_mps else speed_mps

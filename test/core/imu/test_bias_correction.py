@@ -42,7 +42,7 @@ def last(bench: Bench) -> ImuEstimate:
 
 @pytest.mark.parametrize("imu_only", [False, True])
 def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -> None:
-    """In both running modes; the rates that come out afterwards are about zero."""
+    """This holds in both running modes; afterwards the published rates are about zero."""
     bench = running(gyro_bias_dps=PLANTED_DPS, imu_only=imu_only)
     assert last(bench).angular_velocity == pytest.approx(PLANTED, abs=0.006)
     assert calibrated(bench).success
@@ -82,7 +82,7 @@ def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
 
 @pytest.mark.parametrize("state", ["disconnected", "paused"])
 def test_without_measurements_a_calibration_is_refused_at_once(state: str) -> None:
-    """With what to do about it."""
+    """The answer says what to do."""
     bench = running()
     if state == "paused":
         bench.ask(Request.PAUSE, 5.0)
@@ -119,7 +119,7 @@ def test_a_calibration_is_answered_in_time_whatever_happens(how: str) -> None:
 
 
 def test_a_silent_board_that_nobody_is_to_start_is_woken_up_for_the_answer() -> None:
-    """Nothing else is due then: Stop was said for its second."""
+    """No other output is due then, since Stop has been sent for its second."""
     bench = Bench(BoardSettings(running=True), run=False)
     bench.open()
     bench.run(1.0)

@@ -74,7 +74,7 @@ def test_moments_are_those_of_the_textbook(values: list[Vector3]) -> None:
 
 @given(biases, st.integers(0, 2**16))
 def test_a_planted_bias_is_found_and_told(bias: Vector3, seed: int) -> None:
-    """From two seconds of the sensor's noise, to a tenth of the noise of one reading at worst."""
+    """Two seconds of noisy readings give it within a tenth of the noise of one reading."""
     calibration = GyroCalibration((0.1, 0.1, 0.1), refine=False)
     calibration.measure("token", 0.0)
     stand(calibration, noisy(bias, NOISE_RADPS, seed), 2.1)
@@ -86,7 +86,7 @@ def test_a_planted_bias_is_found_and_told(bias: Vector3, seed: int) -> None:
 
 
 def test_without_wheels_the_gyro_alone_tells() -> None:
-    """In IMU-only mode there are no displacements."""
+    """There are no displacements in IMU-only mode."""
     calibration = GyroCalibration(NONE, refine=False)
     calibration.measure("token", 0.0)
     stand(calibration, noisy((0.02, 0.0, 0.0), NOISE_RADPS), 2.1, rolling=None)
@@ -128,7 +128,7 @@ def test_a_shaken_accelerometer_is_motion() -> None:
 
 
 def test_readings_before_the_request_do_not_count() -> None:
-    """Neither their motion nor their rest."""
+    """Neither motion nor rest before the request counts."""
     calibration = GyroCalibration(NONE, refine=False)
     stand(calibration, noisy((0.0, 0.0, 2.0), 0.5), 0.9, rolling=(0.01, 0.0, 0.0))
     calibration.measure("token", 0.0)
@@ -138,7 +138,7 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """Within the time that a service has."""
+    """Both happen within the time limit of the service."""
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=False)
     calibration.measure("token", 50.0)
     for start_s in (100.0, 102.0, 104.0):
@@ -202,7 +202,7 @@ def test_whatever_the_gyro_says_no_bias_is_larger_than_a_sensor_can_have(
 
 
 def test_gravity_is_measured_at_rest_alone() -> None:
-    """Not known before, and kept while the robot moves."""
+    """Gravity is unknown before, and the value stays while the robot moves."""
     calibration = GyroCalibration(NONE, refine=False)
     assert calibration.gravity_mps2 is None
     stand(calibration, noisy(NONE, NOISE_RADPS), 1.1, force=(0.0, 6.0, -8.0))

@@ -80,7 +80,7 @@ class Drive:
 
 
 def begins(data: bytes, kind: bytes) -> int:
-    """Where in a tick's bytes its frame of this kind stands; -1 where there is none."""
+    """Position of this kind's frame in the bytes of a tick; -1 if there is none."""
     lengths = {14: (IMU,), 23: (IMU, DELTA), 29: (IMU, POSE), 38: (IMU, DELTA, POSE)}
     at = 0
     for found in lengths.get(len(data), ()):
@@ -154,7 +154,7 @@ def test_an_imu_word_is_published_wrong_by_half_a_g_at_the_most(
 
 
 def test_what_is_refused_is_counted_and_told() -> None:
-    """In one sentence, ten seconds apart at the least."""
+    """One notice has all counts; notices are at least ten seconds apart."""
     drive = Drive()
     drive.arm(DELTA, 0, 6)
     drive.run(1.0)

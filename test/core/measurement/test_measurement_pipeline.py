@@ -32,14 +32,14 @@ def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
 
 
 def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
-    """Also the displacements that waited for the first pose."""
+    """This includes displacements that waited for the first pose."""
     stamps = {event.stamp_s for event in bench.events if isinstance(event, ImuEstimate)}
     assert len(bench.odometry) > 30
     assert {estimate.stamp_s for estimate in bench.odometry} <= stamps
 
 
 def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
-    """After both, a tick is 10 ms again."""
+    """A tick is 10 ms again after both."""
     bench.board.reboot()
     bench.run_until_state("paused")
     bench.run_until_state("nominal")

@@ -103,13 +103,13 @@ def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> 
 def test_a_knock_of_one_reading_that_is_no_bit_comes_out_at_once(
     knock: float, across: float
 ) -> None:
-    """However short it is, and in one axis alone."""
+    """Neither its shortness nor a single axis makes it suspicious."""
     readings, through = row(60, {50: {1: knock, 0: knock * across}}), gate()
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
 
 
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
-    """From 1 g upwards to the end of the scale it is 1 g, but for the noise."""
+    """From 1 g to the end of the scale, the published value is 1 g plus noise."""
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
@@ -160,14 +160,14 @@ def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReadin
 
 
 def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
-    """So that it is not bridged twice."""
+    """The refused motion is not bridged a second time."""
     pose = PoseReading(0.0, 0.0, 0.0)
     came = admitted([ahead(), ahead(1.0), pose, ahead()], gate())
     assert came == [[ahead()], [], [replace(pose, lost=1)], [ahead()]]
 
 
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
-    """From 0.25 to 1.5 m/s and back in 80 ms: poses wait with it."""
+    """The jump is from 0.25 to 1.5 m/s and back in 80 ms; poses wait with it."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
     assert came[3:] == [[], [], [replace(pose, lost=1), ahead(0.011)], [ahead()]]
@@ -175,7 +175,7 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 
 
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
-    """Whatever threw the robot."""
+    """The cause of the jump does not matter."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.05), ahead(0.05)], through)
     assert came[3:] == [[], [], [ahead(0.06), pose, ahead(0.05)], [ahead(0.05)]]
@@ -190,7 +190,7 @@ def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> Non
 
 
 def test_all_motion_of_a_pause_may_be_in_one_displacement() -> None:
-    """As far as the robot can have gone meanwhile."""
+    """It may be as large as the distance that the robot can cover in the pause."""
     through = gate()
     through.admit(ahead(), 1.0)
     rolled_out = replace(ahead(0.5), duration_s=None)

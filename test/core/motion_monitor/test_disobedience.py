@@ -104,7 +104,7 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
 
 
 def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
-    """As a calibration needs it, which measures what is wrong."""
+    """A calibration needs that, since it measures wrong settings."""
     bench = started(BoardSettings(running=True, **A_REVERSED))  # type: ignore[arg-type]
     stopped_after_s(bench, SLOWLY)
     bench.configure(motion_monitor=False)
@@ -130,7 +130,7 @@ def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) ->
 
 @pytest.mark.parametrize("board", [FAST, A_AND_B])
 def test_wheel_commands_are_watched_as_well(board: dict[str, object]) -> None:
-    """By the twist that the wheels make together."""
+    """The twist of all wheels together counts."""
     bench = started(BoardSettings(running=True, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, (0.3, 0.0, 0.0), by_wheels) <= WITHIN_S
 
@@ -302,7 +302,7 @@ def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
 
 
 def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
-    """Within the noise it cannot be decided."""
+    """Motion within the noise cannot be judged."""
     for _ in range(40):
         bench.drive(0.001, 0.0, 0.01)
         bench.run(0.1)

@@ -123,7 +123,7 @@ def test_the_history_does_not_grow_without_end() -> None:
 
 
 def test_a_held_robot_winds_up_by_what_it_loses() -> None:
-    """By 1.2 times that, up to what an integrator holds; one that moves as commanded unwinds."""
+    """It winds up by 1.2 times the loss, up to the integrator's limit; normal motion unwinds it."""
     wind_up = WindUp()
     for _ in range(10):
         wind_up.follow(AT_REST, 0.04, [FORWARD], heading_known=True)

@@ -37,7 +37,7 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """Whatever the signs and the frame: the sum of all tangents, in the board's own axes."""
+    """For all signs and frames, the sum of all tangents in the board's own axes is right."""
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):
         odometry.settle(PoseReading(board.x_m, board.y_m, board.yaw_rad))
@@ -85,7 +85,9 @@ def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int,
 def test_over_a_gap_the_angles_are_those_of_the_encoders(
     lost_s: float, off_rad: float, frame: str
 ) -> None:
-    """Within a few degrees; of seconds in curves only the shortest way is known, of tens of rad."""
+    """They are right within a few degrees; after seconds of curves only the shortest way is
+    known.
+    """
     for seed in range(3):
         line = Line(BoardSettings(seed=seed, frame=frame, running=True), seed=seed)
         line.run(2.0)

@@ -86,7 +86,7 @@ def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]
 
 @given(small_moves, headings, st.sampled_from(["earth", "body"]))
 def test_the_twist_is_the_bodys_over_40_ms(move: Pose, initial: float, frame: str) -> None:
-    """Of a constant twist exactly, in the body's axes, whatever came before."""
+    """A constant twist is exact, in the body's axes, at any past."""
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)
     for _ in range(3):
@@ -98,7 +98,7 @@ def test_the_twist_is_the_bodys_over_40_ms(move: Pose, initial: float, frame: st
 
 
 def test_every_delta_gives_one_estimate_with_its_own_stamp() -> None:
-    """In order."""
+    """The order is kept."""
     odometry = Odometry(SETTINGS)
     assert odometry.displace(earth(0.01, 0.0), 1.0) == []
     assert odometry.displace(earth(0.01, 0.0), 1.04) == []

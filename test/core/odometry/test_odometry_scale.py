@@ -44,7 +44,7 @@ def drive(on: Bench) -> None:
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> None:
-    """Within 5 mm and 3 mrad after metres of curves; without the scales it is not."""
+    """The error is below 5 mm and 3 mrad after metres of curves, and larger without the scales."""
     on = bench(TRUE, frame=frame, initial_pose=BoardPose(4000.0, -1000.0, 2000.0))
     drive(on)
     truth, pose = on.board.truth, on.odometry[-1].pose
@@ -58,7 +58,7 @@ def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> N
 
 
 def test_the_twist_is_the_true_one() -> None:
-    """So a filter that fuses it with a gyro is not pulled apart."""
+    """A filter that fuses it with a gyro gets consistent inputs."""
     on = bench(TRUE)
     on.drive(0.2, 0.1, 0.4)
     on.run(3.0)

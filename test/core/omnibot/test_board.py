@@ -107,7 +107,7 @@ def test_a_text_says_that_the_board_is_paused() -> None:
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """Where anything came between two texts the board ran, and may have restarted since."""
+    """Bytes between two texts mean that the board ran, and may have restarted since."""
     texts = readings(bot(), *map(PausedFrame, (255, 0, 2)))
     assert texts == [PausedReading(), PausedReading(continues=True), PausedReading()]
     assert readings(bot(), PausedFrame(0), data, PausedFrame(1))[-1] == PausedReading()
@@ -196,7 +196,7 @@ def test_faults_are_counted_over_all_connections() -> None:
 
 
 def test_stop_and_emergency_stop_are_the_manuals() -> None:
-    """From the appendix."""
+    """The bytes are those of the manual's appendix."""
     assert joined(bot().stop()) == STOP
     assert joined(bot().emergency_stop()) == ZEROS + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
 

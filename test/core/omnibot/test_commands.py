@@ -123,7 +123,7 @@ def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int
 def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
     pose: tuple[float, float, float], typed: str
 ) -> None:
-    """In mode 1; the origin is a place like any other."""
+    """The frame is of mode 1; the origin is a place like any other."""
     assert bare(encoder().drive_to(Pose(*pose))) == bytes.fromhex(typed)
 
 

@@ -158,7 +158,7 @@ def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
 def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
     name: str, by: str
 ) -> None:
-    """From each of the places in the first fifth of a second and a little more."""
+    """The stream starts at each place in its first fifth of a second."""
     ticks = ticks_of(name)[:60]
     stream = b"".join(ticks)
     sent = frames_of(stream)
@@ -200,7 +200,7 @@ def test_a_robot_on_a_slope_is_not_misread_for_ever(
 
 
 def test_one_whole_text_is_enough_to_believe() -> None:
-    """At one text a second it must not wait for two."""
+    """Texts come once a second, so the decoder does not wait for the second one."""
     assert FrameDecoder().feed(b"used: 3 \nPaused: 4 \n", 0.0) == [PausedFrame(4)]
 
 

@@ -96,7 +96,9 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
-    """Without a checksum a gyro that happens to read a header may do it, once in thirty times."""
+    """There is no checksum, so a gyro that reads like a header may cause one, once in thirty
+    times.
+    """
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]
@@ -143,7 +145,7 @@ def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(
 def test_rubbish_between_frames_costs_a_few_frames_only(
     pieces: list[Frame | bytes], data: st.DataObject
 ) -> None:
-    """After any past, six ordinary frames later the decoder is in step."""
+    """Six ordinary frames later the decoder is in step, for any past."""
     stream = b"".join(piece if isinstance(piece, bytes) else encode(piece) for piece in pieces)
     made = FrameDecoder()
     for chunk in data.draw(chunkings(stream)):
@@ -221,7 +223,7 @@ def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
 
 
 def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> None:
-    """Nothing spoke against it."""
+    """No later bytes contradicted it."""
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)
@@ -230,7 +232,7 @@ def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> No
 
 
 def test_flush_tells_what_can_still_be_told() -> None:
-    """In step a whole frame; never a part of one, never one that is not proved."""
+    """A whole frame in step comes out; partial or unproved frames do not."""
     doubtful = DeltaFrame(1, 2, 3, 255)
     in_step = FrameDecoder()
     in_step.feed(LEAD_IN + encode(doubtful), 0.0)
@@ -245,7 +247,7 @@ def test_flush_tells_what_can_still_be_told() -> None:
 
 
 def test_a_decoder_goes_on_after_a_flush() -> None:
-    """With the next whole frames."""
+    """It decodes the next whole frames."""
     made = FrameDecoder()
     made.feed(LEAD_IN + encode(REST)[:5], 0.0)
     made.flush(0.0)

@@ -50,7 +50,7 @@ def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
 def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
     stream: bytes, data: st.DataObject
 ) -> None:
-    """Nothing raises, little is held."""
+    """The decoder raises nothing and holds little."""
     made, now, found = FrameDecoder(), 0.0, []
     for chunk in data.draw(chunkings(stream)):
         now += data.draw(times_s)
@@ -92,7 +92,9 @@ def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
 
 @pytest.mark.parametrize("word", [-6, -5, -4])
 def test_in_free_fall_only_a_look_alike_of_a_header_is_lost(word: int) -> None:
-    """Not even a fifth of gravity, and -6 where the accelerometer's words are: a shifted frame."""
+    """The header needs an acceleration below a fifth of gravity, and -6 in the accelerometer's
+    words.
+    """
     made, fall = FrameDecoder(), ImuFrame((word, 3, 900), (1, 2, 3))
     found = made.feed(REST * 2 + encode(fall) + REST * 4, 0.0) + made.flush(1.0)
     assert found.count(fall) == (word != -6)

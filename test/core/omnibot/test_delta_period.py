@@ -114,7 +114,7 @@ def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_1
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 9, 10, 11, 30, 60, 100, 300])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
-    """At 10 Hz as at 25 Hz, over the wrap of SEQ too."""
+    """This holds at 10 Hz and 25 Hz, and over the wrap of SEQ."""
     for seed in range(3):
         on = Line(
             BoardSettings(running=True, delta_period_s=TEN_HZ_S, frame=frame, seed=seed), seed=seed
@@ -201,7 +201,7 @@ def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_bytes_that_made_no_frame_tell_how_many_imu_frames_they_were(period_s: float) -> None:
-    """By the order in which this board sends: the last one before a delta, and the delta."""
+    """The board's order of frames tells: the last one before a delta, and the delta."""
     schedule = Schedule(period_s)
     rhythm = FrameSchedule(schedule)
     for _ in range(3):

@@ -37,7 +37,7 @@ def test_damaged_bytes_tell_how_many_imu_frames_they_were(
 
 
 def test_a_damaged_pose_is_no_imu_frame() -> None:
-    """Though it is as long as one."""
+    """It has the length of one."""
     rhythm = nominal(0)
     for _ in range(5):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
@@ -46,7 +46,7 @@ def test_a_damaged_pose_is_no_imu_frame() -> None:
 
 
 def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
-    """With the delta in between it is gone, whose SEQ counts what is before it."""
+    """The delta in between is lost, and its SEQ counts what came before it."""
     rhythm = nominal(0)
     for _ in range(4):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
@@ -58,7 +58,7 @@ def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
 
 
 def test_imu_frames_alone_are_all_that_was_lost() -> None:
-    """Also where a delta stood before."""
+    """This holds after a delta as well."""
     rhythm = nominal(0)
     for _ in range(30):
         rhythm.hear(ImuFrame, 0)

@@ -215,7 +215,7 @@ def test_a_pose_is_rounded_to_four_bytes_or_refused(pose: PoseFrame, x: float) -
     ids=str,
 )
 def test_a_value_that_does_not_fit_its_field_is_refused(frame: Frame | CommandFrame) -> None:
-    """Nothing wraps round in silence; the message names the frame."""
+    """Values do not wrap silently; the message names the frame."""
     with pytest.raises(FrameError, match=type(frame).__name__):
         encode(frame)
 
@@ -232,7 +232,7 @@ def test_a_part_of_a_frame_is_not_a_frame(frame: Frame | CommandFrame, length: i
 def test_a_frame_and_something_more_is_not_a_frame(
     frame: Frame | CommandFrame, more: bytes
 ) -> None:
-    """Before or behind it, whatever it is."""
+    """The extra bytes may be in front or behind."""
     data = encode(frame)
     with pytest.raises(FrameError, match="not one whole frame"):
         decode(data + more)
@@ -255,7 +255,7 @@ def test_a_frame_and_something_more_is_not_a_frame(
     ],
 )
 def test_bytes_of_no_frame_are_refused(data: bytes) -> None:
-    """With the bytes in the message."""
+    """The message contains the bytes."""
     with pytest.raises(FrameError, match=data.hex(" ") or "no bytes"):
         decode(data)
 

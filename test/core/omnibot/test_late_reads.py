@@ -122,7 +122,7 @@ def test_any_content_comes_through_a_reader_that_is_always_late(
 
 @pytest.mark.parametrize("place", range(1, 11))
 def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
-    """So does the last frame before it: of a board that is paused nothing is due."""
+    """The last frame before it comes out too, since a paused board owes no other."""
     ticks = [encode(REST)] * 40
     text = b"Paused: 0 \n"
     made = FrameDecoder()

@@ -39,7 +39,7 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_short_gap_is_bridged_at_once() -> None:
-    """By the motion on both sides of it: a tenth of a second lost is right to a millimetre."""
+    """The motion on both sides fills it: 0.1 s of loss is right within a millimetre."""
     for seed in range(5):
         on = line(seed)
         lose(on, 0.12)
@@ -76,7 +76,9 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
 @pytest.mark.parametrize("lost", [1, 5, 10, 20, 25, 26, 40, 100, 250])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
-    """At 2 m/s and 8 rad/s in the time of that step; only the first one has the gap's time."""
+    """The limits are 2 m/s and 8 rad/s over the time of the step; the first step has the gap's
+    time.
+    """
     for seed in range(5):
         on = line(seed, frame=frame)
         before = on.estimates[-1]
@@ -153,7 +155,7 @@ def test_the_twist_is_that_of_the_last_displacement_whatever_is_put_right() -> N
 
 @pytest.mark.parametrize("lost", [2, 5, 10])
 def test_the_covariance_jumps_with_a_gap_and_shrinks_when_it_is_settled(lost: int) -> None:
-    """By the gap's term and no more: drift stays."""
+    """It grows by the gap's term only; the drift stays."""
     whole, torn = line(2), line(2)
     whole.run(lost * PERIOD_S)
     lose(torn, lost * PERIOD_S)
@@ -191,7 +193,7 @@ def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose:
 
 
 def test_a_board_that_sends_no_pose_is_bridged() -> None:
-    """At an even pace in an even curve the bridge is the way itself."""
+    """At a steady pace in a steady curve the bridge is exact."""
     odometry = Odometry(OdometrySettings())
     for number in range(60):
         if number < 30 or number >= 40:
@@ -214,7 +216,7 @@ def moved(lost: int = 0) -> DisplacementReading:
     "bad", [(math.nan, 0.0, 0.0), (1e9, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.0, 1.0)]
 )
 def test_one_damaged_pose_moves_nothing(bad: tuple[float, float, float]) -> None:
-    """Not finite, out of reach, or a surprise that the next does not confirm."""
+    """It is not finite, out of reach, or a surprise that the next pose does not confirm."""
     odometry = attached()
     still = DisplacementReading(0.0, 0.0, 0.0, "earth", PERIOD_S, 0)
     for pose in (bad, (0.0, 0.0, 0.0), bad, (0.0, 0.0, 0.0)):
@@ -279,7 +281,7 @@ def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
 def test_any_readings_give_finite_estimates_and_never_a_certain_one(
     readings: list[DisplacementReading | PoseReading], use_board_pose: bool
 ) -> None:
-    """Nothing is raised; x, y and yaw keep a variance."""
+    """Nothing raises; x, y and yaw keep a variance."""
     odometry = Odometry(OdometrySettings(use_board_pose=use_board_pose))
     for number, reading in enumerate(readings):
         if isinstance(reading, PoseReading):

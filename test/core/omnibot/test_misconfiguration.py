@@ -25,7 +25,7 @@ DRIVE = bytes.fromhex("FF FE 01 00 15 00 0E 00 C8")
 
 
 def advice(board: BoardSettings, settings: OmniBotSettings, seconds: float = 6.0) -> str | None:
-    """After a drive on this board, read with these settings."""
+    """The advice after a drive on this board with these settings."""
     sender, driver = SimulatedBoard(board), OmniBot(settings)
     sender.receive(DRIVE)
     for tick in range(round(seconds * 100)):
@@ -35,7 +35,7 @@ def advice(board: BoardSettings, settings: OmniBotSettings, seconds: float = 6.0
 
 @pytest.mark.parametrize(("sent", "read"), [("big", "little"), ("little", "big")])
 def test_a_wrong_byte_order_of_poses_is_noticed(sent: str, read: str) -> None:
-    """After two seconds of poses that make sense only the other way round."""
+    """Two seconds of poses that are valid only in the other byte order are enough."""
     board = BoardSettings(running=True, pose_byte_order=sent)
     told = advice(board, OmniBotSettings(pose_byte_order=read))
     assert told is not None
@@ -44,7 +44,7 @@ def test_a_wrong_byte_order_of_poses_is_noticed(sent: str, read: str) -> None:
 
 @pytest.mark.parametrize(("sent", "read"), [("earth", "body"), ("body", "earth")])
 def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str) -> None:
-    """As soon as the robot has turned and drives."""
+    """It is noticed as soon as the robot has turned and drives."""
     board = BoardSettings(running=True, frame=sent, initial_pose=BoardPose(0.0, 0.0, 1500.0))
     told = advice(board, OmniBotSettings(delta_frame=read))
     assert told is not None
@@ -54,7 +54,9 @@ def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str) -> None:
 @pytest.mark.parametrize("sent_s", DELTA_PERIODS_S)
 @pytest.mark.parametrize("read_s", DELTA_PERIODS_S)
 def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> None:
-    """Within three seconds, and the right one is named; of the right one nothing is said."""
+    """It takes three seconds, and the message names the right one; the right one causes no
+    message.
+    """
     board = BoardSettings(running=True, delta_period_s=sent_s)
     told = advice(board, OmniBotSettings(delta_period_s=read_s), 3.0)
     if sent_s == read_s:
@@ -69,7 +71,7 @@ def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> No
 @pytest.mark.parametrize("period_s", [0.04, 0.1])
 @pytest.mark.parametrize("lose", [0.001, 0.01, 0.05])
 def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float) -> None:
-    """However many IMU frames are missing: the arrival of the deltas says otherwise."""
+    """The arrival of the deltas contradicts it, whatever the number of missing IMU frames."""
     sender = SimulatedBoard(BoardSettings(running=True, delta_period_s=period_s))
     driver = OmniBot(OmniBotSettings(delta_period_s=period_s))
     line = FaultyLine(LineFaults(lose=lose), 5)

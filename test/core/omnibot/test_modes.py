@@ -69,7 +69,7 @@ def test_only_p_is_ever_refused() -> None:
     ids=["text", "delta", "pose"],
 )
 def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard: Mode) -> None:
-    """Whatever was believed before."""
+    """The earlier mode does not matter."""
     made = tracker(mode)
     made.hear(frame)
     assert made.mode is heard
@@ -101,7 +101,7 @@ def test_the_rhythm_of_a_nominal_board_is_never_imu_only() -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_r_makes_the_mode_unknown(mode: Mode) -> None:
-    """After a reboot nothing is known until something is heard."""
+    """It stays unknown until data arrives after the reboot."""
     made = tracker(mode)
     made.apply(Happening.SENT_RESET)
     assert made.mode is Mode.UNKNOWN

@@ -41,7 +41,7 @@ def test_no_payload_holds_a_letter_or_a_header(counts: tuple[float, float, float
 
 @given(st.tuples(words, words, words).filter(lambda w: min(w) > -32768))
 def test_harmless_words_stay_as_they_are(counts: tuple[int, int, int]) -> None:
-    """Only what could act is moved."""
+    """Only words that could act are changed."""
     if not re.search(rb"[SPR]|\xff\xfe", payload(*counts)):
         assert harmless(counts) == counts
 

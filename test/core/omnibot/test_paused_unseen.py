@@ -14,7 +14,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 def test_what_was_commanded_before_it_ends_with_stop(
     kept_back: int, imu_only: bool, run: bool
 ) -> None:
-    """For a second, once it is known to run: it may carry out an earlier command."""
+    """Stop is sent for a second once the board runs, as it may carry out an earlier command."""
     bench = Bench(BoardSettings(seed=2, running=True, imu_only=imu_only), run=run)
     bench.open()
     bench.run(2.0)

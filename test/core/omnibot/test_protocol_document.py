@@ -143,7 +143,9 @@ def test_each_example_means_what_the_document_says(example: Example) -> None:
 
 
 def test_no_line_of_bytes_escapes_the_check() -> None:
-    """Whatever begins like bytes or has an arrow after it in a code block is an example."""
+    """In a code block, each line that begins with bytes or has an arrow after them is an
+    example.
+    """
     suspects = re.compile(r"\s*[0-9A-Fa-f]{2}( [0-9A-Fa-f]{2})*(\s|$)|.*\s->\s")
     lines = [line for line in code_lines(DOCUMENT) if suspects.match(line)]
     assert [line for line in lines if not EXAMPLE.fullmatch(line)] == []

@@ -22,7 +22,7 @@ def begun(count: int) -> Sequence:
 def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
     count: int, lost: int, late_s: float
 ) -> None:
-    """By up to half a second."""
+    """The line may be late by up to half a second."""
     step = begun(count).delta((count + 1 + lost) % 256, 100.0 + 0.04 * (lost + 1) + late_s)
     assert step == Step(lost)
 
@@ -44,7 +44,7 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 
 @given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
-    """Also when the first deltas are lost; unless the old count goes on as well."""
+    """The first deltas may be lost, unless the old count continues as well."""
     sequence = begun(count)
     sequence.pause()
     goes_on = (lost - count - 1) % 256

@@ -85,7 +85,7 @@ class Robot:
 
 
 def test_a_healthy_robot_is_all_ok() -> None:
-    """With rates, skew, delay and gravity to look at."""
+    """The statuses show rates, skew, delay and gravity."""
     robot = Robot()
     assert not robot.troubles
     stream, time = robot.statuses["Stream"].values, robot.statuses["Time"].values
@@ -148,7 +148,7 @@ def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
 
 
 def test_what_only_a_board_has_to_show_stands_with_its_mode() -> None:
-    """As does how often its odometry goes out with what comes in."""
+    """One example is the rate of its own odometry."""
     robot = Robot()
     assert "Published odometry (Hz)" not in robot.statuses["Stream"].values
     robot.set(board=replace(robot.figures.board, own={"Version": "7"}, odom_hz=20.0))
@@ -174,7 +174,7 @@ def test_what_happened_is_told_for_a_while_and_then_forgotten(
 
 
 def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_bad() -> None:
-    """Nothing is lost by it; where the rates are off, that is why."""
+    """Late reads lose nothing; they are the cause where the rates are off."""
     robot = Robot()
     for second in range(12):
         robot.connect(waited_s=0.3 * second)
@@ -264,7 +264,7 @@ def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
 
 
 def test_what_a_board_does_not_send_has_no_figures() -> None:
-    """Neither a status of an IMU, nor rates and counts of it, nor poses."""
+    """There is no IMU status, and there are no rates and counts of IMU and poses."""
     robot = Robot()
     rates_hz: dict[RateName, float] = {"Odometry": 2.5}
     robot.set(board=BoardFigures(rates_hz=rates_hz))

@@ -28,7 +28,7 @@ Read = tuple[list[Reading], float, SampleBoundary | None]
 
 
 def stamped(reads: list[Read], *, quick: bool) -> tuple[list[list[float]], str]:
-    """Of each read the stamps; and all that the clock knows in the end."""
+    """The stamps of each read, and the final state of the clock."""
     with pytest.MonkeyPatch.context() as patch:
         if not quick:
             patch.setattr(device_clock, "CALM", -1.0)
@@ -82,7 +82,7 @@ surprises = st.tuples(
 def test_surprises_are_stamped_alike(
     given: list[tuple[list[Reading], int, float, SampleBoundary | None, int]], later_s: float
 ) -> None:
-    """After a calm beginning, without which there is no short way; all arrive later afterwards."""
+    """They follow a normal beginning, which enables the short way; all arrive late afterwards."""
     tick, last_s = SETTLING, 0.0
     reads: list[Read] = [([SAMPLE], n * 0.01, WHOLE) for n in range(SETTLING)]
     for readings, ticks, late_s, edge, calm in given:

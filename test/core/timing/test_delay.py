@@ -21,7 +21,7 @@ def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
 
 
 def test_a_pause_is_no_delay() -> None:
-    """However long it was since the last measurement."""
+    """The time since the last measurement does not matter."""
     bench = Bench()
     bench.open()
     bench.run_until_state("nominal")

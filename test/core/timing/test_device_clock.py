@@ -106,7 +106,7 @@ def run(
 def test_stamps_are_even_and_true_to_a_constant(
     chunker: Chunker, skew: float, imu_only: bool
 ) -> None:
-    """Within 0.2 ms (standard deviation) of 10 ms; 99 % within 0.5 ms; from 2 s on."""
+    """From 2 s on the standard deviation is below 0.2 ms, and 99 % are within 0.5 ms."""
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=skew, imu_only=imu_only), chunker, seed)
         assert stamped.unevenness() < 0.2e-3
@@ -128,7 +128,7 @@ def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
 @pytest.mark.slow
 @pytest.mark.parametrize("chunker", [bursts, singles], ids=["bursts", "bytes"])
 def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Chunker) -> None:
-    """Neither in their error nor in their evenness."""
+    """Both error and evenness are compared."""
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=1e-4), chunker, seed)
         arrivals = Stamped(stamped.board, [(tick, at, at) for tick, _, at in stamped.samples])
@@ -159,7 +159,7 @@ def test_a_host_that_stalls_does_not_move_the_stamps(chunker: Chunker) -> None:
 
 @pytest.mark.parametrize("imu_only", [False, True])
 def test_a_driver_that_finds_a_backlog_does_not_take_it_for_now(imu_only: bool) -> None:
-    """Three seconds of frames in the first read, cut anywhere, get their own times."""
+    """Three seconds of frames in the first read, cut at any place, get their own times."""
     for seed in SEEDS:
         board = Board(seconds=10, skew=1e-4, imu_only=imu_only, first_tick=seed * 1234 + 3)
         rng = random.Random(seed)
@@ -182,7 +182,7 @@ def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
 
 
 def test_without_displacements_lost_samples_are_counted_by_their_arrival() -> None:
-    """On a line that delivers at once, a tick of silence is a tick."""
+    """The line delivers at once, so a tick of silence is a tick."""
     for seed in SEEDS:
         stamped = run(Board(seconds=40, skew=1e-4, loss=0.01, imu_only=True), bursts, seed)
         assert spread(stamped.errors()) < 0.5e-3
@@ -236,7 +236,7 @@ def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
 
 
 def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
-    """Also when the adapter cuts between the two frames."""
+    """The adapter may cut between the two frames."""
     for chunker in (ftdi(restarted_by_data=True), bursts, singles):
         stamped = run(Board(seconds=10), chunker, 0)
         stamp_of = {tick: stamp_s for tick, stamp_s, _ in stamped.samples}
@@ -277,7 +277,7 @@ reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, m
 def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
     reads: list[tuple[float, list[ImuReading | DisplacementReading], SampleBoundary | None]],
 ) -> None:
-    """Whatever counters and framing say."""
+    """Counters and framing may claim anything."""
     clock = DeviceClock(0.01)
     now, last_s = 1000.0, -math.inf
     for passed_s, readings, edge in reads:
@@ -298,7 +298,7 @@ def test_displacements_alone_are_stamped_forwards() -> None:
 
 
 def test_stamps_increase_even_where_arrival_times_do_not() -> None:
-    """By a microsecond each, when a clock as coarse as that hands all of them in at once."""
+    """A coarse clock reads them all at once; their stamps differ by a microsecond each."""
     clock = DeviceClock(0.01)
     stamps_s = [clock.stamps([SAMPLE], 5.0)[0] for _ in range(100)]
     assert all(before < after for before, after in pairwise(stamps_s))

@@ -49,7 +49,7 @@ def step(before: OdometryEstimate, after: OdometryEstimate) -> float:
 @example(ticks=592, frame="earth", vx=0.0)
 @example(ticks=291, frame="body", vx=0.4)
 def test_no_step_is_larger_than_its_stamps_allow(ticks: int, frame: str, vx: float) -> None:
-    """However much was lost, and however little the stamps know of it; soon nothing is missing."""
+    """This holds for any loss, and if the stamps know little of it; soon nothing is missing."""
     bench = through_a_stall(ticks, frame, vx, 0.5)
     fastest_mps = OdometrySettings().fastest_mps
     for before, after in pairwise(bench.odometry):
