@@ -282,7 +282,7 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
 
 
 def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a host where nothing can be killed, more guards would not help."""
+    """More guards would not help on a host where nothing can be killed."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     stopped: set[int] = set()
     with monkeypatch.context() as undying:
@@ -313,7 +313,7 @@ def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
 def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As in an uninterruptible sleep, which a stopped process stands for that no signal reaches."""
+    """A stopped process that no signal reaches stands for an uninterruptible sleep."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)

@@ -34,7 +34,7 @@ def test_overruns_of_the_chip_and_of_the_buffer_are_added(monkeypatch: pytest.Mo
 
 
 def test_a_thread_has_waited_and_one_that_is_none_is_not_known() -> None:
-    """In seconds."""
+    """The time is in seconds."""
     waited = waited_s(threading.get_native_id())
     assert waited is None or waited >= 0.0
     assert waited_s(0) is None

@@ -99,7 +99,7 @@ def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: P
 
 
 def test_closing_writes_stop_and_ends_the_threads(board: PtyBoard) -> None:
-    """Also when it is closed twice."""
+    """It may be closed twice."""
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
@@ -178,7 +178,7 @@ def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
 
 
 def obeyed(command: Callable[[], None]) -> bool:
-    """Not at once after a standstill: the reader may run before the pacer."""
+    """Commands may be refused just after a stall, when the reader runs before the pacer."""
     try:
         command()
     except CommandRefused:
@@ -299,7 +299,7 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
 
 
 def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard) -> None:
-    """Neither the call nor the watchdog's thread waits for it; what it missed comes in order."""
+    """The call and the watchdog's thread do not wait; what was missed is delivered in order."""
     listener, ours = Listener(), session()
     deliver, hang, goes_on = listener.deliver, threading.Event(), threading.Event()
 

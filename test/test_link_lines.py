@@ -69,7 +69,7 @@ def command(link: Link) -> None:
 
 
 class Lines:
-    """Both lines of a board without a simulator, and a link to them; ``sense`` by a name."""
+    """Both lines of a board without a simulator, and a link to them."""
 
     def __init__(self, folder: Path, board: LineBoard | None = None) -> None:
         self.drive, self.sense = Terminal(), Terminal()
@@ -84,7 +84,7 @@ class Lines:
         self.name.symlink_to(self.sense.path)
 
     def say_that_it_stands(self) -> None:
-        """As soon as the line is open: what waited before is not heard."""
+        """Report a standstill as soon as the line is open, since earlier data is dropped."""
         self.listener.wait_for(lambda: self.listener.reports[-1:] == [None])
         os.write(self.sense.far, b"d 0 0\n")
         self.come_to_state("nominal")
@@ -115,7 +115,7 @@ def lines(tmp_path: Path) -> Iterator[Lines]:
 def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missing(
     lines: Lines,
 ) -> None:
-    """In one connection; motion is refused by the name of the line."""
+    """There is one connection; motion is refused with the name of the missing line."""
     lines.link.start()
     lines.drive.read_until(5 * STOPS)
     lines.come_to_state("connecting")
@@ -159,7 +159,7 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
 
 
 def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
-    """Although all that it measures comes."""
+    """Its measurements still arrive."""
     lines.connect()
     missing = lines.openers[0] = partial(SerialPort, str(lines.name) + "-not", 115200)
     lines.link.start()

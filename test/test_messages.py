@@ -61,7 +61,7 @@ def goal(
 def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
     yaw_rad: float, length: float
 ) -> None:
-    """Not everybody normalises."""
+    """Some senders do not normalise it."""
     turn = (0.0, 0.0, length * math.sin(yaw_rad / 2), length * math.cos(yaw_rad / 2))
     pose = messages.goal_pose(goal(1.0, -2.0, turn), "odom")
     assert (pose.x_m, pose.y_m) == (1.0, -2.0)
@@ -100,7 +100,7 @@ def publisher(name: str, kind: str) -> SimpleNamespace:
 
 
 def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
-    """For both types; only the wrong publisher is named."""
+    """This holds for both types; only the wrong publisher is named."""
     teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
     assert messages.type_conflict([teleop], stamped=False) == ""
     assert messages.type_conflict([nav], stamped=True) == ""
@@ -178,7 +178,7 @@ poses = st.builds(Pose, *[st.floats(-1e4, 1e4)] * 3)
 
 @given(poses)
 def test_the_transform_is_the_odometrys_pose_between_the_same_frames(pose: Pose) -> None:
-    """At the same time; tf has no covariance."""
+    """The time is the same too; tf has no covariance."""
     estimate = OdometryEstimate(0.0, pose, None, Covariance())
     odometry = messages.odometry_message(estimate, STAMP, PREFIXED)
     transform = messages.transform_message(estimate, STAMP, PREFIXED)
@@ -191,7 +191,7 @@ def test_the_transform_is_the_odometrys_pose_between_the_same_frames(pose: Pose)
 
 
 def test_every_frame_has_the_prefix_as_it_is() -> None:
-    """Nothing is put between, as robot_state_publisher does it."""
+    """No separator is added, as robot_state_publisher does it."""
     assert PREFIXED.odom_frame == "robot1/odom"
     assert PREFIXED.base_frame == "robot1/base_link"
     estimate = ImuEstimate(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -215,7 +215,7 @@ def test_joint_states_are_the_manuals_wheels() -> None:
 
 
 def test_joints_whose_rate_is_not_known_have_none() -> None:
-    """As sensor_msgs wants it: an empty array, not zeros."""
+    """The array is empty, as sensor_msgs requires, not full of zeros."""
     estimate = OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), None)
     wheels = messages.turned(messages.unturned(SETTINGS.wheels), estimate, SETTINGS.wheels)
     message = messages.joint_state_message(wheels, STAMP, SETTINGS)
@@ -250,7 +250,7 @@ def test_diagnostics_are_named_as_by_diagnostic_updater() -> None:
 
 @given(st.floats(-1e4, 1e4))
 def test_a_yaw_becomes_a_unit_quaternion(yaw_rad: float) -> None:
-    """However many turns the robot has made."""
+    """The number of turns does not matter."""
     turn = messages.yaw_quaternion(yaw_rad)
     assert math.hypot(turn.z, turn.w) == pytest.approx(1.0)
     assert math.cos(2 * math.atan2(turn.z, turn.w)) == pytest.approx(math.cos(yaw_rad), abs=1e-6)

@@ -47,7 +47,7 @@ class Held:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_everything_leaves_once_in_the_order_of_the_lock_and_one_at_a_time(seed: int) -> None:
-    """However threads are held up between the lock and the delivery, or within one."""
+    """Threads may be delayed between the lock and the delivery, or within one."""
     outbox, lock = Outbox(), threading.Lock()
     happened: list[int] = []
     left: list[int] = []
@@ -87,7 +87,7 @@ def test_everything_leaves_once_in_the_order_of_the_lock_and_one_at_a_time(seed:
 
 
 def test_nobody_claims_what_is_not_next() -> None:
-    """While another one delivers, or anything waits."""
+    """Another thread may be delivering, or other events may wait."""
     outbox = Outbox()
     held = Held(outbox)
     assert not outbox.claim()

@@ -130,7 +130,7 @@ json_like = st.recursive(
 def test_any_value_is_either_taken_in_the_right_type_or_refused(
     parameter: Parameter, value: object
 ) -> None:
-    """Nothing else is raised, and what was taken is taken again."""
+    """It raises nothing else, and an accepted value is accepted again."""
     try:
         taken = parameter.check(value)
     except ParameterError:
@@ -141,14 +141,14 @@ def test_any_value_is_either_taken_in_the_right_type_or_refused(
 
 @pytest.mark.parametrize("wrong", [[1, 0, 1], [1, 2, 1], [1, 1, 0.5]])
 def test_axis_signs_are_nothing_but_ones(wrong: list[float]) -> None:
-    """Only signs are accepted, not factors."""
+    """Other factors are refused."""
     with pytest.raises(ParameterError, match="each 1 or -1"):
         PARAMETERS.by_name["axis_signs"].check(wrong)
 
 
 @pytest.mark.parametrize("signs", [[1, -1, 1], (1, -1, 1), [1.0, -1.0, 1.0]])
 def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
-    """In any sequence; integers come of it."""
+    """They may be in any sequence; the result is integers."""
     taken = PARAMETERS.by_name["axis_signs"].check(signs)
     assert taken == [1, -1, 1]
     assert isinstance(taken, list)
@@ -205,7 +205,7 @@ ANY = Parameter("any", ["x"], "", "One word.")
 def test_a_list_may_have_any_length_that_its_row_allows(
     parameter: Parameter, value: object, taken: object
 ) -> None:
-    """Of numbers or words."""
+    """The list has numbers or words."""
     assert parameter.check(value) == taken
 
 

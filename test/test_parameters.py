@@ -76,7 +76,7 @@ def test_every_promised_parameter_is_there_with_its_default(name: str, default: 
 
 @pytest.mark.parametrize("parameter", PARAMETERS.rows, ids=name_of)
 def test_every_default_passes_its_own_check_and_is_explained(parameter: Parameter) -> None:
-    """With a description that is a sentence, and a unit where it is a measure."""
+    """Each has a description that is a sentence, and a unit if it is a quantity."""
     value = parameter.check(parameter.default)
     assert value == parameter.default
     assert type(value) is type(parameter.default)
@@ -133,14 +133,14 @@ def test_an_unknown_name_is_refused_with_the_nearest_known_one(mistyped: str, me
 
 @given(st.text())
 def test_any_unknown_name_is_refused(name: str) -> None:
-    """However far from all others, the empty one too."""
+    """The distance to known names does not matter; an empty name is refused too."""
     if name not in PARAMETERS.by_name and not boards.owners_of(name):
         with pytest.raises(ParameterError, match="the nearest is"):
             check_all({name: 1})
 
 
 def test_one_wrong_value_among_many_is_found() -> None:
-    """By its name."""
+    """The message names it."""
     with pytest.raises(ParameterError, match="'command_rate'"):
         check_all({"port": "/dev/ttyACM3", "command_rate": 1e6, "baudrate": 9600})
 
@@ -224,7 +224,7 @@ def in_the_file() -> dict[str, object]:
 
 
 def test_the_file_has_its_former_name_as_well() -> None:
-    """For one release."""
+    """The former name stays for one release."""
     assert FORMER.read_bytes() == CONFIG.read_bytes()
 
 

@@ -204,7 +204,7 @@ class Charge:
 
 
 def test_what_only_one_board_measures_is_published_by_its_type(node: Node) -> None:
-    """By whom its profile names, with the stamp in ROS time, in order with all else."""
+    """The profile names the publisher; stamps are in ROS time, and the order is kept."""
     _, publishing = session_with(node)
     published: list[tuple[float, int]] = []
     publishing.extras = {Charge: lambda charge, ns: published.append((charge.volts, ns))}

@@ -46,7 +46,7 @@ def bag(
 
 @pytest.mark.parametrize("plugin", StoragePlugin)
 def test_every_byte_comes_back_with_its_time(tmp_path: Path, plugin: StoragePlugin) -> None:
-    """From both kinds of storage, of a bag and of its one file, whatever else is in it."""
+    """This holds for both kinds of storage, and for the bag's single file."""
     path = bag(tmp_path / "bag", "/omnibot_driver/raw_tx", RX, plugin=plugin)
     (file,) = (found for found in path.iterdir() if found.suffix != ".yaml")
     for place in (path, file):
@@ -65,7 +65,7 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
 
 
 def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
-    """In the order of its channels, whatever the names; a robot is chosen by one of its topics."""
+    """The channels are in order, whatever the topics' names; one topic selects the robot."""
     path = bag(tmp_path / "bag", *(f"/{who}{RX}/{name}" for who in "ab" for name in ("one", "two")))
     recording = open_recording(f"replay://{path}?topic=/b{RX}/one", ("two", "one"))
     assert recording.topics == (f"/b{RX}/two", f"/b{RX}/one")
@@ -93,7 +93,7 @@ def test_without_options_it_is_played_at_its_own_speed_after_five_seconds(tmp_pa
     ],
 )
 def test_options_that_make_no_sense_are_refused(tmp_path: Path, query: str, why: str) -> None:
-    """With what would make sense."""
+    """The message says what is allowed."""
     path = bag(tmp_path / "bag", RX)
     with pytest.raises(ParameterError) as refusal:
         open_recording(f"replay://{path}{query}")
@@ -115,7 +115,7 @@ def test_a_bag_of_two_robots_is_not_guessed_at(tmp_path: Path) -> None:
 
 
 def test_what_is_no_bag_is_refused(tmp_path: Path) -> None:
-    """Nothing there, an empty folder, some other file."""
+    """The path is missing, an empty folder, or another file."""
     (tmp_path / "notes.txt").write_text("hello")
     (tmp_path / "torn.mcap").write_bytes(b"\x89MCAP0\r\n")
     for name, why in (
@@ -131,7 +131,7 @@ def test_what_is_no_bag_is_refused(tmp_path: Path) -> None:
 def test_without_the_library_it_says_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nothing else of the driver needs it."""
+    """The rest of the driver works without it."""
     path = bag(tmp_path / "bag", RX)
     monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
     with pytest.raises(ParameterError) as refusal:
@@ -143,7 +143,7 @@ def test_without_the_library_it_says_what_to_install(
 
 
 def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> None:
-    """Whatever the library stumbles over."""
+    """The kind of damage does not matter."""
     recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
     (tmp_path / "bag" / "metadata.yaml").unlink()
     with pytest.raises(LinkError, match="cannot be read any further"):

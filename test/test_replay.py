@@ -74,7 +74,7 @@ def start(tape: Tape) -> tuple[Replay, Heard]:
 
 
 def play(tape: Tape) -> Heard:
-    """From the beginning to the end."""
+    """Play a recording from beginning to end."""
     replay, heard = start(tape)
     heard.wait_for(lambda: heard.failures or ENDED in heard.events)
     replay.close("stop")
@@ -220,7 +220,7 @@ def test_a_recording_that_breaks_off_says_so() -> None:
 
 
 def test_an_empty_recording_ends_at_once() -> None:
-    """Nothing was recorded, so nothing is published."""
+    """It publishes nothing."""
     heard = play(Tape([]))
     assert heard.events == [ENDED]
     assert heard.reports == []

@@ -78,7 +78,7 @@ def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
     ],
 )
 def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, warned: bool) -> None:
-    """Where measurements wait for it; a recording has stamps of its own."""
+    """Only ports whose measurements wait for it are affected; a recording has its own stamps."""
     assert ("nothing publishes /clock" in selfcheck.waiting_advice(port, now_ns)) == warned
 
 
@@ -93,7 +93,7 @@ def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, wa
 def test_a_node_of_the_same_full_name_is_told_of(
     others: list[tuple[str, str]], warned: bool
 ) -> None:
-    """Not one in another namespace, nor a bag that says what another driver said."""
+    """A node in another namespace is fine, and so is a bag of another driver."""
     publishers = [
         SimpleNamespace(node_namespace=namespace, node_name=name)
         for namespace, name in [("/", "omnibot_driver"), *others]

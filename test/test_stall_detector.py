@@ -99,7 +99,7 @@ def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_fro
 
 
 def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
-    """However late a retransmission brings it; later than ten seconds none does."""
+    """A retransmission may bring it up to ten seconds late."""
     standstill = resumed(5.0)
     standstill.passed(108.0, wall_ns(108.0))
     assert not standstill.outlived_by(wall_ns(104.9), 108.0)

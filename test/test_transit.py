@@ -75,7 +75,9 @@ pauses_s = st.floats(0.001, 30.0)
 def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apart(
     sender_s: float, receiver_s: float, messages: list[tuple[float, float, bool]]
 ) -> None:
-    """On the way or in our own queue; the reported delay never exceeds the true one."""
+    """The time on the way and in our queue counts; the reported delay never exceeds the true
+    one.
+    """
     receiver, sender, now_s = Receiver(receiver_s), Sender(sender_s), 100.0
     for pause_s, late_s, waits in messages:
         now_s += pause_s
@@ -208,7 +210,7 @@ def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
 
 @given(st.floats(-1e-4, 1e-4))
 def test_clocks_that_drift_are_followed(drift: float) -> None:
-    """For a day, with a silence of an hour now and then."""
+    """The drift lasts a day, with an hour of silence now and then."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(200):
         now_s += HOUR_S if number % 20 == 0 else 0.1
@@ -217,7 +219,7 @@ def test_clocks_that_drift_are_followed(drift: float) -> None:
 
 
 def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
-    """On the network, or on this computer."""
+    """It names the network or this computer."""
     with pytest.raises(CommandRefused, match=r"^cmd_vel refused: it was sent 1\.2 s ago.*network"):
         Delay(1.2, 0.1).require("cmd_vel", 0.5)
     with pytest.raises(CommandRefused, match=r"1\.1 s of it in this driver's queue.* load"):
@@ -235,7 +237,7 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 
 
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
-    """Whatever it says."""
+    """Its clock alone may claim anything."""
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):
         delay = receiver.hear(sender, 100.0 + number, 0.01)

@@ -55,7 +55,7 @@ def calls(work: Callable[[], object]) -> int:
 
 
 def opened_session() -> Session:
-    """As the driver makes it."""
+    """A session as the driver makes it."""
     values = boards.check_all({})
     session = Session(
         omnibot.make(values),
@@ -70,7 +70,7 @@ def opened_session() -> Session:
 def most_calls(
     work: Callable[[bytes, float], object], rest: Callable[[float], None] = lambda _now: None
 ) -> dict[int, float]:
-    """For each kind of tick of a running board, the mean over many of them; without the rest."""
+    """Mean number of calls for each kind of tick of a running board."""
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     counted: dict[int, list[int]] = {}
     for tick in range(SETTLED + TICKS):
@@ -91,7 +91,7 @@ def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 48), (DELTA, 158), (POSE, 281)])
 def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
-    """From the bytes of one read to its events, and what the link asks after each."""
+    """The calls are counted from the bytes of one read to its events and the link's requests."""
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:
@@ -119,7 +119,7 @@ def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound
 
 
 def test_a_command_calls_no_more_than_it_did() -> None:
-    """From the bytes of a Twist to the bytes on the wire, while the board runs."""
+    """The calls are counted from the bytes of a Twist to those on the wire, on a running board."""
     session, board, now = opened_session(), SimulatedBoard(BoardSettings(running=True)), 0.0
     for tick in range(SETTLED):
         now = tick * TICK_S

@@ -52,7 +52,7 @@ def _known(keys: Iterable[Key | None]) -> list[Key]:
 
 @contextmanager
 def busy_loops() -> Iterator[None]:
-    """As processes, so the kernel shares the cores out among them and the driver."""
+    """Run busy loops as processes, so the kernel divides the cores among them and the driver."""
     loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(LOOPS)]
     try:
         yield
@@ -85,7 +85,7 @@ def _compared(published: list[Key], sent: list[Key]) -> tuple[int, int]:
 
 
 def is_busy(rig: PiecesRig, ticks: int = TICKS) -> None:
-    """While somebody drives."""
+    """The computer is busy while the robot is driven."""
     rig.drive()
     before = max(0, len(rig.line.sent) - TRANSIT)
     imu, odom, line = len(rig.imu), len(rig.odom), len(rig.driver.lines)

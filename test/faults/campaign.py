@@ -88,7 +88,7 @@ class Outcome:
         self.wrong += more.wrong
 
     def table(self) -> str:
-        """In Markdown."""
+        """The table in Markdown."""
         lines = ["| fault | tried | robot stood after at most | |", "|---|---|---|---|"]
         lines += [str(row) for row in self.rows]
         lines += [
@@ -208,7 +208,7 @@ class Campaign(Outcome):
                     self.run(rows[name], case, rig, again=False)
 
     def busy_computer(self) -> None:
-        """Nothing is wrong with the line."""
+        """Run on a busy computer; the line itself is good."""
         row = self.row(
             f"{LOOPS} busy loops for {TICKS // 100} s, the line in pieces of {PIECE} bytes"
         )
@@ -262,7 +262,7 @@ Piece = tuple[str, tuple[Any, ...]]
 
 
 def losses() -> list[Piece]:
-    """In parts of ten drivers."""
+    """Fault cases with losses, in groups of ten drivers."""
     starts = range(0, LOSSES, LOSSES_AT_ONCE)
     return [
         ("losses", (life, range(start, start + LOSSES_AT_ONCE)))
@@ -272,7 +272,7 @@ def losses() -> list[Piece]:
 
 
 def pieces() -> list[Piece]:
-    """In the order of the table. The busy computer is none of them: it is to be busy alone."""
+    """The pieces in the order of the table, without the busy computer, which must run alone."""
     return [
         ("faults_of_the_line", ()),
         ("faults_of_the_network", ()),

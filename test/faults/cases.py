@@ -284,7 +284,7 @@ def driver_hangs(rig: Rig) -> None:
 
 
 def second_driver(rig: Rig) -> None:
-    """On the same port: refused, and the first one does not notice."""
+    """A second driver on the same port is refused, and the first one does not notice."""
     rig.drive()
     with Driver(**rig.ports, **rig.kind.parameters) as other:
         said = other.wait_for_line("is in use")

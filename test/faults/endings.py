@@ -66,7 +66,7 @@ class Ending:
     full: bool = False
 
     def __call__(self, rig: Rig) -> None:
-        """While the robot drives."""
+        """End the driver while the robot drives."""
         rig.drive()
         self.end(rig)
         since = rig.line.tick
@@ -89,7 +89,7 @@ def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
-    """As a shell and a launcher do; without waiting in between."""
+    """Signal the whole process group, as a shell or a launcher does, without a wait in between."""
 
     def end(rig: Rig) -> None:
         for number in numbers:
@@ -99,7 +99,7 @@ def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_topic(rig: Rig) -> None:
-    """Whatever ``before`` has prepared."""
+    """Shut ROS down, whatever ``before`` has prepared."""
     publisher = rig.probe.publisher(Bool, "estop")
     publisher.publish(Bool(data=True))
 

@@ -87,7 +87,7 @@ def hang(rig: GoalRig) -> int:
 
 
 def discards(event: Callable[[GoalRig], int], allowed_s: float, rig: GoalRig) -> None:
-    """Also after everything is well again."""
+    """The goal stays discarded after everything works again."""
     rig.drive()
     rig.wait_ticks(50)
     since = event(rig)
@@ -98,7 +98,7 @@ def discards(event: Callable[[GoalRig], int], allowed_s: float, rig: GoalRig) ->
 
 
 def ended(number: signal.Signals, rig: GoalRig) -> None:
-    """With and without a last word of the driver's own."""
+    """The driver ends with and without a final Stop of its own."""
     rig.drive()
     since = rig.line.tick
     rig.driver.process.send_signal(number)

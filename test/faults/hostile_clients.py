@@ -121,7 +121,7 @@ def nonsense_for_parameters(rig: Rig) -> None:
 
 
 def limit_lowered(rig: Rig) -> None:
-    """To nothing, while somebody drives on."""
+    """The limit is lowered to zero while commands continue."""
     rig.drive(yaw_rate=0.0)
     since = rig.line.tick
     for value in (0.0, 0.5):

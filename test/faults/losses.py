@@ -33,7 +33,7 @@ def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:
 
 
 def lose(rig: Rig, number: int) -> None:
-    """From now on."""
+    """Lose bytes from now on."""
     rig.line.to_board = losing(RATES[number % len(RATES)], Random(number))
 
 
@@ -45,7 +45,7 @@ def times_out(rig: Rig) -> None:
 
 
 def is_estopped(rig: Rig) -> None:
-    """While somebody drives on."""
+    """The e-stop is latched while commands continue."""
     rig.drive()
     since = rig.line.tick
     answer = rig.probe.call(SetBool, "estop", data=True)

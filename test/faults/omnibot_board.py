@@ -26,7 +26,7 @@ def make(settings: BoardSettings | None) -> SimulatedBoard:
 
 
 def sent(board: SimulatedBoard) -> list[bytes]:
-    """In its last tick."""
+    """The bytes that were sent in the last tick."""
     frames = []
     for frame in reversed(board.sent):
         if frame.tick != board.tick:

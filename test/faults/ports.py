@@ -112,7 +112,7 @@ class Server(RunningBoard):
             each.close()
 
     def close_from_here(self) -> None:
-        """Nothing more will come from the server; it still takes what is sent to it."""
+        """The server sends nothing more; it still accepts data."""
         with self.lock:
             self._peers[-1].shutdown(socket.SHUT_WR)
 
@@ -126,7 +126,7 @@ class Server(RunningBoard):
                 each.setsockopt(socket.SOL_SOCKET, SO_ATTACH_FILTER, rule)
 
     def come_back(self) -> None:
-        """With no memory of who was connected before."""
+        """The server starts again without memory of its clients."""
         self._listener.setsockopt(socket.SOL_SOCKET, SO_DETACH_FILTER, 0)
         self.deaf = self.mute = False
 

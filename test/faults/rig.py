@@ -138,7 +138,7 @@ class Rig:
         return self._terminal
 
     def heal(self) -> None:
-        """Nothing is wrong with the line any more."""
+        """End all faults of the line."""
         self.line.heal()
         assert self._terminal is not None
         self._terminal.deaf = False
@@ -189,7 +189,7 @@ class Rig:
         assert self.wait_for_board(lambda line: line.board.driven), self.driver.output
 
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
-        """From ``since_tick`` on the motors may be driven for this time, and not again."""
+        """Expect that the motors run for this time from ``since_tick`` on, and not again."""
         ticks = round((allowed_s + self._grace_s) / TICK_S)
         self.wait_ticks(max(0, since_tick + ticks + 50 - self.line.tick))
         stood_s = max(0, self.line.driven_at - since_tick) * TICK_S
@@ -211,7 +211,7 @@ class Rig:
         )
 
     def expect_said_once(self, pattern: str, mark: int) -> None:
-        """In the lines of the log from number ``mark`` on."""
+        """Expect it once in the lines of the log from number ``mark`` on."""
         times = sum(bool(re.search(pattern, line)) for line in self.driver.lines[mark:])
         self.findings.expect(times == 1, f"the log says {times} times: {pattern}")
 

@@ -66,5 +66,5 @@ class RigBoard:
 
 
 def load(name: str) -> RigBoard:
-    """Of the board with this name."""
+    """Load the rig of the board with this name."""
     return cast(RigBoard, import_module(f"{name}_board").BOARD)

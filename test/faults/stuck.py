@@ -29,7 +29,7 @@ def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
 
 
 def full(rig: Rig, *, mute: bool = False) -> None:
-    """As after minutes. It takes bytes again while the driver has the port open, or has it not."""
+    """Fill the port as after minutes; it accepts data again, with or without a reopening."""
     rig.drive()
     mark = len(rig.driver.lines)
     with rig.terminal.full(rig.kind.old_command):
@@ -43,7 +43,7 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 
 
 def full_for_long(rig: Rig) -> None:
-    """Nothing helps, so it is opened again and again, and told once; then all is well."""
+    """The port is opened repeatedly and the trouble reported once; then all is well."""
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)
     with rig.terminal.kept_full(rig.kind.old_command):
@@ -124,7 +124,7 @@ def server_dies(rig: NetworkRig) -> None:
 
 
 def server_vanishes(rig: NetworkRig) -> None:
-    """Neither an end nor a refusal, and it has forgotten everything when it is back."""
+    """The server ends without closing the connection, and returns without memory."""
     rig.drive()
     before = len(rig.server.accepted_at)
     rig.server.vanish()

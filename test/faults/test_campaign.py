@@ -31,7 +31,7 @@ def rig(
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_the_robot_stands_still_and_obeys_again(case: Case[Rig], rig: Rig) -> None:
-    """While it lasts, and afterwards."""
+    """This holds during the fault and afterwards."""
     case(rig)
     rig.expect_obeys_again()
     assert not rig.findings.take(), rig.driver.output
@@ -51,7 +51,7 @@ def test_faults_in_random_order_and_at_once(rig: Rig) -> None:
 
 
 def test_nothing_was_published_that_was_not_sent(rig: Rig) -> None:
-    """In all of the cases together; and the odometry never jumped."""
+    """This holds for all cases together; and the odometry never jumped."""
     rig.judge_stream(damaged_bytes=True)
     assert not rig.findings.take()
     assert rig.findings.published > 1000

@@ -35,7 +35,7 @@ def network(
 def test_a_server_that_fails_leaves_a_robot_that_stands_and_obeys_again(
     case: Callable[[NetworkRig], None], network: NetworkRig
 ) -> None:
-    """As soon as a byte can go."""
+    """The robot obeys as soon as bytes arrive again."""
     case(network)
     network.expect_obeys_again()
     network.judge_stream()

@@ -28,12 +28,12 @@ class Bound:
     chunkers: tuple[str, ...] = tuple(CHUNKINGS)
 
     def one_wrong_in(self, chunker: str) -> int | None:
-        """By whether the chunking carries the line's idle gaps."""
+        """The bound depends on whether the chunking keeps the line's idle gaps."""
         visible = chunker in GAPS_VISIBLE
         return self.one_wrong_in_visible if visible else self.one_wrong_in_hidden
 
     def share(self, chunker: str) -> float:
-        """To be delivered. Where both ends are late, a few wait in vain for what is due."""
+        """The share to be delivered. Where both ends are late, a few frames wait in vain."""
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 
     def holds(self, chunker: str, score: Score) -> bool:

@@ -17,7 +17,7 @@ Fault = Callable[[int, Random], Origins]
 
 
 def none(length: int, random: Random) -> Origins:
-    """Nothing, but a start anywhere in the first second."""
+    """A stream without faults that starts anywhere in the first second."""
     return list(range(random.randrange(1700), length))
 
 

@@ -36,7 +36,7 @@ def robot(**settings: object) -> Callable[[float], Bench]:
 
 
 def gripped_after_s(bench: Bench, command: Triple, motion: Triple) -> float:
-    """From the tick in which an obeying robot is made to move otherwise until Stop."""
+    """Time from the tick in which an obeying robot starts to deviate until Stop."""
     if any(command):
         for _ in range(15):
             by_velocity(bench, command)

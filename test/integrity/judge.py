@@ -34,12 +34,12 @@ class Score:
 
     @property
     def wrong_share(self) -> float:
-        """Of the frames that came out."""
+        """The share of wrong frames among those that came out."""
         return self.wrong / max(1, self.out)
 
     @property
     def delivered_share(self) -> float:
-        """Of the frames that arrived intact."""
+        """The share of intact frames that came out."""
         return self.delivered / max(1, self.intact)
 
     def __iadd__(self, other: "Score") -> "Score":

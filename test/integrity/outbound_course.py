@@ -52,7 +52,7 @@ class Course:
         return other
 
     def understood(self, kind: ReceiverKind) -> Understood:
-        """By a receiver of this kind that is awake and runs."""
+        """The commands as a receiver of this kind understands them, awake and running."""
         if kind not in self._understood:
             self._understood[kind] = self._understand(kind)
         return self._understood[kind]

@@ -147,7 +147,9 @@ class _Rehearsal:
         self._session.take_events()
 
     def _leave(self, changes: dict[int, Shown], shown: Shown, tick: int) -> None:
-        """As the link does: Stop until the robot is seen to stand, a last look, or the guard."""
+        """Leave as the link does: Stop until the robot is seen to stand, a last look, or the
+        guard.
+        """
         session, now = self._session, self._scene.exits_s
         session.leave(now)
         self._settle(now)

@@ -81,7 +81,7 @@ class Judge:
 
     @property
     def calm(self) -> bool:
-        """Nothing is in force that was not commanded."""
+        """Whether no uncommanded set-point is in force."""
         return self._uncommanded_from_s is None and self._stray_from_s is None
 
     def branch(self, score: Score) -> "Judge":

@@ -54,7 +54,7 @@ def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
 
 
 def trials(fault: str, scene: str) -> int:
-    """Of each script, for each receiver."""
+    """The trials of each script, for each receiver."""
     if fault in OTHERS:
         return OTHER_TRIALS
     if scene in DRIVES:

@@ -113,7 +113,7 @@ def _wheels(random: Random) -> bool:
 
 
 def drive(rate_hz: float, random: Random) -> Scene:
-    """Nothing but driving, by commands at this rate; what ends it is not looked at."""
+    """Only drive, by commands at this rate; the end is not examined."""
     wishes = driving(random, FROM_S, FROM_S + DRIVE_S, rate_hz=rate_hz)
     return Scene(
         kind=f"drive {rate_hz:g}",

@@ -93,7 +93,7 @@ class Trial:
         self._play(course.scene.faults_from_s)
 
     def run(self, line: Line, score: Score) -> None:
-        """To the end of the scene, on this line; its counts are added to the score."""
+        """Run to the end of the scene on this line, and add the counts to the score."""
         trial = copy(self)
         trial._line, trial._judge = line, self._judge.branch(score)
         trial._receiver, trial._last = copy(self._receiver), self._last.copy()
@@ -292,7 +292,7 @@ class Trial:
         self._understood = self._course.understood(self._board.receiver)
 
     def _example(self, what: str) -> None:
-        """For inspection of the bytes: the first few of a score."""
+        """Show the bytes of the first few of a score."""
         examples = self._judge.score.examples
         if len(examples) < EXAMPLES:
             examples.append(Example(self._course.scene.kind, self._board, what, tuple(self._last)))

@@ -47,7 +47,7 @@ class Outcome:
     happened: Counter[str] = field(default_factory=Counter)
 
     def add(self, other: "Outcome") -> None:
-        """Of another robot."""
+        """Add the counts of another robot."""
         self.seconds += other.seconds
         self.trips += other.trips
         self.said += other.said

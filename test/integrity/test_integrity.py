@@ -40,7 +40,7 @@ def test_the_bounds_of_the_integrity_report_hold(fault: str, chunker: str, score
 
 
 def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
-    """From the first byte on, even the plain parser makes no mistake."""
+    """Even the plain parser makes no mistake, from the first byte on."""
     truth = generate(SCENARIOS["driving"], 1, 10.0)
     received = receive(truth, lambda length, _: list(range(length)), Random(1))
     score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())

@@ -45,7 +45,7 @@ def on_all_receivers(course: Course, line: Line) -> Score:
 
 
 def shown(score: Score) -> str:
-    """With the bytes that led to it."""
+    """Describe it with the bytes that led to it."""
     return "\n".join([str(score), *map(str, score.examples)])
 
 
@@ -136,7 +136,7 @@ def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
 
 
 def test_a_cut_line_leaves_the_robot_driving_and_the_judge_says_so() -> None:
-    """Nothing arrives from the first fault on."""
+    """No byte arrives from the first fault on."""
     course = Course(ENDED["timeout"](Random("cut")))
     driving = next(n for n, items in enumerate(course.items) if items.moves)
     begin = next(n for n, write in enumerate(course.writes) if write.at_s >= FROM_S)

@@ -91,7 +91,7 @@ pieces = st.sampled_from(
 @settings(max_examples=200)
 @given(st.lists(st.tuples(pieces, st.sampled_from([0.0, 0.001, 0.01, 0.2])), min_size=1))
 def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, float]]) -> None:
-    """In any order, with any pauses."""
+    """The pieces come in any order, with any pauses."""
     now, chunks = 0.0, []
     for data, pause_s in arrivals:
         now += pause_s
@@ -104,7 +104,7 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
 def test_readings_come_out_alike(
     scenario: str, fault: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """So do the end of each read and the mode, whatever is sent meanwhile or refused."""
+    """The end of each read and the mode are alike, too, with any requests in between."""
     chunks = chunks_of(scenario, fault, "whole bursts", 2)
 
     def told() -> list[object]:

@@ -47,7 +47,7 @@ def test_what_is_generated_is_what_the_code_says(name: str) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_link_leads_somewhere(page: Path) -> None:
-    """To a file that is there, and to a heading where one is named."""
+    """The file exists, and so does the heading where one is named."""
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         if re.match(r"https?://|mailto:", target):
             continue

@@ -67,7 +67,7 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 
 @pytest.mark.parametrize("template", sorted(set(told())))
 def test_what_the_driver_tells_is_explained(template: str) -> None:
-    """By a sentence that is all in it, or that begins with it where the rest is filled in."""
+    """One sentence of the guide is contained in it, or begins like it."""
     begin = next((part for part in template.split(GAP) if len(part) > 9), template)
     assert any(
         begin in sentence or all(part.strip() in template for part in GAPS.split(sentence))
@@ -82,7 +82,7 @@ def test_every_state_is_explained() -> None:
 
 
 def test_every_status_of_the_diagnostics_has_its_row() -> None:
-    """In the order in which they are published."""
+    """The rows are in the order of publication."""
     code = (ROOT / "omnibot_driver/core/reporting/diagnosis.py").read_text()
     names = dict.fromkeys(re.findall(r'Status\(\s*"([\w-]+)"', code))
     rows = re.findall(r"^\| ([\w-]+) \|", DIAGNOSTICS.read_text(), re.MULTILINE)

@@ -134,7 +134,7 @@ def test_colcon_installs_the_executables(prefix: Path) -> None:
 
 
 def test_the_installed_package_is_the_one_that_runs(workspace: Path, prefix: Path) -> None:
-    """In a sourced workspace Python imports the installed copy, with its type marker."""
+    """Python imports the installed copy, with its type marker, in a sourced workspace."""
     script = f"import {PACKAGE}; print({PACKAGE}.__file__)"
     found = Path(run(in_workspace(workspace, [sys.executable, "-c", script]), workspace).strip())
     assert found.is_relative_to(prefix)
@@ -142,7 +142,7 @@ def test_the_installed_package_is_the_one_that_runs(workspace: Path, prefix: Pat
 
 
 def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, prefix: Path) -> None:
-    """Both executables start from their installed places, and ctrl-C ends the driver in order."""
+    """Both start from their installed places, and ctrl-C ends the driver in order."""
     executables = prefix / "lib" / PACKAGE
     board = workspace / "board"
     simulator = in_workspace(workspace, [executables / "simulator", "--link", board])

@@ -146,7 +146,7 @@ def test_the_driver_has_every_parameter_that_is_offered() -> None:
 
 @needs_launch
 def test_the_driver_gets_the_defaults_and_nothing_else(launch: Callable[..., Started]) -> None:
-    """Without arguments the parameter file decides."""
+    """The parameter file decides when there are no arguments."""
     started = launch("driver.launch.py")
     assert set(started) == {"driver"}
     assert parameters(started["driver"]) == {
@@ -175,7 +175,7 @@ def test_the_driver_gets_what_is_given(launch: Callable[..., Started]) -> None:
 def test_the_parameter_file_is_that_of_the_board(
     launch: Callable[..., Started], tmp_path: Path
 ) -> None:
-    """Unless another is given, which says itself what board it is for."""
+    """Another file can be given, which names its own board."""
     defaults = {row.name: row.default for row in PARAMETERS.rows}
     assert parameters(launch("driver.launch.py", "board:=omnibot")["driver"]) == defaults
     own = tmp_path / "own.yaml"
@@ -201,7 +201,7 @@ def test_the_description_is_expanded_and_prefixed(launch: Callable[..., Started]
 
 @needs_launch
 def test_rviz_is_shown_where_asked_for(launch: Callable[..., Started]) -> None:
-    """With the display of this package, in the robot's own odometry frame."""
+    """It uses this package's display, in the robot's own odometry frame."""
     started = launch("description.launch.py", "rviz:=true", "frame_prefix:=robot1/")
     words = started["rviz2"]["arguments"]
     display = Path(words[words.index("--display-config") + 1])

@@ -38,7 +38,7 @@ def no_python(tmp_path: Path) -> str:
 def test_without_wheels_one_sentence_points_to_jazzy(
     target: str, no_python: str, tmp_path: Path
 ) -> None:
-    """Where PyPI has no wheels, make fails before it has made anything and says where to go."""
+    """Make fails before it has made anything, and says where to go."""
     done = make(target, f"PYTHON={no_python}", f"VENV={tmp_path / 'venv'}")
     sentence, verdict = done.stderr.splitlines()
     assert done.returncode != 0

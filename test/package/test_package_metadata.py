@@ -160,7 +160,7 @@ def test_only_tools_need_what_an_extra_brings() -> None:
 
 
 def test_what_rosdep_does_not_bring_the_readme_has_pip_bring() -> None:
-    """In the words that Ubuntu 24.04 accepts."""
+    """The command is one that Ubuntu 24.04 accepts."""
     words = f"pip install --user --break-system-packages {' '.join(sorted(FROM_PIP))}"
     assert words in (ROOT / "README.md").read_text()
 
@@ -244,7 +244,7 @@ def test_mypy_checks_exactly_what_imports_no_ros() -> None:
 
 
 def test_every_source_file_says_whose_it_is() -> None:
-    """In its first line, with the licence that package.xml declares."""
+    """The first line has it, with the licence that package.xml declares."""
     line = f"# Copyright {MANIFEST.findtext('maintainer')}. SPDX-License-Identifier: Apache-2.0"
     files = python_files(PACKAGE, "docs", "launch", "test", "setup.py")
     without = [str(file) for file in files if file.read_text().partition("\n")[0] != line]

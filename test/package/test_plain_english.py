@@ -67,7 +67,7 @@ def texts() -> dict[str, str]:
 
 
 def found(phrase: str) -> Iterator[str]:
-    """Where the phrase stands, as file, line and words."""
+    """Places of the phrase: file, line and words."""
     pattern = re.compile(
         rf"\b(?:{PATTERNS[phrase]})(?!\w)".replace(" ", r"(?: |\s*\n[\s#|]*)"),
         re.IGNORECASE | re.MULTILINE,

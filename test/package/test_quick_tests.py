@@ -13,7 +13,7 @@ MOST_EXAMPLES = 200
 
 
 def quick_folders() -> list[str]:
-    """As the Makefile names them."""
+    """The folders that the Makefile names."""
     found = re.search(r"^QUICK := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
     assert found
     return found[1].split()
@@ -26,7 +26,7 @@ def modules() -> Iterator[tuple[str, ast.Module]]:
 
 
 def test_none_of_them_imports_ros() -> None:
-    """Neither a test nor what it stands on."""
+    """Neither the tests nor their helpers import it."""
     for name, module in modules():
         for node in ast.walk(module):
             if isinstance(node, ast.Import | ast.ImportFrom):
@@ -36,7 +36,7 @@ def test_none_of_them_imports_ros() -> None:
 
 
 def test_a_property_of_many_examples_is_marked_slow() -> None:
-    """So that a minute is enough."""
+    """Otherwise a minute would not be enough."""
     for name, module in modules():
         for node in ast.walk(module):
             if not isinstance(node, ast.FunctionDef):

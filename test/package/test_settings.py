@@ -103,7 +103,7 @@ def test_the_filter_fuses_the_drivers_velocities_and_gyro() -> None:
 
 
 def test_nav2_keeps_to_the_drivers_limits() -> None:
-    """Whatever limits a speed in Nav2 is the driver's default, so plans are driven as planned."""
+    """Each speed limit in Nav2 is the driver's default, so plans are driven as planned."""
     file = load("nav2_omnibot.yaml")
     mppi = file["controller_server"]["ros__parameters"]["FollowPath"]
     assert {mppi["vx_max"], -mppi["vx_min"], mppi["vy_max"]} == {LINEAR}

@@ -123,7 +123,7 @@ def _append(heard: list[Message], data: bytes, info: dict[str, int]) -> None:
 
 
 def read(path: Path) -> tuple[dict[str, list[Message]], dict[str, Qos]]:
-    """By topic: the messages of a bag, and how they were offered."""
+    """Read a bag: messages by topic, and their offered quality of service."""
     with Reader(path) as bag:
         offered = {item.topic: item.ext.offered_qos_profiles[0] for item in bag.connections}
         messages: dict[str, list[Message]] = {topic: [] for topic in offered}

@@ -26,7 +26,7 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture
 def stack() -> Iterator[ExitStack]:
-    """Whatever a test enters here ends with it, in reverse order."""
+    """A stack of contexts that ends with the test, in reverse order."""
     with ExitStack() as stack:
         yield stack
 

@@ -273,7 +273,7 @@ def test_a_signal_on_the_way_ends_it_cleanly(number: signal.Signals) -> None:
 
 
 def test_who_ends_it_before_it_drives_is_told_so() -> None:
-    """In one line, instead of a result."""
+    """One line says so in place of a result."""
     with running_demo() as (process, mark):
         assert process.stdout is not None
         for line in process.stdout:
@@ -300,7 +300,7 @@ def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
 
 
 def test_a_killed_demo_leaves_nobody_behind() -> None:
-    """Even SIGKILL, which the demo cannot answer, ends simulator and driver."""
+    """Even SIGKILL of the demo ends simulator and driver."""
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         family = [os.pidfd_open(pid) for pid in marked(mark)]

@@ -133,7 +133,7 @@ def test_the_monitor_shows_what_the_board_has(
 def test_what_means_nothing_to_the_board_is_refused(
     start_driver: Start, parameters: dict[str, object], message: str
 ) -> None:
-    """With a sentence that says whose it is, or what is meant."""
+    """The message says which board has it, or what is expected."""
     driver = start_plain(start_driver, "/dev/null", **parameters)
     driver.wait_for_line(message)
     assert driver.end() == 2

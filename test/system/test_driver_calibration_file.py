@@ -13,7 +13,7 @@ WARNED = "calibration_file {} does not exist, so nothing is loaded from it; chec
 
 
 def said_of(path: Path, start_driver: Start) -> str:
-    """By a driver that has read it: one line, no more."""
+    """The one line about the file from a driver that has read it."""
     driver = start_driver("/dev/null", calibration_file=path)
     driver.wait_for_line("is not a serial port")
     (line,) = [line for line in driver.lines if "calibration_file" in line]
@@ -60,7 +60,7 @@ def test_names_that_are_not_read_are_told_with_the_nearest(
 
 
 def test_a_home_that_nobody_has_ends_the_start(start_driver: Start) -> None:
-    """With a sentence."""
+    """The driver ends with a message."""
     driver = start_driver("/dev/null", calibration_file="~nosuchuser/c.yaml")
     driver.wait_for_line("the calibration_file ~nosuchuser/c.yaml cannot be found: .*whole path")
     assert driver.end() == 2

@@ -114,7 +114,7 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
 def test_a_twist_that_is_not_finite_anywhere_is_refused(
     probe: Probe, driver: Driver, board: PtyBoard, bad: float, axis: str
 ) -> None:
-    """Also where the driver would not use the axis: its publisher is not to be trusted."""
+    """This includes axes that the driver ignores, as their publisher is faulty."""
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.y = 0.3

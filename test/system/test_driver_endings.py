@@ -120,7 +120,7 @@ def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
 
 
 def fill_terminal(path: str) -> None:
-    """From the side of a program that opened it."""
+    """Fill the terminal from the side of a program that opened it."""
     descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     fill(descriptor)
     os.close(descriptor)

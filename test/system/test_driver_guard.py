@@ -59,7 +59,7 @@ def hang(driver: Driver, board: PtyBoard) -> int:
 
 
 def wait_until(predicate: Callable[[], object]) -> None:
-    """For processes and log lines, which raise no event."""
+    """Wait for processes and log lines, which raise no event."""
     end = time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end, "it did not come about"
@@ -70,7 +70,7 @@ def wait_until(predicate: Callable[[], object]) -> None:
 def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
     board: PtyBoard, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """Without a chance to do anything about it itself."""
+    """The driver cannot act any more; the guard stops the robot."""
     driving(probe, board)
     assert driver.end(number) == -number
     assert board.wait_for(still, PATIENCE_S)

@@ -101,7 +101,7 @@ def test_a_calibration_that_cannot_be_saved_is_applied_and_says_so(robot: Robot)
 def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
     tmp_path: Path, start_driver: Callable[..., Driver]
 ) -> None:
-    """With exit code 2 and a sentence that says what to do."""
+    """The exit code is 2, and the message says what to do."""
     path = tmp_path / "robot.yaml"
     path.write_text("gyro_bias: [1, 2")
     driver = start_driver("/dev/null", calibration_file=path)
@@ -159,7 +159,7 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
 
 
 def test_the_updater_publishes_where_it_is_installed(robot: Robot) -> None:
-    """By its period, a parameter of its own; names, levels and hardware id are the same."""
+    """It uses its own period parameter; names, levels and hardware id are the same."""
     pytest.importorskip("diagnostic_updater", exc_type=ImportError)
     period = ["diagnostic_updater.period"]
     values = robot.probe.call(GetParameters, "get_parameters", names=period).values
@@ -182,7 +182,7 @@ def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> No
 def test_who_does_not_want_transforms_hears_nothing_of_tf(
     start_driver: Callable[..., Driver],
 ) -> None:
-    """With an EKF, say. Simulated time on a real port is another matter."""
+    """An EKF is one example. Simulated time on a real port is reported separately."""
     driver = start_driver("/dev/null", publish_tf=False, use_sim_time=True)
     driver.wait_for_line("use_sim_time is set, but /dev/null keeps real time")
     assert "tf2" not in driver.output
@@ -191,7 +191,7 @@ def test_who_does_not_want_transforms_hears_nothing_of_tf(
 def test_measurements_wait_for_simulated_time_and_it_is_said(
     start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """Also on a simulated board, whose time is not that of /clock."""
+    """This includes a simulated board, whose time is not that of /clock."""
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)
     probe.wait_for_state("nominal")

@@ -42,7 +42,7 @@ def drive(probe: Probe, board: PtyBoard) -> None:
 
 
 def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board: PtyBoard) -> None:
-    """Twice each: one P in all, and what the board does is what was asked."""
+    """Each is called twice; one P is sent in all, and the board does what was requested."""
     for data, mode in [
         (True, BoardMode.PAUSED),
         (True, BoardMode.PAUSED),
@@ -148,7 +148,7 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_and_a_reset_frees_it(
 def test_commands_under_estop_are_refused_and_told_what_to_do(
     probe: Probe, driver: Driver, board: PtyBoard
 ) -> None:
-    """Neither during the stop nor after its release do they move the robot."""
+    """They move the robot neither during the stop nor after its release."""
     assert probe.call(SetBool, "estop", data=True).success
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
@@ -192,7 +192,7 @@ def test_a_second_request_is_refused_while_one_is_under_way(
 
 
 def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
-    """Where the robot stands is the origin from then on, heading included."""
+    """The robot's place and heading are the origin from then on."""
     odometry = probe.listen(Odometry, "odom")
     drive(probe, board)
     assert board.wait_for(lambda b: b.truth.x_m > 0.1 and still(b), 20.0)

@@ -27,7 +27,7 @@ BUSY_S = 3.0
 
 
 def yes(_question: str) -> str:
-    """To whatever is asked."""
+    """Answer yes to every question."""
     return "y"
 
 
@@ -78,7 +78,7 @@ def rig(
 
 @contextmanager
 def robot_of(driver: Driver) -> Iterator[Robot]:
-    """As a calibration has it."""
+    """A robot as a calibration sees it."""
     with Interruption() as interruption, connect(driver.namespace, [], interruption) as robot:
         yield robot
 

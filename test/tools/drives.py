@@ -44,7 +44,7 @@ class Topic:
     late_s: Array
 
     def series(self) -> Series:
-        """In the order of arrival."""
+        """A series in order of arrival."""
         arrived_s = self.stamp_s + self.late_s
         order = np.argsort(arrived_s)
         return Series(arrived_s[order], self.stamp_s[order], self.values[order])
@@ -155,7 +155,7 @@ class Drive:
         return zip(topic.stamp_s, topic.values.tolist(), topic.late_s, strict=True)
 
     def log(self) -> Log:
-        """As a reader would have it."""
+        """A log as a reader of bags makes it."""
         end_s = self.seconds
         nothing = Series(np.empty(0), np.empty(0), np.empty((0, 3)))
         series = [topic.series() for topic in (self.imu, self.odom, self.joints, self.cmd_vel)]
@@ -178,7 +178,7 @@ class Drive:
 
 
 def spans(changes: list[tuple[float, str]], end_s: float) -> tuple[Span, ...]:
-    """From each change to the next."""
+    """Spans between changes."""
     times_s = [at_s for at_s, _ in changes] + [end_s]
     return tuple(
         Span(at_s, until_s, what)

@@ -25,7 +25,7 @@ from omnibot_driver.tools.needs import ToolError
 def test_a_wrong_namespace_names_the_drivers_there_are(
     rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With exit code 1; a slash at its end does not matter."""
+    """The exit code is 1; a slash at its end does not matter."""
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
     assert main(["imu", "--yes", "--namespace", "/nowhere/"]) == 1
     said = capsys.readouterr().err
@@ -34,7 +34,7 @@ def test_a_wrong_namespace_names_the_drivers_there_are(
 
 
 def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) -> None:
-    """Of the same name, too: both would obey."""
+    """They may have the same name: both would obey."""
     before = len(rigged.port.board.commands)
     twin = robot._node.create_publisher(String, f"{robot.driver}/state", listener.LATCHED)
     assert robot._wait(lambda: robot._node.count_publishers(twin.topic_name) == 2, PATIENCE_S)
@@ -79,7 +79,7 @@ def test_what_ros_cannot_take_is_a_sentence(
 def test_no_driver_at_all_says_how_to_start_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In an empty domain."""
+    """The domain is empty."""
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 0.2)
     monkeypatch.setenv("ROS_DOMAIN_ID", "101" if os.environ["ROS_DOMAIN_ID"] != "101" else "100")
     assert main(["imu", "--plot", str(tmp_path)]) == 1

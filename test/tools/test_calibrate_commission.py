@@ -112,7 +112,7 @@ def test_an_axis_is_reversed_against_what_the_driver_has(
 
 
 def test_wheels_that_are_all_reversed_are_mended_by_the_axes() -> None:
-    """As far as axes go."""
+    """The axes correct what axes can."""
     found = walk("-00", "0-0", "00-", "+-0", "++-", "+++")
     assert found.axis_signs == (-1, -1, -1)
     assert any("wheel_cmd and joint_states stay" in note for note in result_of(found).notes)

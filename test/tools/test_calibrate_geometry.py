@@ -38,7 +38,7 @@ def arguments(*words: str) -> argparse.Namespace:
 
 
 def paths() -> list[tuple[str, Column, bool]]:
-    """Of an odometry that goes exactly through the places of every drive."""
+    """Paths of an odometry that goes exactly through the places of every drive."""
     found = []
     for drive in geometry.plan(1.0, 3, squares=True):
         places = [Pose(), *drive.places]
@@ -53,7 +53,7 @@ def paths() -> list[tuple[str, Column, bool]]:
 
 
 def readings(factors: Column, base: float, random: np.random.Generator) -> list[Reading]:
-    """By a tape of SIGMA, of a robot that truly has these sizes."""
+    """Readings by a tape of SIGMA, of a robot that truly has these sizes."""
     made = []
     for name, path, heading in paths():
         rims = np.abs(rims_of(path, BASE_M))
@@ -98,7 +98,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 
 @given(st.integers(0, 3))
 def test_rolling_with_the_believed_sizes_is_the_way_itself(number: int) -> None:
-    """From wherever it began."""
+    """The start of the way does not matter."""
     path = paths()[number + 2][1] + [3.0, -2.0, 0.0]
     assert rolled(path, PERFECT, 1.0, BASE_M) == pytest.approx(path - path[0], abs=1e-9)
 
@@ -149,7 +149,7 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
 
 
 def test_sizes_that_were_found_are_those_believed_next_time() -> None:
-    """So a second calibration goes on from the first; the driver itself turns counts into ways."""
+    """A second calibration continues from the first."""
     now = {name: parameter.default for name, parameter in PARAMETERS.by_name.items()}
     found = {
         "wheel_radius": 0.029 * 1.02,

@@ -27,7 +27,7 @@ UPSIDE_DOWN = np.array([0.0, 0.0, -9.80665])
 
 
 def sensor(seconds: float, seed: int = 0, force: np.ndarray = UPSIDE_DOWN, lost: int = 0) -> Imu:
-    """Of white noise about a bias and a force."""
+    """Readings of a sensor with white noise about a bias and a force."""
     random = np.random.default_rng(seed)
     count = round(seconds / PERIOD_S)
     rates = BIAS + NOISE * random.standard_normal((count, 3))
@@ -38,7 +38,7 @@ def sensor(seconds: float, seed: int = 0, force: np.ndarray = UPSIDE_DOWN, lost:
 
 
 def log_of(imu: Imu, moved_m: float = 0.0) -> Log:
-    """With odometry that has moved by this much in all."""
+    """A log whose odometry has moved by this much in all."""
     rows = np.column_stack((imu.stamp_s, imu.force_mps2, imu.rate_radps))
     way = np.linspace(0.0, moved_m, len(rows) // 4)
     odometry = [(4 * n * PERIOD_S, x, 0.0, 0.0, 0.0, 0.0, 0.0) for n, x in enumerate(way)]
@@ -62,7 +62,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 def test_level_is_the_turn_that_makes_gravity_point_up(
     roll: float, pitch: float, mounting: float
 ) -> None:
-    """By the rotation matrix of fixed-axis angles, written out."""
+    """The rotation matrix of fixed-axis angles is written out."""
     roll += mounting
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     to_body = np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])
@@ -99,7 +99,7 @@ def test_a_bias_that_walks_is_known_less_well() -> None:
 
 
 def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
-    """Of noise, which no compression makes small."""
+    """The noise does not compress, so the picture is reduced."""
     imu = sensor(120.0)
     picture = tmp_path / "imu.png"
     now = {name: parameter.default for name, parameter in PARAMETERS.by_name.items()}
@@ -124,7 +124,7 @@ def test_readings_that_say_nothing_are_turned_away() -> None:
 
 
 def test_a_robot_that_moves_is_not_at_rest() -> None:
-    """By its wheels, or by a gyro that turns faster than any bias; a robot at rest passes."""
+    """Wheels show it, or a gyro that turns faster than any bias; a robot at rest passes."""
     still(np.zeros(3))(log_of(sensor(3.0)))
     with pytest.raises(ToolError, match="its wheels turn"):
         still(np.zeros(3))(log_of(sensor(3.0), moved_m=0.02))

@@ -63,7 +63,7 @@ def arguments(subcommand: str, *words: str) -> argparse.Namespace:
 
 
 def answers(robot: TwoWheels, misread_mm: float = 0.0) -> Console:
-    """Of a user with a perfect tape, who misreads the last line."""
+    """Answers of a user with a perfect tape who misreads the last line."""
     marks = [drive.wanted for drive in plan(1.0, 3)]
     asked = 0
 
@@ -82,7 +82,7 @@ def answers(robot: TwoWheels, misread_mm: float = 0.0) -> Console:
 @pytest.mark.parametrize("subcommand", [geometry, scale])
 @pytest.mark.parametrize("before", [1.0, 1.2])
 def test_both_scales_are_found_by_tape(subcommand: Any, before: float) -> None:
-    """Whatever the driver has by now; by either name, as there is nothing else to find."""
+    """The driver's present scales do not matter; both option names work."""
     robot = TwoWheels(odom_linear_scale=before)
     name = subcommand.__name__.rpartition(".")[2]
     found = subcommand.run(robot, answers(robot), arguments(name))
@@ -133,7 +133,7 @@ def test_a_line_that_was_misread_is_told() -> None:
 
 
 def test_a_robot_that_may_not_move_is_not_driven() -> None:
-    """By its own limits."""
+    """Its own limits are zero."""
     robot = TwoWheels(max_angular_speed=0.0)
     with pytest.raises(ToolError, match="max_angular_speed is 0"):
         geometry.run(robot, answers(robot), arguments("geometry"))

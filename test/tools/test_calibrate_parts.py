@@ -56,7 +56,7 @@ def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:
 def test_a_command_changes_no_faster_than_allowed(
     now: tuple[float, float, float], wanted: tuple[float, float, float], seconds: float
 ) -> None:
-    """As a vector, turning by itself; what is near is reached."""
+    """The linear part changes as a vector, the yaw rate by itself; near targets are reached."""
     then = BOUNDS.approach("cmd_vel", now, wanted, seconds)
     assert math.dist(then[:2], now[:2]) <= 0.3 * seconds + 1e-12
     assert abs(then[2] - now[2]) <= 0.8 * seconds + 1e-12
@@ -69,7 +69,7 @@ def test_a_command_changes_no_faster_than_allowed(
     "command", [(0.31, 0.0, 0.0), (0.25, 0.25, 0.0), (0.0, 0.0, -0.6), (math.nan, 0.0, 0.0)]
 )
 def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, float]) -> None:
-    """As a vector, too; NaN as well."""
+    """The linear part counts as a vector; NaN is refused too."""
     with pytest.raises(ToolError, match="beyond this calibration's own bounds"):
         BOUNDS.require_allowed("cmd_vel", command)
     wheels = Bounds(speed=5.0, way=1.0, seconds=1.0)
@@ -113,7 +113,7 @@ def test_stairs_are_climbed_one_by_one() -> None:
 
 
 def test_an_empty_log_has_empty_columns() -> None:
-    """Of the right shape, so that no question is needed."""
+    """The columns have the right shape."""
     log = Log()
     assert log.imu.rate_radps.shape == log.odometry.pose.shape == (0, 3)
     assert log.wheels.angle_rad.shape == log.wheels.rate_radps.shape == (0, 0)
@@ -181,7 +181,7 @@ def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
 
 
 def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
-    """For the file and the picture; they are checked before the drive, not after it."""
+    """They are for the file and the picture, and are checked before the drive."""
     path, picture = tmp_path / "a" / "b" / "robot.yaml", tmp_path / "c" / "d" / "picture.png"
     assert output_file(str(path), "", PARAMETERS) == path
     assert picture_file(str(picture), "imu") == picture
@@ -217,14 +217,14 @@ def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -
     "words", [[], ["nonsense"], ["imu", "--minutes", "0"], ["scale", "--levels", "x"]]
 )
 def test_wrong_usage_is_exit_code_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    """With a sentence."""
+    """A message explains it."""
     assert main(words) == 2
     assert "calibrate" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("what", "thing"), [("imu", "an IMU"), ("step", "a firmware")])
 def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: str) -> None:
-    """Of a driver with these parameters; the OmniBot can do it all."""
+    """The message is for a driver with these parameters; the OmniBot can do everything."""
     for subcommand in SUBCOMMANDS:
         require_able(subcommand, PARAMETERS.by_name)
     with pytest.raises(

@@ -35,7 +35,7 @@ def stands(board: SimulatedBoard) -> bool:
 
 
 def once(action: Callable[[], object]) -> Callable[[float], None]:
-    """To be done when the robot has been under way for a moment."""
+    """Do this once when the robot has moved for a moment."""
     left = [action]
 
     def show(seconds: float) -> None:
@@ -101,7 +101,7 @@ def test_what_happens_on_the_way_ends_it_at_rest(
 
 
 def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None:
-    """By the odometry; and commands beyond the bounds are never sent."""
+    """The odometry shows it; commands beyond the bounds are never sent."""
     near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
     with pytest.raises(ToolError, match=r"it went too far \(0\.\d\d m from where it began, 0\.05"):
         robot.drive(steady(SLOWLY, 10.0), near)
@@ -197,7 +197,7 @@ def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
 
 
 def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of each topic that is wanted."""
+    """This holds for each wanted topic."""
     monkeypatch.setattr(listener, "LOST_S", LOST_S)
     heard_s = {listener.IMU: 10.0, listener.ODOMETRY: 9.9}
     assert listener.silent(heard_s, listener.TOPICS, 10.19) == []
@@ -224,7 +224,7 @@ def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixtur
 def test_ctrl_c_at_an_open_question_ends_it(
     rigged: Rig, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With the exit code of an interruption; nothing moves."""
+    """The exit code is that of an interruption; nothing moves."""
 
     def interrupt(_question: str) -> str:
         os.kill(os.getpid(), signal.SIGINT)

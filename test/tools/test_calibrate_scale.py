@@ -53,7 +53,7 @@ def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) ->
 def test_any_scale_is_found_within_what_is_claimed(
     linear: float, angular: float, seed: int
 ) -> None:
-    """From commands in whole counts, by odometry and by gyro, whatever was assumed."""
+    """Commands are in whole counts; odometry and gyro measure, whatever was assumed."""
     found = speeds(drive((linear, linear, angular), seed), ASSUMED, UP, NO_BIAS)
     by = scale([one for one in found if one.axis < 2])
     assert abs(by.value - linear) < max(5 * by.sigma, 1e-4 * linear)

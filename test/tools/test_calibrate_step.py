@@ -72,7 +72,7 @@ def still(answer: str, *words: str) -> None:
 def test_what_cannot_be_done_is_said_before_anything_moves(
     words: list[str], complaint: str
 ) -> None:
-    """With what would do."""
+    """The message says what is possible."""
     with pytest.raises(ToolError, match=complaint):
         still("y", *words)
 

@@ -67,7 +67,7 @@ def test_the_table_of_the_commissioning_guide_is_what_is_wanted() -> None:
 
 @pytest.mark.parametrize("answer", ["+0-", "+ 0 -", "+,0,-", " +, 0, - "])
 def test_three_signs_are_understood(answer: str) -> None:
-    """However they are set apart."""
+    """Any separator is accepted."""
     assert understand(answer) == (1, 0, -1)
 
 
@@ -82,7 +82,7 @@ def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
 def test_a_wheel_is_itself_or_it_is_a_contradiction(
     wheel: int, pattern: tuple[int, int, int]
 ) -> None:
-    """Of 27 answers two are possible."""
+    """Two of the 27 answers are possible."""
     alone = tuple(int(n == wheel) for n in range(3))
     if pattern in (alone, tuple(-n for n in alone)):
         assert wheel_sign(wheel, pattern) == sum(pattern)
@@ -121,7 +121,7 @@ def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
 def test_any_mounting_is_found_from_three_postures(
     roll: float, pitch: float, yaw: float, nose_rad: float, left_rad: float
 ) -> None:
-    """However far it was tilted."""
+    """The tilt angle does not matter."""
     planted = rotation(roll, pitch, yaw)
     found = mounting(*postures(planted, nose_rad, left_rad))
     assert found.rotation == pytest.approx(planted, abs=1e-6)
@@ -137,7 +137,7 @@ def test_angles_are_those_of_a_description(roll: float, pitch: float, yaw: float
 
 @pytest.mark.parametrize("pitch", [math.pi / 2, -math.pi / 2])
 def test_a_sensor_on_its_edge_has_angles_too(pitch: float) -> None:
-    """Where roll and yaw are one."""
+    """Roll and yaw coincide there."""
     made = rotation(0.3, pitch, 0.4)
     assert rotation(*rpy(made)) == pytest.approx(made, abs=1e-9)
 
@@ -226,7 +226,7 @@ def steady(vx: float, vy: float = 0.0, yaw_rate: float = 0.0) -> Drift:
 
 @given(st.floats(0.3, 3.0), angles)
 def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> None:
-    """Whatever the command's unit, and whichever way it goes."""
+    """The command's unit and direction do not matter."""
     x, y = 0.06 * scale * math.cos(direction_rad), 0.06 * scale * math.sin(direction_rad)
     assert control_method(steady(x, y), steady(2 * x, 2 * y), 0.06) == "velocity"
 
@@ -241,7 +241,7 @@ def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> 
     ],
 )
 def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
-    """Neither is it held, nor doubled."""
+    """A pose is neither held as a velocity nor doubled."""
     assert control_method(slow, fast, 0.06) == "position"
 
 
@@ -263,7 +263,7 @@ def test_the_wrong_frame_turns_with_the_robot(
 
 
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
-    """By hand: 0.5 rad/s are 24 counts of each wheel in 40 ms, or 200 tenths of a milliradian."""
+    """Computed by hand: 0.5 rad/s are 24 counts of each wheel in 40 ms, or 20 mrad."""
     rim = math.tau * 0.029 / 1560
     as_displacements = steady(24e-4 / 0.04, 24e-4 / 0.04, 24e-4 / 0.04)
     as_counts = steady(0.0, 2 / 3 * 200 * rim / 0.04, -200 * rim / 0.04 / (3 * 0.143))
@@ -273,7 +273,7 @@ def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
 
 
 def test_a_drift_is_of_its_time_alone() -> None:
-    """Without data, or at rest, no drift is computed."""
+    """A drift is not computed without data or at rest."""
     stamps = np.arange(0.0, 4.0, 0.04)
     twist = np.zeros((100, 3))
     twist[50:, 0] = 0.2

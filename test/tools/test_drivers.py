@@ -10,7 +10,7 @@ STRING, BOOL = "std_msgs/msg/String", "std_msgs/msg/Bool"
 
 
 def test_a_driver_is_a_node_with_a_state_and_an_estop() -> None:
-    """Of their types, under one name, in whatever namespace and under whatever name."""
+    """The types must match, under one name, in any namespace."""
     topics = [
         ("/omnibot_driver/state", STRING), ("/omnibot_driver/estop_active", BOOL),
         ("/robot1/base/estop_active", BOOL), ("/robot1/base/state", STRING),

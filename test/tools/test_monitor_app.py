@@ -132,7 +132,7 @@ def test_q_and_what_people_try_instead_leave_the_dashboard(keys: list[str]) -> N
 
 @pytest.mark.parametrize("key", ["w", "up", "j"])
 def test_keys_steer_with_teleop_alone(key: str) -> None:
-    """Without it nothing asks for keys."""
+    """The program asks for keys only with it."""
     robot = press(key, teleop=True)
     assert robot.dead_man
     assert robot.dead_man.command(0.0) not in (None, HALT)
@@ -140,7 +140,7 @@ def test_keys_steer_with_teleop_alone(key: str) -> None:
 
 
 def test_plus_and_minus_change_the_speed() -> None:
-    """By a tenth each."""
+    """Each key changes it by a tenth."""
     robot = press("plus", "plus", "minus", teleop=True)
     assert robot.dead_man
     assert robot.dead_man.level == 4

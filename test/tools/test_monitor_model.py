@@ -22,7 +22,7 @@ waits_s = st.lists(st.floats(0.0, 3.0), max_size=300)
 
 @given(st.floats(0.5, 120.0), st.floats(2.0, 30.0), st.floats(0.0, 1e6))
 def test_a_steady_stream_has_its_own_rate(hz: float, seconds: float, began_s: float) -> None:
-    """To within one arrival in the window, wherever the window lies."""
+    """The rate is exact within one arrival in the window, wherever the window lies."""
     rate = Rate(began_s)
     for number in range(math.ceil(seconds * hz)):
         rate.arrived(began_s + number / hz)
@@ -104,7 +104,7 @@ def test_a_command_that_nobody_repeats_is_none() -> None:
 
 
 def test_commands_do_not_make_a_silent_driver_look_alive() -> None:
-    """Only what the driver says counts as heard."""
+    """Only messages from the driver count."""
     model = Model("/omnibot_driver", 0.0)
     model.state("nominal", 1.0)
     model.commanded(HALT, 9.0)

@@ -85,7 +85,7 @@ def test_stop_is_at_once() -> None:
 
 
 def test_who_has_not_steered_commands_nothing() -> None:
-    """Not even to stand still: others may be driving."""
+    """Zero commands are not sent either, since another source may be driving."""
     dead_man = DeadMan()
     assert not dead_man.press("x", 0.0)
     assert commands(dead_man, 0.0, 100) == [None] * 100
@@ -113,7 +113,7 @@ def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> Non
 
 @given(st.lists(st.sampled_from([1, -1]), max_size=50), keys)
 def test_speeds_stay_within_the_drivers_limits(steps: list[int], key: str) -> None:
-    """From a tenth of them to the whole."""
+    """They range from a tenth of the limits to the whole."""
     dead_man = DeadMan()
     dead_man.fastest = (0.4, 1.5)
     for step in steps:

@@ -38,7 +38,7 @@ def test_no_value_breaks_the_screen(
 
 
 def test_json_holds_the_values() -> None:
-    """In SI units, under the names of the topics; what is not finite is null."""
+    """Values are in SI units under the topics' names; values that are not finite are null."""
     told = json.loads(text.as_json(view(force_mps2=(math.nan, 1.0, math.inf)), ["trouble"]))
     assert told["driver"] == "/robot1/omnibot_driver"
     assert (told["state"], told["estop"]) == ("nominal", False)
@@ -134,7 +134,7 @@ def test_the_robot_points_where_it_looks(yaw_rad: float, arrow: str) -> None:
 def test_any_way_fits_any_picture(
     points: list[tuple[float, float]], columns: int, rows: int
 ) -> None:
-    """Also on a terminal that has no room for it."""
+    """This includes a terminal without room for it."""
     picture = draw_path(points, columns, rows, Pose(*(points[-1] if points else (0.0, 0.0))))
     assert len(picture.rows) == max(1, rows)
     assert {len(row) for row in picture.rows} == {max(1, columns)}
@@ -142,7 +142,7 @@ def test_any_way_fits_any_picture(
 
 @given(st.lists(st.integers(0, 10**6), max_size=80), st.integers(0, 70))
 def test_a_sparkline_has_its_width(values: list[int], columns: int) -> None:
-    """Nothing is a gap, the largest is full, and something is never nothing."""
+    """Zero is a gap, the largest value is full, and a small value is visible."""
     line = sparkline(values, columns)
     assert len(line) == columns
     shown = values[-columns:] if columns else []
@@ -151,7 +151,7 @@ def test_a_sparkline_has_its_width(values: list[int], columns: int) -> None:
 
 
 def test_a_board_without_an_imu_has_no_rows_of_it() -> None:
-    """In words and in JSON, and it is not missed."""
+    """Neither words nor JSON show it, and it does not count as missing."""
     shown = view(lacks=frozenset({"imu"}), imu=Flow(0.0, None, ()), force_mps2=None)
     words = "\n".join(text.figures(shown))
     assert "odom" in words

@@ -16,7 +16,7 @@ ROOT = Path(omnibot_driver.__file__).parents[1]
 
 
 def test_a_library_that_is_there_is_imported() -> None:
-    """As ``import`` would."""
+    """The import works as ``import`` does."""
     assert need("json") is json
 
 

@@ -101,7 +101,7 @@ def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) 
 
 
 def test_the_only_robot_needs_no_name(tmp_path: Path) -> None:
-    """Whatever its namespace is."""
+    """Its namespace does not matter."""
     log = log_of(write(tmp_path / "bag", [Drive(SECONDS, "/robot1")]))
     assert log.robot == "/robot1"
 
@@ -117,7 +117,7 @@ def refused(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def test_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """With what to give."""
+    """The message says what to give."""
     assert "give the folder of a bag" in refused(tmp_path / "nothing", capsys)
 
 
@@ -152,7 +152,7 @@ def test_a_bag_of_something_else_is_told(
 def test_a_robot_without_odometry_is_reported_on_and_is_not_healthy(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """With what cannot be said of it."""
+    """The report says what it cannot judge."""
     drive.odom.drop(0.0, SECONDS)
     assert main([str(write(tmp_path / "bag", [drive])), "--output", str(tmp_path / "out")]) == 3
     assert "No message of odom" in capsys.readouterr().out
@@ -161,7 +161,7 @@ def test_a_robot_without_odometry_is_reported_on_and_is_not_healthy(
 def test_nothing_but_nan_is_reported_on(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """In every number there is."""
+    """Every number of the bag is NaN."""
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
     assert main([str(write(tmp_path / "bag", [drive])), "--output", str(tmp_path / "out")]) == 3
@@ -186,7 +186,7 @@ def test_wrong_usage_is_told(wrong: list[str], capsys: pytest.CaptureFixture[str
 
 
 def test_a_bag_is_reported_on_where_there_is_no_ros(drive: Drive, tmp_path: Path) -> None:
-    """In a process that cannot import rclpy nor any message, and whose reader leaves at once."""
+    """The process cannot import rclpy or messages, and its reader leaves at once."""
     bag = write(tmp_path / "bag", [drive])
     program = (
         "import sys\n"

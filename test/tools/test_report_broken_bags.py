@@ -109,7 +109,7 @@ def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
 
 
 def test_an_mcap_with_its_end_overwritten_by_zeros_is_read(tmp_path: Path) -> None:
-    """As a file system leaves it after a power failure."""
+    """A file system leaves such a file after a power failure."""
     bag = write(tmp_path / "bag", [Drive(40.0)])
     size = (bag / "bag.mcap").stat().st_size
     file = cut(bag, size * 9 // 10)
@@ -149,7 +149,7 @@ def test_an_mcap_without_chunks_and_order_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("size", [0, 8, 20])
 def test_an_mcap_in_which_nothing_is_whole_is_told(drive: Drive, tmp_path: Path, size: int) -> None:
-    """With the repair that may do more."""
+    """The message names the repair that may do more."""
     bag = write(tmp_path / "bag", [drive])
     file = cut(bag, size)
     with pytest.raises(ToolError, match=f"{file.name} cannot be read: .*ros2 bag reindex {bag}"):

@@ -51,5 +51,5 @@ def test_every_subject_has_a_row() -> None:
     ],
 )
 def test_the_limits_are_those_of_the_code(subject: str, limit: str) -> None:
-    """In the row of their subject."""
+    """Each row has those of its subject."""
     assert limit in ROWS[subject]

@@ -19,7 +19,7 @@ def drive() -> Drive:
 
 
 def test_a_healthy_drive_is_called_healthy(drive: Drive) -> None:
-    """With figures, and nothing to do."""
+    """The report has figures, and nothing to do."""
     findings = judge(drive.log())
     assert not troubles(drive)
     assert headline(findings) == "Healthy."
@@ -103,7 +103,7 @@ def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) ->
 
 
 def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
-    """Nothing comes after it to step to."""
+    """No later message ends the gap."""
     drive.imu.drop(17.0, 99.0)
     gap = said(drive, "Gaps", "imu/data_raw has 1 gap, 301 messages")
     assert gap.level is Level.BAD
@@ -174,7 +174,7 @@ def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
 
 
 def test_nothing_but_nan_is_told(drive: Drive) -> None:
-    """Of every topic."""
+    """This holds for every topic."""
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
     assert {finding.subject for finding in troubles(drive)} == {"IMU", "Odometry", "Commands"}
@@ -213,7 +213,7 @@ def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
 
 
 def test_topics_that_are_missing_are_named(drive: Drive) -> None:
-    """With what cannot be said for want of them."""
+    """The report says what it cannot judge without them."""
     drive.odom.drop(0.0, 99.0)
     drive.cmd_vel.drop(0.0, 99.0)
     assert said(drive, "Recording", "No message of odom").level is Level.BAD

@@ -53,7 +53,7 @@ def test_a_biased_gyro_is_told_with_the_service_that_mends_it(drive: Drive) -> N
 
 
 def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
-    """While the accelerometer is alive."""
+    """The accelerometer still varies."""
     drive.imu.values[500:700, :3] = drive.imu.values[500, :3]
     stuck = said(drive, "IMU", "identical readings")
     assert stuck.level is Level.BAD
@@ -129,7 +129,7 @@ def test_a_robot_that_goes_the_wrong_way_is_told_with_the_signs(drive: Drive) ->
 
 
 def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
-    """For the last four seconds of the drive."""
+    """The robot stands for the last four seconds of the drive."""
     rows = drive.odom.stamp_s > 12.0
     drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]
     drive.odom.values[rows, 3:] = 0.0
@@ -162,7 +162,7 @@ def test_an_estop_is_noted_and_what_it_stops_is_no_trouble(drive: Drive) -> None
 
 
 def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
-    """Nothing is worse."""
+    """It is the worst finding."""
     drive.estops += [(10.0, True)]
     moved = said(drive, "E-stop", "moved while")
     assert moved.level is Level.BAD

@@ -40,7 +40,7 @@ def test_the_page_has_everything_inside(folder: Path) -> None:
 
 
 def test_every_picture_lies_beside_the_page(folder: Path) -> None:
-    """As a PNG, of moderate size."""
+    """Each is a PNG of moderate size."""
     assert sorted(file.stem for file in folder.glob("*.png")) == PICTURES
     for file in folder.glob("*.png"):
         assert file.read_bytes().startswith(b"\x89PNG")
@@ -55,7 +55,7 @@ def test_a_name_cannot_become_markup(folder: Path) -> None:
 
 
 def test_every_finding_is_on_the_page_and_in_the_terminal(folder: Path) -> None:
-    """In the same words."""
+    """The words are the same."""
     drive = Drive(10.0)
     drive.estops += [(5.0, True), (6.0, False)]
     findings = judge(drive.log())
@@ -67,7 +67,7 @@ def test_every_finding_is_on_the_page_and_in_the_terminal(folder: Path) -> None:
 
 
 def test_what_cannot_be_drawn_is_not_there(tmp_path: Path) -> None:
-    """Of nothing but NaN there are times to draw; a picture of an earlier report does not stay."""
+    """A topic of NaN has no picture, and a picture of an earlier report is removed."""
     drive = Drive(10.0)
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
@@ -81,7 +81,7 @@ def test_what_cannot_be_drawn_is_not_there(tmp_path: Path) -> None:
 
 @given(st.integers(0, 40_000), st.integers(0, 2**32 - 1))
 def test_an_envelope_keeps_the_extremes_and_the_order(length: int, seed: int) -> None:
-    """In few points, whatever the length; but for less than a stretch at the end."""
+    """The number of points is small, whatever the length."""
     values = np.random.default_rng(seed).normal(size=length)
     times_s = np.arange(length, dtype=float)
     shown_s, shown = envelope(times_s, values)
@@ -98,5 +98,5 @@ def test_an_envelope_keeps_the_extremes_and_the_order(length: int, seed: int) ->
     [(0.02, "0.02 s"), (9.0, "9 s"), (99.6, "100 s"), (150.4, "2 min 30 s"), (7384, "2 h 03 min")],
 )
 def test_lengths_of_time_are_told_as_people_do(seconds: float, told: str) -> None:
-    """To three figures at the most."""
+    """They have at most three figures."""
     assert span(seconds) == told

@@ -6,7 +6,7 @@ from omnibot_driver.tools.ros_arguments import split_ros_arguments
 
 
 def test_ros_arguments_are_told_from_ours() -> None:
-    """As rclpy tells them."""
+    """The rule is that of rclpy."""
     words = ["imu", "--yes", "--ros-args", "-r", "cmd_vel:=other", "--", "--minutes", "2"]
     own, ros = split_ros_arguments(words)
     assert own == ["imu", "--yes", "--minutes", "2"]

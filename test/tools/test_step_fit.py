@@ -96,7 +96,7 @@ def test_late_commands_are_put_right_and_a_stall_is_left_out() -> None:
 
 
 def test_a_wheel_that_answers_differently_each_time_is_said() -> None:
-    """With what may be the reason."""
+    """The message names a possible reason."""
     random = np.random.default_rng(5)
     steps = made_up(FIRST_ORDER, (1.0, 0.06, 0.0), 1) + made_up(FIRST_ORDER, (1.0, 0.06, 0.0), 2)
     for step in steps:
@@ -136,7 +136,7 @@ def test_other_gains_must_be_told() -> None:
 
 
 def test_rise_and_overshoot_are_those_of_the_answer() -> None:
-    """Of a first order: 2.2 time constants, and none."""
+    """A first order has a rise of 2.2 time constants, and no overshoot."""
     traits = fit(FIRST_ORDER, made_up(FIRST_ORDER, (1.0, 0.1, 0.0), 3)).traits()
     rise_s, sigma_s = traits["rise time"]
     assert rise_s == pytest.approx(0.22, abs=5 * sigma_s + 2e-3)
@@ -165,7 +165,7 @@ def test_lost_deltas_are_left_out() -> None:
 
 
 def test_odometry_that_was_lost_is_said() -> None:
-    """Nothing is fitted to nothing."""
+    """Without data there is no fit."""
     commands, wheels = steps_to_and_fro(MotorConstants(), steps=2)
     silent = replace(
         wheels,

@@ -27,7 +27,9 @@ wheel_motors = st.builds(Motor, st.floats(15, 120), st.floats(2, 15), st.floats(
 
 
 def simulated_answer(motor: Motor, gains: Gains, ticks: int) -> list[float]:
-    """By the simulated board's own motor and controller, without friction and encoder steps."""
+    """The answer of the simulated board's motor and controller, without friction and
+    quantisation.
+    """
     wheel = simulated.Motor(
         simulated.MotorConstants(
             pwm_per_count=motor.pwm_per_count,
@@ -63,7 +65,7 @@ def test_the_loop_is_the_simulated_boards(delay: int) -> None:
 
 
 def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
-    """In every tick of the rise."""
+    """This holds for every tick of the rise."""
     sooner, between, later = (
         answer(Motor(46.0, 6.0, delay), MANUAL, 8).speed for delay in (1.0, 1.4, 2.0)
     )
@@ -131,7 +133,7 @@ def test_two_equal_poles_are_no_exception() -> None:
 
 
 def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
-    """At the ends of ticks, the sum of its ticks."""
+    """The comparison is at the ends of ticks, as the sum of the ticks."""
     model = motor_model(MANUAL)
     turned = model.turned(np.array([46.0, 0.06, 0.01]), np.array([-0.1, 0.0, 0.01, 0.05]))
     speeds = answer(Motor(46.0, 6.0, 1.0), MANUAL, 5).speed
@@ -141,7 +143,7 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
 @settings(max_examples=5)
 @given(wheel_motors)
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
-    """Whatever the motor: robust, hardly overshooting, not nervous, closer to command and load."""
+    """For any motor they are robust, hardly overshoot, and follow command and load more closely."""
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)
     assert after.ms <= LARGEST_MS
@@ -155,7 +157,7 @@ def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
 
 
 def test_gains_for_three_motors_keep_within_the_limits_on_each() -> None:
-    """Also on the one that they suit least."""
+    """This holds for the motor that they suit least."""
     motors = [Motor(46.0, 6.0, 0.0), Motor(35.0, 10.0, 1.0), Motor(60.0, 4.0, 3.0)]
     gains = better_gains(motors)
     for motor in motors:

@@ -47,7 +47,7 @@ def test_every_way_a_port_can_refuse_says_what_to_do(
 
 @pytest.mark.parametrize("path", ["/dev/no-such-port", "/dev/null", "spy://a:b"])
 def test_a_port_that_cannot_be_had_names_the_parameter_to_set(path: str) -> None:
-    """Of several lines each has its own."""
+    """A board with several lines has a parameter for each."""
     with pytest.raises(LinkError) as refused:
         SerialPort(path, 115200, "front_port")
     assert "front_port" in str(refused.value)
@@ -55,7 +55,7 @@ def test_a_port_that_cannot_be_had_names_the_parameter_to_set(path: str) -> None
 
 
 def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
-    """By the kernel's list of locks."""
+    """The kernel's list of locks names the owner."""
     port = SerialPort(terminal.path, 115200)
     with pytest.raises(LinkError, match=rf"in use by another program \(process {os.getpid()}, "):
         SerialPort(terminal.path, 115200)

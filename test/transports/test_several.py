@@ -77,7 +77,7 @@ def next_packets(lines: Several, count: int) -> set[Packet]:
 
 
 def test_what_is_read_and_written_keeps_its_channel(ends: Ends, lines: Several) -> None:
-    """Both at once."""
+    """Both lines are used at once."""
     os.write(ends.far[0], b"drive")
     os.write(ends.far[1], b"front")
     assert next_packets(lines, 2) == {(0, b"drive"), (1, b"front")}
@@ -111,7 +111,7 @@ def test_a_line_that_is_lost_keeps_the_other_from_nothing(ends: Ends, lines: Sev
 
 
 def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
-    """By the sentence of the first."""
+    """The error is that of the first line."""
     ends.hang_up(0)
     changed(lines)
     ends.hang_up(1)
@@ -143,7 +143,7 @@ def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Severa
 def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also where the reader has something else to do."""
+    """The reader may be busy with something else."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
@@ -167,7 +167,7 @@ def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
 def test_what_a_full_line_does_not_take_at_once_follows_in_order(
     ends: Ends, lines: Several
 ) -> None:
-    """As soon as its reader makes room."""
+    """It follows as soon as the reader makes room."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     lines.write(((0, b"one"),))
@@ -182,7 +182,7 @@ def test_what_a_full_line_does_not_take_at_once_follows_in_order(
 def test_a_line_that_comes_back_is_opened_while_the_others_stay_open(
     ends: Ends, tmp_path: Path
 ) -> None:
-    """Nothing is given back of what is there."""
+    """The open lines are not closed for it."""
     late = tmp_path / "late"
     paths = str(late), ends.paths[1]
     lines = Several([partial(SerialPort, path, 115200) for path in paths], retry_s=0.01)

@@ -27,13 +27,13 @@ PATIENCE_S = 20.0
 
 @pytest.fixture
 def stack() -> Iterator[ExitStack]:
-    """Whatever a test enters here ends with it."""
+    """A stack of contexts that ends with the test."""
     with ExitStack() as stack:
         yield stack
 
 
 def read(transport: SimulatedTransport, wanted: int, channel: int = 0) -> bytes:
-    """At least this many bytes of a channel, those of others aside."""
+    """Read at least this many bytes of a channel, and drop those of others."""
     data, deadline_s = b"", time.monotonic() + PATIENCE_S
     while len(data) < wanted:
         assert time.monotonic() < deadline_s, f"only {data!r} came"
@@ -50,7 +50,7 @@ def test_it_needs_no_guard_and_no_kernel() -> None:
 
 
 def test_a_read_ends_without_a_packet() -> None:
-    """When its time is over."""
+    """It ends after its time limit."""
     assert InProcessBoard(ToyServer()).read(0.01) == (0, b"")
 
 
@@ -66,7 +66,7 @@ def test_a_read_that_waits_can_be_interrupted() -> None:
 
 
 def test_after_closing_nothing_is_read_and_nothing_written() -> None:
-    """As with a port that is gone; closing again is harmless."""
+    """It behaves like a lost port; a second close does nothing."""
     transport = SimulatedTransport("sim://", TOY)
     transport.close()
     transport.close()

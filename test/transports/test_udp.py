@@ -67,7 +67,7 @@ def next_packet(transport: UdpPorts) -> Packet:
 
 
 def test_each_packet_is_a_datagram_of_its_channel(host: Host, transport: UdpPorts) -> None:
-    """In both directions, and never joined."""
+    """This holds in both directions; packets are never joined."""
     transport.write(((0, b"one"), (0, b"two"), (1, b"halt")))
     (first, driver), (second, _) = host.ports[0].recvfrom(99), host.ports[0].recvfrom(99)
     assert (first, second) == (b"one", b"two")
@@ -136,7 +136,7 @@ def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
     ],
 )
 def test_a_url_that_means_no_place_is_refused(url: str) -> None:
-    """With the form that it must have; the stop port is one higher."""
+    """The message has the expected form; the stop port is one higher."""
     with pytest.raises(LinkError, match=r"give udp://HOST:PORT"):
         UdpPorts(url, 2)
 
@@ -151,7 +151,7 @@ def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
 
 @pytest.mark.parametrize("name", ["no-such-host.invalid", "robot..local", 64 * "a"])
 def test_a_host_that_is_not_known_is_refused(name: str) -> None:
-    """Whatever the resolver says of it; no descriptor stays open."""
+    """The resolver's error does not matter; no descriptor stays open."""
     before = len(os.listdir("/proc/self/fd"))
     with pytest.raises(LinkError, match="check the parameter `port`"):
         UdpPorts(f"udp://{name}:5000", 2)

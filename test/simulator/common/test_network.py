@@ -21,7 +21,7 @@ def through(path: NetworkPath, every_s: float = 0.01) -> list[bytes]:
 
 
 def test_a_good_network_hands_over_at_once_and_in_order() -> None:
-    """Nothing is lost, doubled or counted."""
+    """No datagram is lost, doubled or counted."""
     network = FaultyNetwork()
     network.to_board.send(b"hello", 1.0)
     assert network.to_board.arrived(1.0) == [b"hello"]
@@ -41,7 +41,7 @@ def test_datagrams_are_lost_at_the_given_rate() -> None:
 
 
 def test_datagrams_come_twice_at_the_given_rate() -> None:
-    """Without delay the copy comes right behind."""
+    """The copy follows at once if there is no delay."""
     path = NetworkPath(NetworkFaults(duplicate=0.1), "seed")
     arrived = through(path)
     assert len(arrived) - len(SENT) == path.duplicated == pytest.approx(500, rel=0.2)

@@ -60,7 +60,7 @@ def test_one_link_leads_to_several_terminals_by_their_names(tmp_path: Path) -> N
 
 
 def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
-    """In the order of the channels."""
+    """The links are in the order of the channels."""
     links = [tmp_path / "a", tmp_path / "b"]
     with ServedBoard(ToyLines(), links=links) as served:
         assert [os.readlink(link) for link in links] == served.addresses
@@ -91,7 +91,7 @@ def test_a_datagram_is_answered_to_its_sender(client: socket.socket) -> None:
 
 
 def test_empty_datagrams_and_several_at_once_come_apart(client: socket.socket) -> None:
-    """Nothing is joined, and nothing left out."""
+    """They are neither joined nor left out."""
     with ServedBoard(ToyServer()) as served:
         with served.lock:  # they wait in the socket
             for data in (b"odo", b"", b"odo"):
@@ -111,7 +111,7 @@ def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
 
 
 def test_datagram_channels_stand_on_ports_in_a_row() -> None:
-    """On this computer alone; the first may be chosen."""
+    """They listen on this computer only; the first port may be chosen."""
     sockets = open_sockets(2)
     first, second = (place(one.address) for one in sockets)
     for one in sockets:

@@ -45,7 +45,7 @@ def test_a_request_is_answered_when_its_move_is_done() -> None:
 
 
 def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
-    """Nothing waits for real time: ten seconds of it pass at once."""
+    """Ten seconds of board time pass at once."""
     network = FaultyNetwork(NetworkFaults(delay_s=10.0, duplicate=0.5, lose=0.2))
     board = ToyServer()
     wired = WiredBoard(board, [network])

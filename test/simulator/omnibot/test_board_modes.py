@@ -197,7 +197,7 @@ def test_what_was_received_and_obeyed_is_on_record() -> None:
 
 @pytest.mark.slow
 def test_the_record_of_received_bytes_is_bounded() -> None:
-    """Of very much input the newest is kept."""
+    """The newest bytes are kept."""
     board = SimulatedBoard(RUNNING)
     for _ in range(30):
         board.receive(bytes(100_000))

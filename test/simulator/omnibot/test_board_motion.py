@@ -134,7 +134,7 @@ def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
 
 
 def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
-    """However far the pose is."""
+    """The distance of the pose does not matter."""
     board = SimulatedBoard(POSITION)
     board.receive(velocity(5000, 5000, 0))
     run(board, 5.0)

@@ -88,7 +88,7 @@ def test_both_sequences_count_by_themselves_and_wrap() -> None:
 
 
 def test_a_sequence_goes_on_after_a_pause() -> None:
-    """Only a reboot sets SEQ to zero, and motion while paused is in the next delta."""
+    """Only a reboot sets SEQ to zero; motion during the pause is in the next delta."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 2.0)
@@ -134,7 +134,7 @@ def drive_square(board: SimulatedBoard) -> None:
 
 
 def test_the_odometry_is_the_truth_but_for_quantisation() -> None:
-    """Without slip and scale errors the two agree after four metres to a millimetre."""
+    """They agree within a millimetre after four metres without slip and scale errors."""
     board = SimulatedBoard(RUNNING)
     drive_square(board)
     truth, odometry = board.truth, board.odometry

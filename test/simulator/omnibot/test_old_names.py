@@ -26,7 +26,7 @@ def test_a_name_is_found_where_it_was_with_a_warning(
 
 
 def test_a_name_that_never_was_there_is_not_found() -> None:
-    """As in any module."""
+    """It raises as in any module."""
     with pytest.raises(AttributeError, match="has no attribute 'wheels'"):
         _ = simulator.wheels
 

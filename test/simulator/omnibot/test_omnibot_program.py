@@ -45,7 +45,7 @@ def test_the_console_reboots_the_board() -> None:
 
 
 def test_the_end_of_the_input_does_not_end_it() -> None:
-    """With /dev/null for stdin the board goes on through its boot and beyond."""
+    """The board runs through its boot and beyond with /dev/null as stdin."""
     with simulator(stdin=subprocess.DEVNULL) as process:
         port = os.open(line(process), os.O_RDONLY | os.O_NOCTTY)
         try:

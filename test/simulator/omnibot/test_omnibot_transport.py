@@ -45,7 +45,7 @@ def test_a_board_boots_and_obeys() -> None:
     ],
 )
 def test_options_that_it_does_not_know_are_refused(url: str, why: str) -> None:
-    """By a sentence that names the option, the whole list and an example."""
+    """The message names the option, the whole list and an example."""
     with pytest.raises(LinkError) as refusal:
         SimulatedTransport(url, OMNIBOT)
     assert why in str(refusal.value)

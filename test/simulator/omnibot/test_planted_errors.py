@@ -55,7 +55,7 @@ def test_a_reversed_axis_moves_the_robot_the_other_way_and_the_board_does_not_kn
 
 
 def test_wheel_counts_are_those_of_the_wheels() -> None:
-    """By hand: 8 / 70 m/s are 39 counts in 40 ms, of wheel B alone."""
+    """Computed by hand: 8 / 70 m/s are 39 counts in 40 ms, of wheel B alone."""
     a, b, c = last(driven(WHEEL_B, 2.0, frame="wheel_counts"), DELTA, 3)
     assert (a, c) == (0, 0)
     assert b == pytest.approx(8 / 70 * 0.04 * 1560 / (2 * pi * 0.029), abs=1.5)
@@ -70,14 +70,14 @@ def test_each_motor_has_its_own_constants() -> None:
 
 
 def test_a_motors_delay_holds_its_effort_back() -> None:
-    """Nothing for this many ticks, then the normal stream."""
+    """There is no effort for this many ticks, then the normal stream."""
     prompt, late = Motor(), Motor(MotorConstants(delay_ticks=3))
     turned = [prompt.advance(500.0) for _ in range(10)]
     assert [late.advance(500.0) for _ in range(10)] == [0.0, 0.0, 0.0, *turned[:7]]
 
 
 def test_the_controllers_gains_are_those_given() -> None:
-    """By hand, one tick after a step of 10 counts: 5·10 + 2·10 + 1·10."""
+    """Computed by hand, one tick after a step of 10 counts: 5·10 + 2·10 + 1·10."""
     gains = WheelGains(feed_forward=5.0, proportional=2.0, integral=1.0)
     assert WheelController(gains).update(10.0, 0.0) == 80.0
 
@@ -104,7 +104,7 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
 
 
 def test_a_robot_that_is_turned_by_hand_feels_it_and_its_wheels_do_not() -> None:
-    """To the left is negative on a gyro that hangs upside down."""
+    """A turn to the left is negative on a gyro that hangs upside down."""
     board = driven(b"", 0.1, gyro_noise_dps=0.0, gyro_bias_dps=(0.0, 0.0, 0.0))
     board.hold(yaw_rate=radians(30))
     board.step()

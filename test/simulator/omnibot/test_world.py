@@ -56,7 +56,7 @@ def test_larger_wheels_carry_the_robot_further_than_the_encoders_say() -> None:
 
 
 def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
-    """By its factor, and the encoders do not know."""
+    """The base turns less by its factor, and the encoders do not show it."""
     plain, wide = drive(BoardSettings()), drive(BoardSettings(base_radius_scale=1.05))
     assert wide.encoders == plain.encoders
     assert wide.truth.yaw_rad == pytest.approx(plain.truth.yaw_rad / 1.05)
@@ -73,7 +73,7 @@ def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
 
 
 def test_the_twist_is_the_derivative_of_the_pose() -> None:
-    """At a steady turn the yaw grows by the yaw rate."""
+    """The yaw grows by the yaw rate in a steady turn."""
     world = drive(BoardSettings())
     before = world.truth
     world.advance((1000.0, 1000.0, 1000.0))
@@ -81,7 +81,7 @@ def test_the_twist_is_the_derivative_of_the_pose() -> None:
 
 
 def test_a_force_moves_the_robot_in_its_direction() -> None:
-    """As efforts of the motors in the pattern of that motion would."""
+    """It acts like efforts of the motors in the pattern of that motion."""
     for force, moved in (((500.0, 0.0, 0.0), 0), ((0.0, 500.0, 0.0), 1), ((0.0, 0.0, 500.0), 2)):
         world = World(BoardSettings())
         world.force = Force(*force)
@@ -110,7 +110,7 @@ def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
 
 
 def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> None:
-    """Whatever the motors do; afterwards they go on from there."""
+    """The motors do not matter; afterwards they continue from there."""
     world = World(BoardSettings())
     world.gripped = Twist(0.1, -0.2, 0.0)
     for _ in range(100):
