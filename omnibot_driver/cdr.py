@@ -122,7 +122,7 @@ def twist(data: bytes) -> BodyTwist:
 
 
 class Messages:
-    """What a Serializer makes, as messages: for a machine on which the bytes are others."""
+    """The messages of a Serializer as rclpy messages, for a machine with other serialised bytes."""
 
     def __init__(self, settings: MessageSettings) -> None:
         self._settings = settings

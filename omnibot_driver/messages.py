@@ -221,7 +221,7 @@ def goal_pose(stamped: Any, odom_frame: str) -> Pose:
 
 
 def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
-    """What to say of publishers on ``cmd_vel`` whose type is not ours; empty if there are none."""
+    """A warning about publishers on ``cmd_vel`` with another type; empty if there are none."""
     ours, other = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
     if stamped:
         ours, other = other, ours

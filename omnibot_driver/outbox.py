@@ -40,7 +40,7 @@ class Outbox:
         return not self._waiting and self._delivering.acquire(blocking=False)
 
     def release(self) -> None:
-        """What was claimed is delivered, or failed."""
+        """End a claim after its delivery, or its failure."""
         self._delivering.release()
         if self._waiting:
             self.deliver()

@@ -20,7 +20,7 @@ WITHOUT_CLOCK: Final = ("sim://", RECORDING)
 
 
 def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
-    """What to say of the adapter's latency timer; empty if it is short, or there is none."""
+    """A warning about the adapter's latency timer; empty if it is short, or there is none."""
     device = Path(port).resolve().name
     try:
         text = (sysfs / "class/tty" / device / "device/latency_timer").read_text(encoding="ascii")
@@ -37,7 +37,7 @@ def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
 
 
 def clock_advice(port: str, use_sim_time: bool) -> str:
-    """What to say of simulated time on a port that keeps real time; empty where all is well."""
+    """A warning about simulated time on a port that keeps real time; empty if there is none."""
     if not use_sim_time or port.startswith(WITHOUT_CLOCK):
         return ""
     return (
@@ -47,7 +47,7 @@ def clock_advice(port: str, use_sim_time: bool) -> str:
 
 
 def waiting_advice(port: str, now_ns: int) -> str:
-    """What to say when the node's clock has not begun; a recording's stamps are its own."""
+    """A warning that the node's clock has not begun; a recording has stamps of its own."""
     if now_ns or port.startswith(RECORDING):
         return ""
     return (
@@ -57,7 +57,7 @@ def waiting_advice(port: str, now_ns: int) -> str:
 
 
 def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
-    """What to say when not all publishers of a node's own topic are the one of this full name."""
+    """A warning that another node of this full name publishes on this node's topic."""
     names = [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in publishers]
     if names.count(name) < 2:
         return ""

@@ -15,7 +15,7 @@ MISSING: Final = (
 
 
 def transform_publisher(node: Node) -> Callable[[TransformStamped], Any] | None:
-    """What publishes a transform; None, and a warning, where nothing can."""
+    """A function that publishes a transform; None, with a warning, without tf2_ros."""
     try:
         from tf2_ros import TransformBroadcaster
     except ImportError as error:

@@ -135,7 +135,7 @@ class _Sender:
         return number is None or self.number is None or self.number < number
 
     def improbability(self, differences_s: Differences, at_s: float) -> float:
-        """How much speaks against its having sent a message, to be compared with other senders."""
+        """How unlikely it is that this sender sent a message, compared with others."""
         late_s = min(
             offset.late_s(difference_s, at_s)
             for offset, difference_s in zip(self._offsets, differences_s, strict=True)

@@ -31,7 +31,7 @@ Publish = Callable[[Any, int], None]
 
 
 class Profile(Protocol):
-    """What the shell needs of a kind of board, as the names of a module."""
+    """The functions and values of a board's profile, which is a module."""
 
     SIMULATOR: str
     """The package of its simulated board, to be imported where it is used."""
@@ -43,10 +43,10 @@ class Profile(Protocol):
         """A board with these checked parameter values."""
 
     def settings(self, values: Mapping[str, Any]) -> object:
-        """What ``Board.settings`` is to be replaced by when parameters change."""
+        """The new value of ``Board.settings`` when parameters change."""
 
     def opener(self, values: Mapping[str, Any]) -> Callable[[], Transport]:
-        """What opens the line to a real one."""
+        """A function that opens the real line."""
 
     def kinematics(self, values: Mapping[str, Any]) -> Kinematics:
         """The wheels, by checked values."""
@@ -65,7 +65,7 @@ def load(name: str) -> Profile:
 
 
 def opener(profile: Profile, values: Mapping[str, Any]) -> Callable[[], Transport]:
-    """What opens the line: to a simulated board inside this process where ``port`` says so."""
+    """A function that opens the line, or a simulated board where ``port`` says so."""
     port = str(values["port"])
     if not port.lower().startswith("sim://"):
         return profile.opener(values)

@@ -28,7 +28,7 @@ def make(values: Mapping[str, Any]) -> OmniBot:
 
 
 def settings(values: Mapping[str, Any]) -> OmniBotSettings:
-    """What its wire does not tell, by checked values."""
+    """The settings that the wire does not reveal, from checked values."""
     return OmniBotSettings(
         baudrate=values["baudrate"],
         linear_scale=values["linear_scale"],

@@ -21,7 +21,7 @@ from omnibot_driver.core.traits import Traits
 
 
 class Mode(Enum):
-    """What we believe of the board, from nothing but what it sent; the value is its public name."""
+    """The mode of the board, as its data shows; the value is its public name."""
 
     UNKNOWN = "connecting"
     PAUSED = "paused"
@@ -112,25 +112,23 @@ class Board(Protocol):
 
     @property
     def advice(self) -> str | None:
-        """What a user should set otherwise, by what the board sends; None while all is well."""
+        """Advice on settings that contradict the board's data; None if there is none."""
         return None
 
     @property
     def refusal(self) -> str:
-        """Why the robot is not to be driven, by what the board shows, and what to do; empty if it
-        may be.
-        """
+        """The reason why motion is refused, with a remedy; empty if it is allowed."""
         return ""
 
     def gravity_advice(self, gravity_mps2: float) -> str:
-        """What such a specific force at rest says of the settings; empty where it is gravity."""
+        """Advice on the settings by a specific force at rest; empty if it is gravity."""
         return ""
 
     def connect(self) -> None:
         """The line is new: nothing that was held or believed is worth anything any more."""
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """What these bytes complete, in the order of the line; ``mode`` follows."""
+        """Decode bytes; returns the readings that they complete, in order, and updates ``mode``."""
 
     def flush(self, now: float) -> list[Reading]:
         """The line is closed: return what the held bytes still prove."""
@@ -152,7 +150,7 @@ class Board(Protocol):
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
-        """What becomes known as time passes, without bytes; asked when ``wake_at`` has come."""
+        """The readings that follow from elapsed time; called when ``wake_at`` has come."""
         return []
 
     def reset_odometry(self) -> None:
@@ -160,14 +158,14 @@ class Board(Protocol):
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether its displacements can prove now that the robot stands."""
+        """Whether its displacements can currently prove a standstill."""
         return True
 
     def actuator(self, proof: StopProof) -> Actuator:
-        """What says orders to it, and tells ``proof`` of stops and motions. Made once."""
+        """The part that encodes orders and reports stops and motions to ``proof``. Made once."""
 
     def wake(self) -> Packets:
-        """What makes a board in any state listen, ends any half command, and stops the wheels."""
+        """The bytes that wake a board in any state, end a partial command and stop the wheels."""
 
     def start(self) -> Packets:
         """Run, whatever it did before; harmless to repeat."""

@@ -35,11 +35,11 @@ class Liveness:
         self.heard_at = now
 
     def unheard(self, now: float) -> bool:
-        """Whether a robot that is driven would be driven blindly."""
+        """Whether the board has been silent for too long to drive the robot."""
         return now - self.heard_at >= self.unheard_s
 
     def fell_silent(self, now: float) -> bool:
-        """Whether a silence has become too long: True once for each."""
+        """Whether a silence has just become too long: True once for each silence."""
         if self._silent_since == self.heard_at or now - self.heard_at < self.silence_s:
             return False
         self._silent_since = self.heard_at

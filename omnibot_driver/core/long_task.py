@@ -27,7 +27,7 @@ class LongTask:
 
     @property
     def active(self) -> bool:
-        """Whether one is under way."""
+        """Whether a task is running."""
         return self.wake_at < math.inf
 
     def begin(self, name: str, token: object, limit_s: float, now: float) -> None:
@@ -43,7 +43,7 @@ class LongTask:
         self._begun_at, self.wake_at = now, now + limit_s
 
     def is_current(self, token: object) -> bool:
-        """Whether the one with this token is under way."""
+        """Whether the task with this token is running."""
         return self.active and self._token is token
 
     def end(self, token: object, success: bool, message: str) -> None:
@@ -58,7 +58,7 @@ class LongTask:
             self.end(self._token, False, f"the {self._name} failed: {reason}")
 
     def watch(self, *, driven: bool) -> None:
-        """Whether the robot is commanded to move now: a stop ends it."""
+        """Note whether the robot is commanded to move now: a stop ends the task."""
         if self._driven and not driven:
             self.give_up("the robot was stopped meanwhile; call again")
         self._driven = driven
@@ -70,7 +70,7 @@ class LongTask:
             self.give_up(f"the board did not complete it within {limit_s:g} s")
 
     def progress(self, now: float) -> str:
-        """What is done, and since when; empty while nothing is."""
+        """The name of the running task, and its start; empty without one."""
         if not self.active:
             return ""
         limit_s = self.wake_at - self._begun_at

@@ -33,7 +33,7 @@ RESET_WITHIN_S: Final = 9.5
 
 
 class Phase(Enum):
-    """What is being done to the board; motion commands are accepted only in SETTLED."""
+    """The conversation with the board; motion commands are accepted only in SETTLED."""
 
     CLOSED = "not connected"
     SETTLED = "settled"
@@ -43,7 +43,7 @@ class Phase(Enum):
 
 
 class Wanted(Enum):
-    """What the board is to be in whenever it is there; it outlives ports, boards and failures."""
+    """The mode that the board should be in; it outlives ports, boards and failures."""
 
     ANY = "as it is"
     RUNNING = "running"
@@ -75,7 +75,7 @@ class ModeManager:
         self._deadline = math.inf
 
     def take_output(self) -> Packets:
-        """What to write now, before anything else."""
+        """The packets to write now, before anything else."""
         packets, self.output = self.output, NO_PACKETS
         return packets
 

@@ -48,7 +48,7 @@ class Parameter:
 
     @property
     def is_list(self) -> bool:
-        """Whether its value is a list."""
+        """Whether the value is a list."""
         return isinstance(self.default, list)
 
     @property
@@ -119,7 +119,7 @@ class Parameter:
         return f"{count} {things}" + (f", {self.allowed}" if self.allowed else "")
 
     def _may_be(self, value: Any) -> bool:
-        """Whether it is among the choices, or in the range."""
+        """Whether the value is among the choices, or in the range."""
         if self.choices:
             return value in self.choices
         if self.low is None or self.high is None:

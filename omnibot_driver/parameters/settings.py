@@ -24,7 +24,7 @@ NOISE: Final = OdometryNoise()
 
 
 def session_settings(values: Mapping[str, Any], wheels: Kinematics) -> SessionSettings:
-    """What the session needs of checked values; ``wheels``: of the board's profile."""
+    """The session's settings from checked values; ``wheels``: of the board's profile."""
     return SessionSettings(
         limits=SpeedLimits(
             linear_mps=values.get("max_linear_speed", 0.0),

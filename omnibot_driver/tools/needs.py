@@ -7,7 +7,7 @@ from types import ModuleType
 
 
 class ToolError(Exception):
-    """What stands in a tool's way, as a sentence that says what to do next."""
+    """A reason why a tool cannot go on, as a sentence with a remedy."""
 
 
 def need(module: str) -> ModuleType:

@@ -42,7 +42,7 @@ class Transport(Protocol):
 
     @property
     def overruns(self) -> int | None:
-        """How often the kernel lost bytes since this is open; None: it does not count."""
+        """How often the kernel has lost bytes since the opening; None without a counter."""
 
     def read(self) -> Packet:
         """What has come in, waiting for it; no bytes after a while without any.

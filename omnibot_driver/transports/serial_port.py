@@ -77,12 +77,12 @@ class SerialPort:
 
     @property
     def descriptors(self) -> tuple[int, ...] | None:
-        """One, where the port has one."""
+        """The port's descriptor, if it has one."""
         return None if self._descriptor is None else (self._descriptor,)
 
     @property
     def overruns(self) -> int | None:
-        """How often the kernel lost bytes since the port is open; None: it does not count."""
+        """How often the kernel has lost bytes since the opening; None without a counter."""
         count = None if self._descriptor is None else overruns(self._descriptor)
         return None if count is None else count - self._overruns_before
 
@@ -202,7 +202,7 @@ def _write_whole(descriptor: int, data: bytes) -> None:
 
 
 def _explain(url: str, parameter: str, error: Exception) -> str:
-    """What is wrong with this port, and what to do."""
+    """Explain the trouble with this port, with a remedy."""
     code = error.errno if isinstance(error, OSError) else None
     # pyserial words some errors anew without their number; where it stumbled is in the context.
     misread = TypeError | ValueError | LookupError | re.error

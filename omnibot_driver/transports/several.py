@@ -67,7 +67,7 @@ class Several:
 
     @property
     def missing(self) -> Mapping[int, str]:
-        """Why, by channel."""
+        """Reasons by channel."""
         return {channel: line.trouble for channel, line in enumerate(self._lines) if line.trouble}
 
     @property

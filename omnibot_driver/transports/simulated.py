@@ -99,7 +99,7 @@ class InProcessBoard(RunningBoard[SimulatedBoard]):
         self._cancelled = False
 
     def unread(self, channel: int = 0) -> int:
-        """How many bytes of a serial channel, or datagrams, wait to be read."""
+        """The number of unread bytes of a serial channel, or of unread datagrams."""
         waiting = [data for number, data in self._outbox if number == channel]
         return len(waiting) if self._has_datagrams(channel) else sum(map(len, waiting))
 

@@ -61,7 +61,7 @@ class UdpPorts:
         return tuple(ours.fileno() for ours in self._sockets)
 
     def read(self) -> Packet:
-        """One datagram; the channels take turns."""
+        """Read one datagram; the channels take turns."""
         if not self._ready:
             self._ready = [ready for ready, _ in self._arrivals.poll(1e3 * READ_TIMEOUT_S)]
         if not self._ready:
@@ -149,7 +149,7 @@ class UdpPorts:
 
 
 def _is_silence(error: OSError) -> bool:
-    """Whether nothing was there to hear or to be heard, as when a controller is restarted."""
+    """Whether the error means that the other side is absent, as while a controller restarts."""
     return isinstance(error, BlockingIOError) or error.errno in UNREACHABLE
 
 

@@ -35,7 +35,10 @@ class Actuator(Protocol):
         """The time at which ``due`` must be called again; infinity while nothing is due."""
 
     def is_zero(self, order: Order) -> bool:
-        """Whether the board would stand still by it. Raises CommandRefused if it can't say it."""
+        """Whether the command is a standstill for the board.
+
+        Raises CommandRefused if it cannot be encoded.
+        """
 
     def connect(self) -> None:
         """The line is new, and the board has heard nothing of it. Nothing is wanted."""
@@ -47,4 +50,4 @@ class Actuator(Protocol):
         """A request to the board went out."""
 
     def due(self, now: float) -> Packets:
-        """What to write now, possibly nothing. It counts as written."""
+        """The packets to write now, possibly none. They count as written."""

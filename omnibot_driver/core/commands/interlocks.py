@@ -34,11 +34,14 @@ class Interlocks:
         self.missing = ""
 
     def why_not_request(self) -> str:
-        """Why nothing is asked of the board."""
+        """The reason why no request is possible now; empty if one is."""
         return "the driver is shutting down" if self.leaving else self.missing
 
     def why_not_drive(self, motion: Setpoint, now: float) -> str:
-        """Why this motion is refused. To be asked once for each, as the motion monitor counts."""
+        """The reason why this motion is refused.
+
+        Call it once per command, as the motion monitor counts.
+        """
         if self.leaving or self.missing:
             return self.why_not_request()
         stands, phase, mode = motion.is_zero, self._mode_manager.phase, self._board.mode
@@ -60,7 +63,7 @@ class Interlocks:
         return tripped
 
     def why_not_task(self) -> str:
-        """Why nothing long is begun."""
+        """The reason why no long task can begin; empty if one can."""
         if self.leaving:
             return self.why_not_request()
         if self._mode_manager.phase is Phase.CLOSED:
@@ -72,7 +75,7 @@ class Interlocks:
         return ""
 
     def why_not_calibrate(self) -> str:
-        """Why the gyro's bias cannot be measured."""
+        """The reason why the gyro's bias cannot be measured; empty if it can."""
         phase, mode, current = self._mode_manager.phase, self._board.mode, self._policy.current
         if self.missing:
             return self.missing

@@ -27,7 +27,7 @@ class SpeedLimits:
     angular_radps2: float = 0.0
 
     def stricter_than(self, other: "SpeedLimits") -> bool:
-        """Whether anything is to go more slowly."""
+        """Whether any of these limits is lower than the other's."""
         return (
             self.linear_mps < other.linear_mps
             or self.angular_radps < other.angular_radps
@@ -35,7 +35,7 @@ class SpeedLimits:
         )
 
     def allow(self, twist: BodyTwist) -> bool:
-        """Whether it is below them, as NaN and infinity never are."""
+        """Whether the value is within the limits; NaN and infinity never are."""
         return (
             twist.vx_mps * twist.vx_mps + twist.vy_mps * twist.vy_mps
             < self.linear_mps * self.linear_mps

@@ -15,7 +15,7 @@ AGAIN_S: Final = 60.0
 
 
 class Until(Enum):
-    """What ends the refusal."""
+    """The condition that ends the refusal."""
 
     NOTHING = "Motion is allowed"
     RELEASE = "Motion is refused until a zero command, or a pause of `cmd_vel_timeout`"
@@ -43,7 +43,7 @@ class MotionInterlock:
         self._tripped_at = now
 
     def start(self) -> None:
-        """Somebody has looked, and calls ~/start."""
+        """End the refusal, as the user has called ~/start."""
         self.until, self._tripped_at = Until.NOTHING, -math.inf
 
     def release(self) -> None:
@@ -64,7 +64,7 @@ class MotionInterlock:
         return "" if stands or self.until is Until.NOTHING else self.reason(timeout_s)
 
     def reason(self, timeout_s: float) -> str:
-        """Why motion is refused, and what to do; empty while it is allowed."""
+        """The reason why motion is refused, with a remedy; empty if it is allowed."""
         if self.until is Until.RELEASE:
             return (
                 "the motion monitor has stopped the robot; send a zero command, or none for"

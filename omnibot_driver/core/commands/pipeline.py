@@ -113,7 +113,7 @@ class CommandPipeline:
         )
 
     def begin(self, now: float) -> None:
-        """What was commanded and seen has nothing to do with what comes."""
+        """Forget earlier commands and measurements."""
         self.policy.discard(now)
         self._monitor.begin()
 
@@ -146,7 +146,7 @@ class CommandPipeline:
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
-        """What was wanted went out: it is what the robot is expected to do."""
+        """Note that the wanted set-point was sent: the robot is expected to follow it."""
         goal = isinstance(self.policy.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._actuator.commanded, now)
 
@@ -166,7 +166,7 @@ class CommandPipeline:
     def _check(
         self, reading: DisplacementReading, estimates: Sequence[Estimate], now: float
     ) -> Fault | None:
-        """What the newest estimate, or else the bare displacement, shows."""
+        """Check the newest estimate, or the bare displacement without one."""
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
             self._monitor.begin()
@@ -203,7 +203,7 @@ class CommandPipeline:
         return [said] if self._monitor.is_news(fault) else []
 
     def _seen(self) -> str:
-        """What was commanded and what was measured, in REP-103's axes."""
+        """Describe the commanded and the measured twist, in REP-103's axes."""
         x, y, yaw = self._axis_signs
         commanded, measured = (
             f"{x * twist.vx_mps:.2f}, {y * twist.vy_mps:.2f} m/s, {yaw * twist.yaw_rate_radps:.2f}"

@@ -113,7 +113,7 @@ class CommandPolicy:
             self.halt(now)
 
     def due(self, now: float) -> Packets:
-        """What to write now, possibly nothing. It counts as written."""
+        """The packets to write now, possibly none. They count as written."""
         if self.current is not None and now >= self._expires_at:
             self.halt(now)
         if self._stopping_since is not None and now - self._stopping_since >= self._stopping_s:
@@ -134,5 +134,5 @@ class CommandPolicy:
 
     @property
     def _stopping_s(self) -> float:
-        """How long Stop is wanted."""
+        """The time for which Stop is wanted."""
         return STOPPING_S if self.proof.proved else self._unproved_s

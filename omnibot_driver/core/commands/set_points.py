@@ -35,7 +35,7 @@ class Authority(Enum):
 
 
 class Setpoint(Protocol):
-    """One command, current until it expires or another takes its place."""
+    """A command that is current until it expires or is replaced."""
 
     @property
     def authority(self) -> Authority:
@@ -50,7 +50,7 @@ class Setpoint(Protocol):
         """False while each next order is another one."""
 
     def order(self, now: float) -> Order:
-        """What to order at this time."""
+        """The order at this time."""
 
     def check_anew(self) -> None:
         """The board's settings have changed. Raises CommandRefused where they cannot say it."""
@@ -120,7 +120,7 @@ class SteadySetpoint:
         return self._order
 
     def check_anew(self) -> None:
-        """Whether the same order stands still now."""
+        """Update whether the order is a standstill with the present settings."""
         self.is_zero = self._is_zero(self._order)
 
 
@@ -155,11 +155,11 @@ class GoalSetpoint:
         return self._order
 
     def check_anew(self) -> None:
-        """Whether it can still be said."""
+        """Check that the order can still be encoded."""
         self._check(self._order)
 
     def is_left_by(self, pose: Pose) -> bool:
-        """Whether a robot that is here now has been plainly nearer before."""
+        """Whether the robot has been clearly nearer to the goal before."""
         if not self._direct:
             return False
         way = pose.way_to(self._goal)

@@ -63,7 +63,7 @@ class StopProof:
 
     @property
     def takes_s(self) -> float:
-        """How long to wait for a proof, with displacements as rare as they are."""
+        """The time to wait for a proof, given the period of the displacements."""
         return max(PROOFS * self._needed_s, UNDER_WAY_S + (AT_LEAST + 1) * self._period_s)
 
     def look(self, reading: DisplacementReading, now: float) -> None:

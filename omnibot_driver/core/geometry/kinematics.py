@@ -17,7 +17,7 @@ class Kinematics(Protocol):
     """Wheels under a body, none of which slips; a frozen value."""
 
     def __hash__(self) -> int:
-        """What is derived of it can be kept."""
+        """Kinematics are hashable, so that derived values can be cached."""
 
     @property
     def rims(self) -> "Kinematics":

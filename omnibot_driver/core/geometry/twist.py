@@ -16,7 +16,7 @@ class BodyTwist:
     yaw_rate_radps: float
 
     def faster_than(self, linear_mps: float, angular_radps: float) -> bool:
-        """Whether it moves or turns faster than this."""
+        """Whether it is faster than these limits, linear or angular."""
         return (
             math.hypot(self.vx_mps, self.vy_mps) > linear_mps
             or abs(self.yaw_rate_radps) > angular_radps

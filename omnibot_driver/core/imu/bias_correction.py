@@ -54,7 +54,7 @@ class BiasCorrector:
         return ImuEstimate(stamp_s, force, (u - bias_u, v - bias_v, w - bias_w))
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """What the wheels tell of rest and motion."""
+        """Note the motion or rest that the wheels report."""
         self.calibration.displaced(reading.dx_m, reading.dy_m, reading.dyaw_rad)
 
     @property

@@ -38,7 +38,7 @@ REFINEMENT: Final = 0.05
 
 
 class Look:
-    """What was seen of the robot since ``began_s``."""
+    """Observations of the robot since ``began_s``."""
 
     def __init__(self) -> None:
         self.rates: list[Vector3] = []
@@ -69,12 +69,12 @@ class Look:
 
     @property
     def rolled(self) -> bool:
-        """Whether the wheels tell of motion."""
+        """Whether the wheels report motion."""
         return math.hypot(self._x_m, self._y_m) > STILL_M or abs(self._yaw_rad) > STILL_RAD
 
     @property
     def motion(self) -> str:
-        """What speaks against rest, in words; empty if nothing does."""
+        """The evidence of motion, in words; empty if there is none."""
         shaken_radps, shaken_mps2 = max(deviation(self.rates)), max(deviation(self.forces))
         bias_radps = max(map(abs, mean(self.rates)))
         if self.rolled:
@@ -109,7 +109,7 @@ class GyroCalibration:
 
     @property
     def measuring(self) -> bool:
-        """Whether an answer is owed."""
+        """Whether a caller waits for an answer."""
         return self.wake_at < math.inf
 
     def measure(self, token: object, now: float) -> None:

@@ -29,7 +29,7 @@ Counts = tuple[int, int, int]
 
 
 def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
-    """What a specific force at rest says of the settings; empty if it is gravity."""
+    """Advice on the settings by a specific force at rest; empty if it is gravity."""
     if abs(gravity_mps2 / STANDARD_GRAVITY - 1.0) <= ACCEL_TOLERANCE:
         return ""
     wrong = f"at rest the accelerometer measures {gravity_mps2:.2f} m/s² instead of gravity: "

@@ -64,7 +64,7 @@ class MotionLimits:
 
 @value(frozen=True, slots=True)
 class Refused:
-    """How many readings that cannot be true were not believed since the driver began."""
+    """Numbers of readings that were rejected as implausible since the driver began."""
 
     imu: int
     displacements: int
@@ -103,7 +103,7 @@ class OutlierFilter:
         return [(self._told_of_losses(reading), stamp_s)]
 
     def release(self) -> list[Stamped]:
-        """What waits, for nothing will come that could speak against it."""
+        """The readings that waited, as no later one can contradict them."""
         released = [*self._held_imu, *self._held_motion]
         self._held_imu, self._held_motion = [], []
         self._imu_leaps.forget()
@@ -179,7 +179,7 @@ class OutlierFilter:
         return replace(reading, lost=reading.lost + lost)
 
     def _made_good(self, reading: DisplacementReading) -> DisplacementReading:
-        """What is known of the refused ones before it is now known of this one."""
+        """This displacement, with the losses of the rejected ones added."""
         unknown = self._time_unknown or reading.duration_s is None
         made_good = replace(
             reading,
@@ -204,7 +204,7 @@ class _Spikes:
         self.forget()
 
     def forget(self) -> None:
-        """What comes next has nothing to do with what came before."""
+        """Forget earlier readings, as the next ones are unrelated."""
         self._sure: Sequence[float] | None = None
         self._leaping: Sequence[float] | None = None
         self._restless = 0.0
@@ -212,7 +212,7 @@ class _Spikes:
     def judge(
         self, values: Sequence[float], periods: int = 1, topmost_bit: float = 0.0
     ) -> tuple[bool, bool]:
-        """Whether the leap before was a single one, and whether these values leap themselves.
+        """Whether the spike before was a single one, and whether these values jump themselves.
 
         ``topmost_bit``: what it is worth in those that may be knocked.
         """
@@ -256,5 +256,5 @@ class _Spikes:
 
 
 def _steps(before: Sequence[float], after: Sequence[float]) -> Iterator[float]:
-    """How far each value moved."""
+    """The change of each value."""
     return map(abs, map(sub, after, before))

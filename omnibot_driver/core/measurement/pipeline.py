@@ -77,11 +77,11 @@ class MeasurementPipeline:
 
     @property
     def skew_ppm(self) -> float:
-        """How much faster the board's clock runs than ours."""
+        """How much faster the board's clock is than the host's."""
         return self._clock.skew_ppm
 
     def restart(self) -> None:
-        """What the board does from here on has nothing to do with what it did before."""
+        """Forget the stream so far, as the board begins another."""
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
@@ -119,7 +119,7 @@ class MeasurementPipeline:
         return self._tally
 
     def flush(self) -> list[Measured]:
-        """What else is sure of all that was heard."""
+        """The other measurements that follow from the received bytes."""
         measured: list[Measured] = []
         for reading, stamp_s in self.undigested:
             for sure, at_s in self._outliers.admit(reading, stamp_s):
@@ -128,7 +128,7 @@ class MeasurementPipeline:
         return measured
 
     def release(self) -> list[Measured]:
-        """What waited for readings that will not come."""
+        """The measurements that waited for readings that will not come."""
         measured, released = self.flush(), self._outliers.release()
         return measured + [(sure, self._estimates(sure, at_s)) for sure, at_s in released]
 

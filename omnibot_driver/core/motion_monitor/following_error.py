@@ -33,7 +33,7 @@ class FollowingError:
         self.reset()
 
     def reset(self) -> None:
-        """What was seen so far says nothing of what comes."""
+        """Forget the differences so far."""
         self._wind_up = WindUp()
         self._stands = True
         self.outside = False
@@ -41,12 +41,12 @@ class FollowingError:
 
     @property
     def exceeded(self) -> bool:
-        """Whether it has been so for too far, driving or turning."""
+        """Whether the excess has reached its limit, linear or angular."""
         return self.way_exceeded or self._turn_rad > UNEXPLAINED_RAD
 
     @property
     def way_exceeded(self) -> bool:
-        """Whether it has driven so too far."""
+        """Whether the linear excess has reached its limit."""
         return self._way_m > UNEXPLAINED_M
 
     def update(

@@ -41,7 +41,7 @@ COSINE_60: Final = 0.5
 
 
 class Fault(Enum):
-    """What is wrong, as the beginning of a sentence."""
+    """The faults; each value is the beginning of a sentence."""
 
     WRONG_WAY = "robot moves in the wrong direction"
     WRONG_TURN = "robot turns in the wrong direction"
@@ -94,7 +94,7 @@ class MotionMonitor:
         self.begin()
 
     def begin(self) -> None:
-        """What was commanded and seen so far says nothing of what comes."""
+        """Forget earlier commands and measurements."""
         self._history.clear()
         self._error.reset()
         self._has_stood = False

@@ -60,7 +60,7 @@ class SetpointHistory:
             self._entries.popleft()
 
     def known(self, at_s: float) -> bool:
-        """Whether the robot's motion at this time has to do with set-points."""
+        """Whether set-points explain the robot's motion at this time."""
         return at_s >= self._known_from_s
 
     def since(self, start_s: float) -> list[BodyTwist]:
@@ -73,7 +73,7 @@ class SetpointHistory:
         return found
 
     def driven(self, at_s: float) -> bool:
-        """Whether any of those that held at this time or later is motion."""
+        """Whether any set-point at this time or later is motion."""
         return any(each is not AT_REST for each in self.since(at_s))
 
     def explained(self, at_s: float) -> list[Velocity]:

@@ -50,7 +50,7 @@ class WindUp:
         return explained
 
     def carry(self, motion: BodyTwist, seconds: float) -> None:
-        """Somebody moves a robot that is to stand."""
+        """Note that a robot without a command is being moved by hand."""
         moved_mps = speed_of(motion) + LEVER_M * abs(motion.yaw_rate_radps)
         self.way_m = min(MOST_M, self.way_m + moved_mps * seconds)
 

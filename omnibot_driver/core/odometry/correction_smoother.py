@@ -61,5 +61,5 @@ class CorrectionSmoother:
 
 
 def _part(wanted: float, room: float) -> float:
-    """How much of what is wanted there is room for."""
+    """The part of the wanted correction that fits."""
     return min(1.0, max(0.0, room) / wanted) if wanted else 1.0

@@ -187,7 +187,7 @@ class Uncertainty:
 
 @cache
 def _alone(wheels: Kinematics) -> tuple[Pose, ...]:
-    """What a metre of rim of each wheel alone does to the body."""
+    """The effect of one metre of rim of each wheel alone on the body."""
     count = len(wheels.joints)
     rates = ([float(n == wheel) for n in range(count)] for wheel in range(count))
     return tuple(

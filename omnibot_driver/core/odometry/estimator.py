@@ -171,14 +171,14 @@ class Odometry:
 
     @property
     def heading_known(self) -> bool:
-        """Whether the board's heading is known well enough to tell forward from sideways."""
+        """Whether the board's heading is known well enough to distinguish forward from sideways."""
         gap_rad2 = self._track.uncertainty.gap.yaw_yaw
         proved = self._belief.proved is not None and self._restarted is None
         return proved and gap_rad2 < WELL_KNOWN_RAD * WELL_KNOWN_RAD
 
     @property
     def _settles(self) -> bool:
-        """Whether a pose may settle what is lost."""
+        """Whether a pose may settle lost motion."""
         return self._settings.use_board_pose and self._belief.proved is not None
 
     # The board's frame

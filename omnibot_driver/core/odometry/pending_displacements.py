@@ -30,7 +30,7 @@ class PendingDisplacements:
         return waiting
 
     def forget_losses(self) -> None:
-        """What is missing before the first is known by other means."""
+        """Forget the losses before the first, which are known by other means."""
         if self._waiting:
             reading, stamp_s = self._waiting[0]
             self._waiting[0] = replace(reading, lost=0), stamp_s

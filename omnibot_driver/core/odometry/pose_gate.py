@@ -48,13 +48,13 @@ class PoseGate:
         self._unproved_s += seconds
 
     def possible(self, told: Pose) -> bool:
-        """Whether it can be a pose at all."""
+        """Whether it is finite and within reach of any robot."""
         possible = told.finite and told.way_m < FARTHEST_M and abs(told.yaw_rad) < FARTHEST_RAD
         self.refused += not possible
         return possible
 
     def confirmed(self, told: Pose, gap: Covariance) -> bool:
-        """Whether the pose before was doubted and said the same; if it did not, it is refused."""
+        """Whether it confirms the doubted pose before it; otherwise that one is rejected."""
         doubted, self.doubted = self.doubted, None
         confirmed = doubted is not None and expected(doubted.way_to(told), gap)
         self.refused += doubted is not None and not confirmed

@@ -67,7 +67,10 @@ LAST_WORDS: Final = (STOP_PACKETS, EMERGENCY_STOP_PACKETS + STOP_PACKETS)
 
 
 class OmniBot:
-    """One board on one line. ``settings`` may be replaced at any time, but not the delta period."""
+    """One OmniBot board on one line.
+
+    ``settings`` may change at any time, except the delta period.
+    """
 
     traits = TRAITS
     clock = None
@@ -85,7 +88,7 @@ class OmniBot:
 
     @property
     def settings(self) -> OmniBotSettings:
-        """What cannot be known from the wire."""
+        """The settings that the wire does not reveal."""
         return self._settings
 
     @settings.setter

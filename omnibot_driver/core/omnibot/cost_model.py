@@ -93,7 +93,7 @@ DELTAS_MISSED: Final = 2
 
 
 class Context(NamedTuple):
-    """What came before, as far as it tells what is likely next. None: not known."""
+    """The context of a frame: what came before it. None means unknown."""
 
     imu: ImuFrame | None = None
     seq: int | None = None
@@ -108,7 +108,7 @@ class Context(NamedTuple):
     """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 
     def damaged(self) -> "Context":
-        """How much was lost is unknown."""
+        """The context after an unknown loss."""
         return Context(self.imu, deltas=self.deltas, shaken=self.shaken)
 
 

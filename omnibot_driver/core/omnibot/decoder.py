@@ -120,7 +120,7 @@ class FrameDecoder:
 
     @property
     def begun(self) -> bytes | None:
-        """What has come of the next frame; None while in doubt about it."""
+        """The received part of the next frame; None while in doubt about it."""
         held = self._held
         if not self._in_step:
             return None

@@ -71,7 +71,7 @@ class Walk:
         self.known: list[tuple[int, Any]] = [(0, context)]
 
     def add(self, end: int, frame: Frame, before: Context) -> None:
-        """One more."""
+        """Add a frame."""
         number = len(self.frames)
         is_lesson = not number % LEARN_EVERY and not before.imus & 3
         if is_lesson and type(frame) is ImuFrame and before.imu is not None:
@@ -93,7 +93,7 @@ class Walk:
 
 
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
-    """Whether a whole frame follows, and perhaps one more: then it is a shock, no damage."""
+    """Whether one or two whole frames follow: then it is a shock, not damage."""
     if at == len(held):
         return closed
     length = measure(held, at)

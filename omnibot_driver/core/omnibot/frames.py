@@ -97,7 +97,7 @@ class PausedFrame:
 
 @dataclass(frozen=True, slots=True)
 class CommandFrame:
-    """What the host sends: a mode byte and three words."""
+    """A frame from the host: a mode byte and three words."""
 
     mode: int
     values: Words
@@ -161,7 +161,7 @@ def length_begun(data: bytes | bytearray, at: int) -> int:
 
 
 def is_text(data: bytes | bytearray, at: int) -> bool:
-    """Whether a text begins here, if anything does."""
+    """Whether it can only be a text that begins here."""
     return data[at] == _TEXT_BEGIN
 
 

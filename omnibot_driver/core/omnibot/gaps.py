@@ -71,7 +71,7 @@ class InterFrameGaps:
         self.gaps.append(Gap(place, place + width, price, pause_s))
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
-        """What came after this pause began with a frame and ended with one."""
+        """The bytes after this pause began and ended with a frame."""
         if pause_s - arrived * self._byte_s > GAP_S:
             self._trust(sharp=True, between=True)
 
@@ -86,7 +86,7 @@ class InterFrameGaps:
             start = end
 
     def against(self, data: bytes | bytearray, start: int, end: int) -> float:
-        """What the pauses within these bytes cost, if they are taken for a frame."""
+        """The cost of the pauses within these bytes, if they are taken for a frame."""
         return sum(
             gap.price
             for gap in self._within(start, end)
@@ -94,12 +94,12 @@ class InterFrameGaps:
         )
 
     def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
-        """Whether what follows may still tell why there was a pause within this frame."""
+        """Whether later bytes may still explain the pause within this frame."""
         causes = [self._cause(gap, data, start, end) for gap in self._within(start, end)]
         return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes
 
     def silent_within(self, start: int, end: int) -> bool:
-        """Whether nothing was read for long amid these bytes."""
+        """Whether there was a long pause of reading within these bytes."""
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def forget(self, count: int) -> None:

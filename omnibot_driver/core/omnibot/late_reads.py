@@ -50,7 +50,7 @@ MOST_BYTES: Final = 6 * IMU_LENGTH
 
 
 class Cause(Enum):
-    """Why there was a pause between two reads."""
+    """The causes of a pause between two reads."""
 
     LATE_READER = "late reader"
     UNDECIDED = "undecided"

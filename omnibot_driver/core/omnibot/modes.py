@@ -18,7 +18,7 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 
 
 class Happening(Enum):
-    """What the table knows: heard from the board, or sent to it."""
+    """The events of the mode table: heard from the board, or sent to it."""
 
     HEARD_PAUSED = "heard «Paused»"
     HEARD_MOTION = "heard deltas or poses"
@@ -52,7 +52,7 @@ class ModeTracker:
         """Before they tell anything."""
 
     def apply(self, happening: Happening) -> None:
-        """One step through the table."""
+        """Apply one event of the table."""
         try:
             self.mode = TRANSITIONS[happening][self.mode]
         except KeyError:
@@ -62,7 +62,7 @@ class ModeTracker:
         self.imus_to_come = self._imus_alone
 
     def hear(self, frame: Frame) -> None:
-        """What this frame tells of the mode."""
+        """Apply what this frame shows of the mode."""
         if isinstance(frame, ImuFrame):
             self.hear_imus(1)
         elif isinstance(frame, PausedFrame):

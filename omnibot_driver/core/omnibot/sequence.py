@@ -123,7 +123,7 @@ class Sequence:
         return Step(missing)
 
     def _take_back(self, count: int, now: float) -> None:
-        """What seemed to begin anew did not, if this count goes on from the one before it."""
+        """Withdraw a restart, if this count continues the one before it."""
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left

@@ -34,7 +34,7 @@ class SimulatedBoard(Protocol):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """What connects it; a packet names one by its place here."""
+        """The connections of the board; a packet names one by its index."""
 
     @property
     def tick_s(self) -> float:
@@ -62,7 +62,7 @@ class SimulatedBoard(Protocol):
 
 
 class SimulatorModule(Protocol):
-    """What the package of a simulated board offers by these names."""
+    """The names that the package of a simulated board must have."""
 
     TITLE: str
     """What it simulates, as in "A simulated ... board listens on"."""

@@ -44,7 +44,7 @@ class FaultyLine:
         return Counter(lost=self.lost, flipped=self.flipped)
 
     def carry(self, data: bytes) -> bytes:
-        """What arrives of these bytes."""
+        """The bytes that arrive of these."""
         if self._faults == _GOOD:
             return data
         arrived = bytearray()

@@ -55,7 +55,7 @@ class NetworkPath:
             heapq.heappush(self._on_their_way, (due_s, next(self._number), datagram))
 
     def arrived(self, now_s: float) -> list[bytes]:
-        """What comes out of it up to this board time and has not come out before."""
+        """The datagrams that arrive up to this board time and have not been returned before."""
         out = []
         while self._on_their_way and self._on_their_way[0][0] <= now_s:
             out.append(heapq.heappop(self._on_their_way)[2])

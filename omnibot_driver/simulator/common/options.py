@@ -36,7 +36,7 @@ def load(module: str) -> SimulatorModule:
 
 
 def command(module: str) -> str:
-    """How this package is run from a command line; ``--help`` after it has its options."""
+    """The command that runs this package; ``--help`` after it lists its options."""
     board = module.rpartition(".")[2]
     return "simulator" if board == DEFAULT_BOARD else f"simulator --board {board}"
 

@@ -46,7 +46,7 @@ class RunningBoard(ABC, Generic[B]):
 
     @abstractmethod
     def _receive(self, timeout_s: float) -> Iterable[Packet]:
-        """What the driver has sent; waits at most this time for it."""
+        """The bytes from the driver; waits at most this time for them."""
 
     @abstractmethod
     def _send(self, channel: int, data: bytes) -> int:

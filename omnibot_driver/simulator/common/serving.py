@@ -21,7 +21,7 @@ from omnibot_driver.simulator.common.wired import B, Line
 
 
 class Carrier(Protocol):
-    """One open port."""
+    """An open port."""
 
     address: str
     """What the driver's parameter is set to."""
@@ -31,7 +31,7 @@ class Carrier(Protocol):
     """Readable when something has come."""
 
     def receive(self) -> list[bytes]:
-        """What has come, in order."""
+        """The bytes received, in order."""
 
     def send(self, data: bytes) -> int:
         """Give it to the driver; how many bytes found room."""
@@ -120,14 +120,14 @@ class PtyBoard(ServedBoard[B]):
 
     @property
     def line(self) -> Line:
-        """What the board's bytes go through."""
+        """The faulty line that the board's bytes pass."""
         return self._wired.lines[0]
 
 
 def open_carriers(
     channels: Sequence[Channel], links: Sequence[str | Path] = (), udp_port: int = 0
 ) -> list[Carrier]:
-    """One for each channel. Raises OSError."""
+    """Open one carrier for each channel. Raises OSError."""
     names = iter(_one_for_each([c.name for c in channels if not c.datagrams], links))
     with ExitStack() as opened:
         sockets = open_sockets(sum(channel.datagrams for channel in channels), udp_port)

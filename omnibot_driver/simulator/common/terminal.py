@@ -41,7 +41,7 @@ class Terminal:
             raise
 
     def receive(self) -> list[bytes]:
-        """What has come, once ``descriptor`` is readable."""
+        """The bytes received, once ``descriptor`` is readable."""
         return [os.read(self.descriptor, 4096)]
 
     def send(self, data: bytes) -> int:

@@ -19,7 +19,7 @@ Line = FaultyLine | FaultyNetwork
 
 
 def good_line(channel: Channel) -> Line:
-    """One without faults."""
+    """A line without faults."""
     return FaultyNetwork() if channel.datagrams else FaultyLine()
 
 

@@ -95,7 +95,7 @@ class ReceivedCommand:
 
 @dataclass(frozen=True, slots=True)
 class SentFrame:
-    """One frame or text that the board sent in tick number `tick`."""
+    """A frame or text that the board sent in tick number `tick`."""
 
     tick: int
     data: bytes
@@ -187,7 +187,7 @@ class SimulatedBoard:
 
     @property
     def facts(self) -> Mapping[str, object]:
-        """What the simulator's console tells."""
+        """The facts that the simulator's console prints."""
         return {
             **asdict(self.truth),
             "mode": self.mode.value,
@@ -294,7 +294,7 @@ class SimulatedBoard:
     # Control
 
     def _control(self) -> None:
-        """One pass of the 100 Hz block (manual, Odometry equation and Wheel control)."""
+        """Run one pass of the 100 Hz block (manual, Odometry equation and Wheel control)."""
         encoders = self._world.encoders
         a, b, c = (new - old for new, old in zip(encoders, self._encoders, strict=True))
         self._encoders = encoders

@@ -120,7 +120,7 @@ class CommandReceiver:
         self.last_at_s = 0.0
 
     def boot(self) -> None:
-        """One byte arrives while the board boots."""
+        """Count a byte that arrives while the board boots."""
         if self._wakes_while_booting and self.to_swallow:
             self.to_swallow -= 1
 

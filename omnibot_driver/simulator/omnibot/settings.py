@@ -106,5 +106,5 @@ class BoardSettings:
 
     @property
     def rim_m_per_count(self) -> float:
-        """What a wheel rolls in one encoder count, as the firmware believes (manual: 2πr/N)."""
+        """Distance per encoder count, as the firmware believes (manual: 2πr/N)."""
         return 2 * pi * self.wheel_radius_m / self.counts_per_revolution

@@ -41,7 +41,7 @@ class TruePose:
 
 
 class Held(NamedTuple):
-    """How somebody holds the robot: roll and pitch (REP-103), and the rate it is turned at."""
+    """The posture of a robot held by hand: roll and pitch (REP-103), and turn rate."""
 
     roll_rad: float = 0.0
     pitch_rad: float = 0.0

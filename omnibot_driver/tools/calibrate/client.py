@@ -144,7 +144,7 @@ class Client:
             self._node.destroy_client(client)
 
     def _wait(self, done: Callable[[], object], seconds: float) -> bool:
-        """Whether it came about."""
+        """Whether the condition came true in time."""
         deadline_s = time.monotonic() + seconds
         while not (held := done()) and time.monotonic() < deadline_s:
             self._spin(0.05)

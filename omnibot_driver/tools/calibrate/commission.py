@@ -194,7 +194,7 @@ class Walk:
     # What gravity tells
 
     def imu(self) -> Mounting:
-        """How the IMU is mounted."""
+        """Find the mounting of the IMU."""
         console = self._console
         console.say(
             "\nThe IMU. The motors stay off; hold the robot as you are asked to, and keep it still."
@@ -222,7 +222,7 @@ class Walk:
     # Both
 
     def _until_possible(self, find: Callable[[], T]) -> T:
-        """What was found, once it can be so. Raises ToolError after a few times."""
+        """Repeat a measurement until its result is possible. Raises ToolError after a few times."""
         for _ in range(TRIES):
             try:
                 return find()

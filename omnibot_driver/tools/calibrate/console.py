@@ -45,7 +45,7 @@ class Console:
         self.rich.print(text, markup=False)
 
     def line(self, text: str) -> None:
-        """One line that is meant to be copied, however long it is."""
+        """Print one line that is meant to be copied, whatever its length."""
         self.rich.print(text, markup=False, soft_wrap=True)
 
     def confirm(self, question: str) -> None:
@@ -61,7 +61,7 @@ class Console:
         return self._answer(f"{question} [y/N] ").lower() in ("y", "yes")
 
     def choose(self, question: str, answers: Sequence[str]) -> str:
-        """One of these words, by the beginning that tells it from the others."""
+        """Ask for one of these words; an unambiguous beginning is enough."""
         while True:
             answer = self._answer(f"{question} [{'/'.join(answers)}] ").lower()
             fitting = [one for one in answers if answer and one.lower().startswith(answer)]
@@ -84,7 +84,7 @@ class Console:
             self.say(f"Please type a number of {unit} from {low:g} to {high:g}.")
 
     def ask(self, question: str, understand: Callable[[str], T | None], otherwise: str) -> T:
-        """What an answer means; ``otherwise`` is said to one that means nothing."""
+        """Ask until the answer has a meaning; ``otherwise`` is printed after one without."""
         while (meant := understand(self._answer(f"{question} "))) is None:
             self.say(otherwise)
         return meant

@@ -54,7 +54,7 @@ def picture_file(given: str | None, subcommand: str) -> Path:
 
 
 def save(result: Result, output: Path, table: Table) -> None:
-    """What was found; raises ToolError, and then the file is as it was."""
+    """Save the result; raises ToolError, and then the file is unchanged."""
     try:
         for name, value in result.parameters.items():
             table.by_name[name].check(value)

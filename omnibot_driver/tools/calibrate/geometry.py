@@ -82,7 +82,7 @@ def believed(now: Mapping[str, Any]) -> dict[str, float]:
 
 
 def plan(side_m: float, turns: int, *, squares: bool) -> list[Drive]:
-    """What to drive, one after the other."""
+    """The drives in their order."""
     angle_rad = math.tau * turns
     number = f"{turns} turns" if turns > 1 else "1 turn"
     drives = [
@@ -145,7 +145,7 @@ def _reading(
 
 
 def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any]) -> Result:
-    """What to show and to write of a geometry; ``now`` are the driver's parameters."""
+    """The findings of a geometry, to show and to write; ``now`` are the driver's parameters."""
     wheels_sigma, base_sigma = map(float, np.sqrt(np.diag(found.covariance)[:2]))
     factors = {
         "wheel_radius": (found.wheels, wheels_sigma, "m"),

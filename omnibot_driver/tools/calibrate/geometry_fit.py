@@ -126,7 +126,7 @@ def rims_of(path: Column, base_radius_m: float) -> Column:
 
 
 def _weights(reading: Reading, base_radius_m: float, drift: float) -> Column:
-    """What makes the measured parts of an error independent and of one standard deviation."""
+    """Weights that make the measured errors independent, with a standard deviation of one."""
     path = reading.path
     x, y, yaw = np.linalg.inv(_rims(base_radius_m))
     middle = (path[:-1, 2] + path[1:, 2]) / 2

@@ -53,7 +53,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> Result:
-    """What to show and to write of a rest; ``now`` are the driver's parameters."""
+    """The findings of a rest, to show and to write; ``now`` are the driver's parameters."""
     too_long_mps2 = found.gravity_mps2 - gravity_mps2
     accel_bias = too_long_mps2 * found.up
     along_sigma = math.hypot(GRAVITY_SIGMA, float(found.force_sigma.max()))

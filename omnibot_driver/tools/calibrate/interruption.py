@@ -18,7 +18,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Interrupted(ToolError):
-    """Somebody wants this to end."""
+    """The user has interrupted the program."""
 
 
 class Interruption:
@@ -49,7 +49,7 @@ class Interruption:
 
     @contextmanager
     def deferred(self) -> Iterator[None]:
-        """What is done here is done to its end; a signal counts afterwards."""
+        """A context that is completed before a signal takes effect."""
         self._deferred = True
         try:
             yield

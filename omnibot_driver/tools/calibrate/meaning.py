@@ -93,8 +93,7 @@ def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod:
 
 
 def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
-    """Whether a turn on the spot is one. Wheel counts taken for displacements, or the other way
-    round, make sideways motion of it."""
+    """Whether a turn on the spot looks like one."""
     return turning.speed_mps < PURE_TURN * base_radius_m * abs(turning.yaw_rate)
 
 

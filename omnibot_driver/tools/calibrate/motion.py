@@ -141,7 +141,7 @@ def steady(command: Vector3, seconds: float) -> Law:
 
 
 def stairs(steps: list[tuple[float, Vector3]]) -> Law:
-    """One command after the other, each for its seconds."""
+    """Commands one after the other, each for its seconds."""
 
     def law(now_s: float, _pose: Pose) -> Vector3 | None:
         for seconds, command in steps:

@@ -77,7 +77,7 @@ def up(imu: Imu) -> Array:
 
 
 def bias(imu: Imu) -> Array:
-    """What the gyro says of rest."""
+    """The gyro's mean reading at rest."""
     return np.asarray(np.mean(imu.rate_radps, axis=0))
 
 

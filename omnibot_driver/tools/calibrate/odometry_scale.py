@@ -84,7 +84,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def plan(side_m: float, turns: int) -> list[Drive]:
-    """What to drive, one after the other."""
+    """The drives in their order."""
     number, angle_rad = f"{turns} turns" if turns > 1 else "1 turn", math.tau * turns
     return [
         Drive(f"{number} to the left", angle_rad, True),
@@ -131,7 +131,7 @@ def _measure(console: Console, drive: Drive, path: Column, arguments: argparse.N
 
 
 def result(ratios: Sequence[Ratio], now: Mapping[str, Any]) -> Result:
-    """What to show and to write of these; ``now`` are the driver's parameters."""
+    """The findings of these drives, to show and to write; ``now`` are the driver's parameters."""
     findings, parameters, notes = [], {}, []
     names = ((COUNT, False),) if COUNT in now else tuple(zip(NAMES, (False, True), strict=True))
     for name, turns in names:

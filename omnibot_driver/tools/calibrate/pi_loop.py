@@ -34,7 +34,7 @@ class PiGains:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """What a wheel is controlled with. ``dead_s``: until a duty shows in the speed."""
+    """The control loop of a wheel. ``dead_s``: time until a duty shows in the speed."""
 
     period_s: float
     ticks_per_revolution: int

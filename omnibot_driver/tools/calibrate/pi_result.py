@@ -54,7 +54,7 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class WheelTuned:
-    """One wheel; ``loop`` has the dead time that was found."""
+    """The result for one wheel; ``loop`` has the dead time that was found."""
 
     name: str
     levels: Levels

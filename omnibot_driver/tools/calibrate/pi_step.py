@@ -180,5 +180,5 @@ def _gains(tuned: Mapping[str, Tuned]) -> dict[str, float]:
 
 
 def _restore(bench: _Bench, before: Mapping[str, Any], names: Sequence[str]) -> None:
-    """What was unset cannot be known: it stays until driver and board are started anew."""
+    """Restore the gains that are known; unset ones stay until driver and board start again."""
     bench.robot.set_parameters({name: before[name] for name in names if before[name] is not None})

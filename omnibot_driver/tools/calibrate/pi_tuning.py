@@ -103,7 +103,7 @@ def target_of(plant: Plant, goals: Goals) -> float:
 
 
 def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
-    """What these gains do."""
+    """Describe the effect of these gains."""
     target = target_of(plant, goals)
     found: Traits = traits(answer(plant, gains, loop, target, SECONDS), target, goals.band)
     return Tuned(
@@ -137,7 +137,7 @@ def dead_time_s(plant: Plant, loop: Loop, made: Sequence[Steps]) -> float:
 
 
 def _recorded(ticks: Column, first: float, ticks_per_revolution: int) -> Response:
-    """What a record of this answer would show; ``first``: where the first mark is."""
+    """The record that this answer would give; ``first``: position of the first mark."""
     marks = np.arange(first, ticks[-1])
     at_s = np.interp(marks, ticks, STEP_S * np.arange(1, len(ticks) + 1))
     return response(np.diff(at_s, prepend=0.0), ticks_per_revolution)

@@ -228,7 +228,7 @@ class Robot(Listener):
             wanted = law(now_s - began_s, pose) if wanted is not None else None
 
     def _halt(self, topic: Topic) -> bool:
-        """Whether the robot stands. Not interrupted by anything; short where it is not heard."""
+        """Stop the robot; returns whether it stands. It cannot be interrupted."""
         began_s = now_s = time.monotonic()
         standing_since_s = math.inf
         while now_s < (

@@ -71,7 +71,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
-    """What to show and to write of these speeds; ``now`` are the driver's parameters."""
+    """The findings of these speeds, to show and to write; ``now`` are the driver's parameters."""
     by_axis = [[one for one in found if one.axis == axis] for axis in range(3)]
     if not all(by_axis):
         raise ToolError("not every axis was measured: drive longer, by --seconds")

@@ -40,7 +40,7 @@ def in_words(pattern: Sequence[int]) -> str:
 
 
 def wanted(axis: int) -> Pattern:
-    """What the manual's equations make the wheels do for +x, +y or +yaw."""
+    """The wheel motion that the manual's equations give for +x, +y or +yaw."""
     x, y, yaw = (float(axis == n) for n in range(3))
     rates = OmniKinematics(1.0, 1.0).wheel_rates(BodyTwist(x, y, yaw))
     a, b, c = ((rate > 1e-6) - (rate < -1e-6) for rate in rates)
@@ -87,6 +87,6 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 
 
 def mirrored(signs: Sequence[int]) -> bool:
-    """Whether these axes are a mirror image, which no place of the front explains."""
+    """Whether these axes are a mirror image, which no choice of the front explains."""
     x, y, yaw = signs
     return x * y != yaw

@@ -69,7 +69,7 @@ def _draw_predictions(
     command: float,
     load: float,
 ) -> None:
-    """One line for each wheel; ``load`` in counts per tick's worth of effort."""
+    """Draw a line for each wheel; ``load`` is in counts per tick's worth of effort."""
     times_ms = 1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5)
     for name, gains, colour in (("now", now, "C0"), ("better", better, "C1")):
         label: str | None = (

@@ -97,7 +97,7 @@ class Fit:
         return 2 * self.samples * math.log(self.rms_radps) + 2 * len(self.values)
 
     def told(self, step: Step) -> Column:
-        """What the model says of a step's deltas, in rad/s."""
+        """The model's prediction of a step's deltas, in rad/s."""
         told = step.told_by(lambda ticks: self.model.mean(self.values[1:], ticks * TICK_S))
         return np.asarray(self.values[0] * told)
 
@@ -178,7 +178,7 @@ def fit(model: Model, steps: Sequence[Step]) -> Fit:
 
 @dataclass(frozen=True, slots=True)
 class WheelFound:
-    """One wheel: its steps, how many others were left out, and the models that were fitted."""
+    """The fit of one wheel: its steps, the number of rejected steps, and the models."""
 
     name: str
     steps: list[Step]

@@ -36,12 +36,12 @@ STATES: Final = {"nominal": GREEN, "imu_only": YELLOW, "paused": YELLOW}
 
 
 class Robot(Protocol):
-    """What is shown, and what a key may ask for. Each call returns at once."""
+    """The figures to show and the actions of the keys. Each call returns at once."""
 
     dead_man: DeadMan | None
 
     def view(self) -> View:
-        """What is known now."""
+        """The present view."""
 
     def estop(self) -> None:
         """Latch."""
@@ -63,7 +63,7 @@ class Release(ModalScreen[bool]):
     """Asks whether the e-stop is really to be released; y does, every other key does not."""
 
     def compose(self) -> ComposeResult:
-        """One question."""
+        """Build the question."""
         yield Static(
             "Release the e-stop?\n\nIs everybody clear of the robot?\nIt stays stopped until the"
             " next command.\n\ny releases, any other key does not",
@@ -186,7 +186,7 @@ class Monitor(App[None]):
     # Keys
 
     def on_key(self, event: events.Key) -> None:
-        """What steers."""
+        """Steer by this key."""
         dead_man = self._robot.dead_man
         if dead_man is None:
             return

@@ -106,7 +106,7 @@ class Feed:
         rclpy.try_shutdown(context=self._context)
 
     def view(self) -> View:
-        """What is known now."""
+        """The present view."""
         with self._lock:
             return self._model.view(
                 time.monotonic(), steers=self._velocity.steers, lacks=self._lacks()
@@ -198,7 +198,7 @@ class Feed:
         self._without_imu = IMU_PARAMETER not in future.result().result.names
 
     def _lacks(self) -> frozenset[str]:
-        """What the board of this driver cannot do; nothing while that is not known."""
+        """The abilities that this driver's board lacks; empty while unknown."""
         offers = {"start": self._start, "pause": self._pause}
         if not self._estop.service_is_ready():
             offers = {}

@@ -34,7 +34,7 @@ JUMP_MPS: Final = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """How a topic comes in; ``age_s`` is None where nothing came of late."""
+    """The rate and age of a topic; ``age_s`` is None without recent messages."""
 
     hz: float
     age_s: float | None
@@ -69,12 +69,12 @@ class View:
 
     @property
     def silent(self) -> bool:
-        """Whether the driver is not heard any more."""
+        """Whether the driver has stopped sending."""
         return self.silent_s > SILENT_S
 
     @property
     def link(self) -> str:
-        """What the diagnostics say of the link, with the port."""
+        """The link status of the diagnostics, with the port."""
         for status in self.statuses:
             if status.name == "Link":
                 return f"{status.message}, {status.values.get('Port', '')}".rstrip(", ")

@@ -20,7 +20,7 @@ class Rate:
         self.count = 0
 
     def arrived(self, now_s: float) -> None:
-        """One more."""
+        """Count a message."""
         self.count += 1
         self._recent_s.append(now_s)
         self._forget(now_s)

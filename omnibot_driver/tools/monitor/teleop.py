@@ -54,7 +54,7 @@ class DeadMan:
         self._deaf_until_s = -math.inf
 
     def press(self, key: str, now_s: float) -> bool:
-        """Whether this key is one that steers; it does from now on, unless it has waited."""
+        """Whether this key steers; it does from now on, unless it has waited."""
         if key not in MOTIONS:
             return False
         self._notice_sleep(now_s)
@@ -80,7 +80,7 @@ class DeadMan:
         return part * self.fastest[0], part * self.fastest[1]
 
     def command(self, now_s: float) -> BodyTwist | None:
-        """What is to be published now: a motion, then a few times to stand still, then nothing."""
+        """The command to publish now: a motion, then a few zeros, then nothing."""
         self._notice_sleep(now_s)
         self._asked_s = now_s
         key, until_s = self._held

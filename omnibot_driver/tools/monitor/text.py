@@ -92,7 +92,7 @@ def verdicts(view: View) -> list[tuple[Level, str]]:
 
 
 def counts(view: View) -> str:
-    """What has happened since the driver started; what is zero is not worth a word."""
+    """The events since the driver started; zero counts are omitted."""
     values = {(s.name, key): value for s in view.statuses for key, value in s.values.items()}
     happened = [
         f"{word} {values[name, key]}"

@@ -22,7 +22,7 @@ WRONG: Final = 3
 
 
 def arguments(given: list[str] | None) -> argparse.Namespace:
-    """What the command line says; ends with 2 and a sentence where it makes no sense."""
+    """Parse the command line; exits with 2 and a message on wrong usage."""
     parser = argparse.ArgumentParser(
         prog="report",
         description="What a drive was like: a page with pictures, and a verdict in words.",

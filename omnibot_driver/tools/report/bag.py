@@ -29,7 +29,7 @@ Progress = Callable[[int, int], None]
 
 
 def read(path: Path, namespace: str | None, progress: Progress) -> Log:
-    """What a bag has of one robot. Raises ToolError where it has nothing to read."""
+    """The log of one robot in a bag. Raises ToolError if there is nothing to read."""
     with ExitStack() as stack:
         readers, troubles = _open(path, stack)
         connections = [connection for reader in readers for connection in reader.connections]
@@ -80,7 +80,7 @@ def _messages(
 
 
 def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
-    """What can be opened, and what is wrong with it."""
+    """The readers that could be opened, and the troubles with the others."""
     if not path.exists():
         raise ToolError(f"there is no {path}: give the folder of a bag, or its .mcap or .db3 file")
     files, troubles = [path], []

@@ -53,7 +53,7 @@ def twists(log: Log) -> Pair:
 
 
 def _scales(log: Log) -> tuple[str, str]:
-    """What is to be set where speeds are off: a robot with two wheels has no unit of its own."""
+    """The parameters to change where speeds are off; a base with two wheels has other ones."""
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
     return "linear_scale", "angular_scale"

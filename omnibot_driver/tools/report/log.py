@@ -115,7 +115,7 @@ class Log:
         return inside
 
     def interrupted(self, begin_s: float, end_s: float, running: tuple[str, ...]) -> bool:
-        """Whether the driver said that between these times nothing was to be expected."""
+        """Whether a change of state explains a gap between these times."""
         begin_s, end_s = begin_s - SETTLING_S, end_s + SETTLING_S
         touched = [span for span in self.states if span.begin_s < end_s and span.end_s > begin_s]
         return len(touched) > 1 or any(span.what not in running for span in touched)

@@ -23,7 +23,7 @@ JOURNALS: Final = ("-wal", "-journal")
 
 
 def breaks_off(file: Path) -> bool:
-    """Whether this mcap has a beginning, and not its end."""
+    """Whether this mcap has a beginning and no end."""
     with file.open("rb") as source:
         source.seek(max(0, file.stat().st_size - len(MAGIC)))
         return source.read() not in (MAGIC, b"")
@@ -47,7 +47,7 @@ def cut_to_records(file: Path, folder: Path) -> Path:
 
 
 def has_journal(file: Path) -> bool:
-    """Whether something of this sqlite3 database is not in it yet."""
+    """Whether this sqlite3 database has changes that are still in its journal."""
     return any(journal.exists() for journal in _journals(file))
 
 

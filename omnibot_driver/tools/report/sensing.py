@@ -139,7 +139,7 @@ def judge(log: Log) -> Iterator[Finding]:
 
 
 def longest_same(values: Array) -> int:
-    """How many rows in a row are equal, at the most."""
+    """The largest number of equal rows in a row."""
     changes = np.flatnonzero((np.diff(values, axis=0) != 0.0).any(axis=1)) + 1
     return int(np.diff(np.concatenate([[0], changes, [len(values)]])).max())
 
