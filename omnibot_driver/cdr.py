@@ -64,7 +64,7 @@ class Serializer:
         self._joints_head = (*no_values, count, *itertools.chain(*name_values), count)
 
     def imu(self, estimate: ImuEstimate, stamp_ns: int) -> bytes:
-        """``messages.imu_message``."""
+        """Serialise what ``messages.imu_message`` makes."""
         return LITTLE_ENDIAN + self._imu.pack(
             *divmod(stamp_ns, 10**9),
             *self._imu_head,
@@ -75,7 +75,7 @@ class Serializer:
         )
 
     def odometry(self, estimate: OdometryEstimate, stamp_ns: int) -> bytes:
-        """``messages.odometry_message``."""
+        """Serialise what ``messages.odometry_message`` makes."""
         pose, twist, noise = estimate.pose, estimate.twist, estimate.covariance
         half_rad = pose.yaw_rad / 2
         moving, twist_noise = AT_REST, messages.TWIST_NOT_KNOWN
@@ -96,7 +96,7 @@ class Serializer:
         )
 
     def joint_state(self, wheels: Wheels, stamp_ns: int) -> bytes:
-        """``messages.joint_state_message``."""
+        """Serialise what ``messages.joint_state_message`` makes."""
         _, angles, rates = wheels
         head = (*divmod(stamp_ns, 10**9), *self._joints_head, *angles)
         if rates:
@@ -128,15 +128,15 @@ class Messages:
         self._settings = settings
 
     def imu(self, estimate: ImuEstimate, stamp_ns: int) -> Imu:
-        """``imu/data_raw``."""
+        """Serialise a message for ``imu/data_raw``."""
         return messages.imu_message(estimate, messages.time_message(stamp_ns), self._settings)
 
     def odometry(self, estimate: OdometryEstimate, stamp_ns: int) -> Odometry:
-        """``odom``."""
+        """Serialise a message for ``odom``."""
         return messages.odometry_message(estimate, messages.time_message(stamp_ns), self._settings)
 
     def joint_state(self, wheels: Wheels, stamp_ns: int) -> JointState:
-        """``joint_states``."""
+        """Serialise a message for ``joint_states``."""
         return messages.joint_state_message(wheels, messages.time_message(stamp_ns), self._settings)
 
 
@@ -176,6 +176,6 @@ def _same(ours: bytes, theirs: bytes, kind: type) -> bool:
 
 
 def _text(text: str) -> tuple[str, tuple[int, bytes]]:
-    """Form and values of a string."""
+    """Struct format and values of a string."""
     data = text.encode() + b"\0"
     return f"I{len(data)}s", (len(data), data)

@@ -108,7 +108,7 @@ def drop_what_waits(line: int) -> None:
 
 
 def words(argument: str) -> Words:
-    """What `keeper.py` made one argument of."""
+    """Split the argument that `keeper.py` made of the last words."""
     each = (word.split(":") for word in argument.split(",") if word)
     return [(int(descriptor), bytes.fromhex(data)) for descriptor, data in each]
 

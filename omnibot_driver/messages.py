@@ -127,7 +127,7 @@ def odometry_message(
 def transform_message(
     estimate: OdometryEstimate, stamp: Time, settings: MessageSettings
 ) -> TransformStamped:
-    """``/tf``: the pose of the ``odom`` with this stamp."""
+    """A transform for ``/tf``: the pose of the ``odom`` with this stamp."""
     pose = estimate.pose
     return TransformStamped(
         header=Header(stamp=stamp, frame_id=settings.odom_frame),
@@ -153,7 +153,7 @@ def turned(before: Wheels, estimate: OdometryEstimate, kinematics: Kinematics) -
 
 
 def joint_state_message(wheels: Wheels, stamp: Time, settings: MessageSettings) -> JointState:
-    """``joint_states``."""
+    """A message for ``joint_states``."""
     _, angles, rates = wheels
     return JointState(
         header=Header(stamp=stamp), name=settings.wheels.joints, position=angles, velocity=rates
@@ -163,7 +163,7 @@ def joint_state_message(wheels: Wheels, stamp: Time, settings: MessageSettings) 
 def diagnostic_message(
     statuses: Sequence[Status], stamp: Time, node_name: str, hardware_id: str
 ) -> DiagnosticArray:
-    """``/diagnostics``, with names as diagnostic_updater makes them."""
+    """A message for ``/diagnostics``, with names as diagnostic_updater makes them."""
     return DiagnosticArray(
         header=Header(stamp=stamp),
         status=[
@@ -249,12 +249,12 @@ def is_stamped(stamped: TwistStamped | PoseStamped) -> bool:
 
 
 def raw_message(data: bytes) -> UInt8MultiArray:
-    """Bytes as they are, without a layout."""
+    """A message of plain bytes, without a layout."""
     return UInt8MultiArray(data=array("B", data))
 
 
 def time_message(nanoseconds: int) -> Time:
-    """Nanoseconds since the clock's epoch as a stamp."""
+    """A stamp from nanoseconds since the clock's epoch."""
     return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
 
 
@@ -281,7 +281,7 @@ def isotropic(stddev: float) -> list[float]:
 def planar(
     xx: float, xy: float, x_yaw: float, yy: float, y_yaw: float, yaw_yaw: float
 ) -> list[float]:
-    """Row-major 6x6 of (x, y, z, roll, pitch, yaw)."""
+    """Row-major 6x6 covariance of (x, y, z, roll, pitch, yaw)."""
     zero, big = 0.0, UNMEASURED_VARIANCE
     return [
         *(xx, xy, zero, zero, zero, x_yaw),

@@ -20,7 +20,7 @@ Delivery = Callable[[], object]
 
 
 class Outbox:
-    """``put`` orders, ``deliver`` and ``serve`` make the calls."""
+    """A queue of calls: ``put`` orders them, ``deliver`` and ``serve`` make them."""
 
     def __init__(self) -> None:
         self._waiting: deque[Delivery] = deque()
@@ -29,7 +29,7 @@ class Outbox:
         self._closed = False
 
     def put(self, delivery: Delivery) -> None:
-        """The next one. Never blocks; held locks decide what is next."""
+        """Queue the next call. It never blocks; the caller's lock gives the order."""
         self._waiting.append(delivery)
 
     def claim(self) -> bool:
@@ -78,6 +78,6 @@ class Outbox:
             self.deliver()
 
     def close(self) -> None:
-        """``serve`` makes the calls that still wait, and returns."""
+        """End ``serve`` after the calls that still wait."""
         self._closed = True
         self._handed_over.set()

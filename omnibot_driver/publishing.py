@@ -39,7 +39,7 @@ UNHEARD: Final = ("disconnected", "connecting")
 
 
 class Publishing:
-    """``settings`` may be replaced at any time."""
+    """Publishes measurements and states. ``settings`` may be replaced at any time."""
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class Publishing:
 
     @property
     def settings(self) -> messages.MessageSettings:
-        """Frames and covariances."""
+        """The frames and covariances of messages."""
         return self._settings
 
     @settings.setter
@@ -134,7 +134,7 @@ class Publishing:
         self._show(StateChanged(*self._session.shown))
 
     def report_port(self, trouble: str | None) -> None:
-        """The port is open, or cannot be had, or was lost."""
+        """Report that the port is open, cannot be opened, or was lost."""
         if trouble is None:
             if self._is_news(text := f"port {self._port} is open"):
                 self._node.get_logger().info(text)

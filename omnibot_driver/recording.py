@@ -53,7 +53,7 @@ class Recording:
 
 
 def is_recording(url: str) -> bool:
-    """Tell whether the URL is one of ours."""
+    """Whether the URL is of a recording."""
     return url.lower().startswith(SCHEME)
 
 

@@ -53,7 +53,7 @@ class StallDetector:
         return length_s
 
     def passed(self, now: float, wall_ns: int) -> None:
-        """The watchdog's thread runs; ``wall_ns`` is the time of day."""
+        """Note that the watchdog's thread runs; ``wall_ns`` is the time of day."""
         if self._begun:
             self._begun = False
             if now >= self._over_at + LATEST_S:  # else commands of the last one are still under way

@@ -51,7 +51,7 @@ def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
 
 
 def kinematics(values: Mapping[str, Any]) -> OmniKinematics:
-    """Its wheels A, B, C."""
+    """The kinematics of wheels A, B and C."""
     return OmniKinematics(values["wheel_radius"], values["base_radius"])
 
 

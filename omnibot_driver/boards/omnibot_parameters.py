@@ -133,7 +133,7 @@ OMNIBOT: Final = (
 
 
 def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
-    """A mirror turns the other way; signs that say otherwise leave positions without meaning."""
+    """Reject signs that no mirror has, as they leave positions without meaning."""
     x, y, yaw = values["axis_signs"]
     if values["control_method"] == "position" and x * y != yaw:
         raise ParameterError(

@@ -107,7 +107,7 @@ class Board(Protocol):
 
     @property
     def figures(self) -> BoardFigures:
-        """Advice for the person who maintains the line."""
+        """Counters for the person who maintains the line."""
         return BoardFigures()
 
     @property
@@ -125,7 +125,7 @@ class Board(Protocol):
         return ""
 
     def connect(self) -> None:
-        """The line is new: nothing that was held or believed is worth anything any more."""
+        """Begin a new connection: forget all held bytes and beliefs."""
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Decode bytes; returns the readings that they complete, in order, and updates ``mode``."""
@@ -135,7 +135,7 @@ class Board(Protocol):
         return []
 
     def silence(self) -> None:
-        """The silence has lasted so long that the mode is unknown again."""
+        """Forget the mode, as the board has been silent for too long."""
 
     @property
     def wake_at(self) -> float:
@@ -154,7 +154,7 @@ class Board(Protocol):
         return []
 
     def reset_odometry(self) -> None:
-        """The frame of its OdometryReadings begins where the robot stands."""
+        """Begin the frame of the OdometryReadings at the robot's present pose."""
 
     @property
     def shows_standstill(self) -> bool:

@@ -24,7 +24,7 @@ class Liveness:
         """The silence that is known: ``heard_at`` when it was found."""
 
     def begin(self, now: float) -> None:
-        """The line is new."""
+        """Begin a new connection."""
         self.heard_at, self.came_at = now, -math.inf
         self._silent_since = None
 

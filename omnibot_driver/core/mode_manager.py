@@ -92,12 +92,12 @@ class ModeManager:
         return min(next_at, self._deadline)
 
     def opened(self, now: float) -> None:
-        """The port is open; the board may be in any state, half-way through a command too."""
+        """Begin with an open port; the board may be in any state, even within a command."""
         self.output = NO_PACKETS
         self._begin(now)
 
     def closed(self) -> None:
-        """The port is gone, and every request with it."""
+        """Fail every request, as the port is lost."""
         self.phase = Phase.CLOSED
         self._answer(False, "the port was lost meanwhile; call again once it is back")
 
@@ -130,7 +130,7 @@ class ModeManager:
             self._say(self._board.reset(), now)
 
     def heard_paused(self, now: float, *, continues: bool) -> None:
-        """The board said that it is paused; ``continues``: and that it has not restarted."""
+        """Note that the board is paused; ``continues``: it has not restarted."""
         in_flight = now - self._said_at < IN_FLIGHT_S
         running_wanted = self._wanted is Wanted.RUNNING
         if self.phase is Phase.PAUSING:
@@ -147,7 +147,7 @@ class ModeManager:
             self._begin(now)  # it has restarted, and may have slept through what was said so far
 
     def heard_reset(self, now: float, remark: str = "") -> None:
-        """The board, which never pauses, shows that it has obeyed a reset, all but ``remark``."""
+        """Note that the board has obeyed a reset, except for ``remark``."""
         if self.phase is Phase.RESETTING and now - self._said_at >= IN_FLIGHT_S:
             self.output += self._board.wake()
             self._settle(remark or "the board was reset")
@@ -158,7 +158,7 @@ class ModeManager:
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 
     def heard_data(self, now: float) -> None:
-        """The board sent data, and its mode is a running one."""
+        """Note that the board sends data and runs."""
         data_at, self._data_at = self._data_at, now
         if self.at_rest:
             return
@@ -178,12 +178,12 @@ class ModeManager:
             self._say(self._board.reset(), now)
 
     def heard_nothing(self, now: float) -> None:
-        """The board fell silent: it may be rebooting, or be gone."""
+        """Note that the board is silent: it may be rebooting, or be lost."""
         if self.phase is Phase.SETTLED and self._wanted is Wanted.RUNNING:
             self._begin(now)
 
     def tick(self, now: float) -> None:
-        """Repeat what is due, give up what is overdue."""
+        """Repeat requests that are due, and give up overdue ones."""
         if self.phase is Phase.PAUSING and now >= self._shown_at + IN_FLIGHT_S:
             self._settle("paused")
         elif now >= self._deadline:
@@ -207,7 +207,7 @@ class ModeManager:
         return NO_PACKETS
 
     def _begin(self, now: float) -> None:
-        """The opening sequence; a board that is not wanted running gets no S."""
+        """Send the opening sequence, without S for a board that should not run."""
         self.output += self._board.wake()
         self.phase = Phase.SETTLED
         if self._wanted is Wanted.RUNNING and Request.START in self._board.traits.requests:

@@ -17,7 +17,7 @@ NO_PACKETS: Final[Packets] = ()
 
 
 def packed(data: bytes, channel: int = 0) -> Packets:
-    """One packet, or none where there are no bytes."""
+    """One packet, or none if there are no bytes."""
     return ((channel, data),) if data else NO_PACKETS
 
 

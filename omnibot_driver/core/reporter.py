@@ -62,7 +62,7 @@ class Reporter:
         return str((Mode.UNKNOWN if unknown else self._board.mode).value)
 
     def figures(self, now: float) -> SessionFigures:
-        """All that is counted and measured."""
+        """All counters and measurements."""
         return SessionFigures(
             state=self.state,
             tally=replace(self._measurement.tally),
@@ -75,12 +75,12 @@ class Reporter:
         )
 
     def notify(self, sentences: Sequence[str]) -> None:
-        """Notices for the user, sentence by sentence."""
+        """Give the user notices, sentence by sentence."""
         if sentences:
             self.events += map(Notice, sentences)
 
     def look_for_news(self, now: float) -> None:
-        """Notices that follow from counters and observations."""
+        """Give the user notices that follow from counters and observations."""
         self.news_at = now + NEWS_EVERY_S
         notices, measuring, advice = self._notices, self._measurement, self._board.advice
         news = notices.counted(
@@ -110,7 +110,7 @@ class Reporter:
         self.notify(self._notices.unconfirmed(self._board.mode, measured=measured, blind=blind))
 
     def take(self) -> list[Event]:
-        """What happened since the last call, in order."""
+        """Return and forget the events since the last call, in order."""
         for answers in (
             self._mode_manager.answers,
             self._calibration.answers,

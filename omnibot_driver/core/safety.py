@@ -36,7 +36,7 @@ BUTTON_HELD: Final = (
 
 
 class SafetyStops:
-    """Reports go to ``reporter``."""
+    """Stops the robot at once when it must. Reports go to ``reporter``."""
 
     def __init__(
         self,
@@ -118,7 +118,7 @@ class SafetyStops:
         return "e-stop released; robot stopped until the next command"
 
     def set_out(self, now: float) -> None:
-        """The board runs (again): it may still carry out an old command."""
+        """Stop the robot, as the board runs again and may carry out an old command."""
         self._policy.proof.begin()
         self._policy.halt(now)
 

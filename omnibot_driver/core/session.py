@@ -103,12 +103,12 @@ class Session:
         return self._measurement.refused
 
     def figures(self, now: float) -> SessionFigures:
-        """All that is counted and measured."""
+        """All counters and measurements."""
         return self._reporter.figures(now)
 
     @property
     def gyro_bias(self) -> Vector3:
-        """What is taken off the gyro's readings, in rad/s."""
+        """The bias that is subtracted from the gyro's readings, in rad/s."""
         return self._calibration.bias
 
     @property
@@ -139,7 +139,7 @@ class Session:
         self._measurement.configure(settings)
 
     def opened(self, now: float, *, missing: str = "") -> None:
-        """The port is open. ``missing``: which of several lines are not, in a sentence.
+        """Begin with an open port. ``missing``: a sentence on the lines that are not open.
 
         A robot that receives only a part of its commands is stopped, and not driven.
         """
@@ -154,7 +154,7 @@ class Session:
             self._commands.halt(now)
 
     def closed(self, now: float) -> None:
-        """The port is gone."""
+        """End the connection, as the port is lost."""
         if readings := self._board.flush(now):
             self._last = readings[-1]
         self._reporter.events += self._measurement.hear(readings, now)
@@ -166,7 +166,7 @@ class Session:
         self._commands.discard(now)
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
-        """Bytes came in at ``now``."""
+        """Process bytes that arrived at ``now``."""
         self._reporter.events += self.hear(data, now, channel)
         self.process(now)
 
@@ -193,7 +193,7 @@ class Session:
         return []
 
     def overran(self, count: int) -> None:
-        """The port has lost bytes this many times since it was opened; they were never read."""
+        """Note how often the port has lost bytes since it was opened."""
         self._reporter.overruns = count
 
     def process(self, now: float) -> bool:
@@ -245,7 +245,7 @@ class Session:
         self._command(self._commanding.twist(twist, now, age_s=age_s), now)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
-        """Turn the wheels. Raises CommandRefused, and then nothing changes."""
+        """Turn the wheels. If it raises CommandRefused, nothing changes."""
         self._command(self._commanding.wheels(rates_radps, now), now)
 
     def command_pose(self, goal: Pose, now: float) -> None:
@@ -283,7 +283,7 @@ class Session:
         return self._task.is_current(token)
 
     def end_task(self, token: object, success: bool, message: str) -> None:
-        """The task is done, or has failed."""
+        """End the task, as done or failed."""
         self._task.end(token, success, message)
 
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
@@ -294,14 +294,15 @@ class Session:
         return self._safety.estop(active, now, by=by)
 
     def reset_odometry(self, now: float) -> None:
-        """The odometry frame begins where the robot stands; a goal in the old one is dropped."""
+        """Begin the odometry frame at the robot's present pose; a goal in the old one is
+        dropped."""
         self.process(now)
         self._board.reset_odometry()
         self._reporter.events += self._odometry.reset()
         self._reporter.notify(self._commanding.check_goal([], now))
 
     def leave(self, now: float) -> None:
-        """The driver ends: nothing is obeyed any more, and Stop is repeated."""
+        """Begin the shutdown: refuse everything, and repeat Stop."""
         self._interlocks.leaving = True
         self._commands.halt(now)
 
@@ -349,7 +350,7 @@ class Session:
     # What comes of it
 
     def take_output(self, now: float) -> Packets:
-        """What to write now; it counts as written."""
+        """The packets to write now; they count as written."""
         if self._mode_manager.phase is CLOSED:
             return NO_PACKETS
         packets = NO_PACKETS
@@ -370,7 +371,7 @@ class Session:
         return packets
 
     def take_events(self) -> list[Event]:
-        """What happened since the last call, in order."""
+        """Return and forget the events since the last call, in order."""
         return self._reporter.take()
 
     def _elapse(self, now: float) -> None:

@@ -13,7 +13,7 @@ from omnibot_driver.core.odometry.estimator import OdometrySettings
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionSettings:
-    """What may change while the session runs."""
+    """The settings that may change while the session runs."""
 
     limits: SpeedLimits
     commands: CommandSettings

@@ -55,5 +55,5 @@ class Traits:
 
     @property
     def to_check(self) -> str:
-        """What may be wrong where nothing is understood."""
+        """Things to check while no valid data arrives."""
         return "its power, cable and baudrate" if self.baudrate else "its power and cable"

@@ -14,7 +14,7 @@ else:
     from dataclasses import dataclass
 
     def value(*, frozen: bool, slots: bool) -> object:
-        """``dataclass``; ``frozen`` stands there for the type checker."""
+        """A ``dataclass`` whose ``frozen`` holds for the type checker only."""
         return dataclass(slots=slots, unsafe_hash=frozen)
 
 

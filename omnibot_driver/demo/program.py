@@ -47,7 +47,7 @@ class Program:
             self._process.wait()
 
     def failure(self, what: str) -> DemoFailed:
-        """What happened, with the last words of this process."""
+        """A message on what happened, with the last output of this process."""
         self._log.seek(0)
         lines = self._log.read().splitlines()[-10:] or ["(nothing)"]
         return DemoFailed("\n  ".join([f"{what}. The {self._name} said last:", *lines]))

@@ -91,7 +91,7 @@ class Table:
 
     @property
     def rows(self) -> tuple[Parameter, ...]:
-        """All of them in order."""
+        """All rows in order."""
         return tuple(self.by_name.values())
 
     @property
@@ -185,7 +185,7 @@ def _require_two_frames(values: Mapping[str, Any]) -> None:
 
 
 def _require_possible_speeds(values: Mapping[str, Any]) -> None:
-    """A displacement above the fastest speed is rejected, so odometry would stop at full speed."""
+    """Reject speed limits above the fastest believable speed, at which odometry would stop."""
     for kind, unit in (("linear", "m/s"), ("angular", "rad/s")):
         commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
         if commanded in values and values[commanded] > values[possible]:

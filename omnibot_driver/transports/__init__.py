@@ -38,7 +38,7 @@ class Transport(Protocol):
 
     @property
     def ends_with_us(self) -> bool:
-        """Nothing outside this process hears what is written."""
+        """Whether nothing outside this process receives what is written."""
 
     @property
     def overruns(self) -> int | None:

@@ -104,7 +104,7 @@ class SerialPort:
         return data  # what came before the loss; the next call finds it again
 
     def write(self, packets: Packets) -> None:
-        """All of it at once."""
+        """Write all bytes at once."""
         data = joined(packets)
         try:
             if self._descriptor is None:

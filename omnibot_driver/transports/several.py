@@ -136,7 +136,7 @@ class Several:
         self._wake_up.ring()
 
     def close(self) -> None:
-        """Harmless to repeat."""
+        """Close the lines. A second call does nothing."""
         for line in self._lines:
             self._close(line)
         self._wake_up.close()
@@ -232,7 +232,7 @@ class Line:
         self._full_since = 0.0
 
     def begin(self, port: ByteLine) -> None:
-        """The line is present."""
+        """Add a line that is present."""
         assert port.descriptors is not None
         self.port, (self.descriptor,) = port, port.descriptors
         self.trouble, self.waits, self.watched = "", b"", False

@@ -63,7 +63,7 @@ class SimulatedTransport:
         return self._board.read(READ_TIMEOUT_S)
 
     def write(self, packets: Iterable[Packet]) -> None:
-        """All of them, at once. Raises LinkError after ``close``."""
+        """Write all bytes at once. Raises LinkError after ``close``."""
         if self._board is None:
             raise LinkError(f"lost {self._url} while writing: it is closed")
         for packet in packets:
@@ -81,7 +81,7 @@ class SimulatedTransport:
             board.cancel()
 
     def close(self) -> None:
-        """Power the board off; harmless to repeat."""
+        """Power the board off. A second call does nothing."""
         board, self._board = self._board, None
         if board is not None:
             board.cancel()
@@ -104,7 +104,7 @@ class InProcessBoard(RunningBoard[SimulatedBoard]):
         return len(waiting) if self._has_datagrams(channel) else sum(map(len, waiting))
 
     def write(self, packet: Packet) -> None:
-        """A packet for the board; it finds it with its next tick at the latest."""
+        """Write a packet for the board, which reads it by its next tick."""
         self._inbox.put(packet)
 
     def read(self, timeout_s: float | None) -> Packet:

@@ -57,7 +57,7 @@ class UdpPorts:
 
     @property
     def descriptors(self) -> tuple[int, ...] | None:
-        """Connected sockets: each write is a datagram."""
+        """Descriptors of connected sockets: each write is a datagram."""
         return tuple(ours.fileno() for ours in self._sockets)
 
     def read(self) -> Packet:
@@ -79,7 +79,7 @@ class UdpPorts:
             raise self._lost(channel, error) from error
 
     def write(self, packets: Packets) -> None:
-        """Each a datagram."""
+        """Write each packet as a datagram."""
         until = time.monotonic() + WRITE_TIMEOUT_S
         failed: LinkError | None = None
         for channel, data in packets:
@@ -105,14 +105,14 @@ class UdpPorts:
         self._wake_up.ring()
 
     def close(self) -> None:
-        """Harmless to repeat."""
+        """Close the sockets. A second call does nothing."""
         for ours in self._sockets:
             ours.close()
         self._sockets = []
         self._wake_up.close()
 
     def _connect(self, channels: int) -> None:
-        """All to one address, whatever others the name has."""
+        """Connect all sockets to one address of the name."""
         family, kind, protocol, _, (address, _, *rest) = socket.getaddrinfo(
             self._host, self._port, type=socket.SOCK_DGRAM
         )[0]

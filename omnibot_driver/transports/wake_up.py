@@ -26,7 +26,7 @@ class WakeUp:
         os.read(self.descriptor, 1000)
 
     def close(self) -> None:
-        """Harmless to repeat."""
+        """Close it. A second call does nothing."""
         for descriptor in (self.descriptor, self._far):
             if descriptor >= 0:
                 os.close(descriptor)

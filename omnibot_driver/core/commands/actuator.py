@@ -41,13 +41,13 @@ class Actuator(Protocol):
         """
 
     def connect(self) -> None:
-        """The line is new, and the board has heard nothing of it. Nothing is wanted."""
+        """Begin a new connection, on which nothing has been sent and nothing is wanted."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """This is wanted from now on."""
+        """Carry out this order from now on."""
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """A request to the board went out."""
+        """Note that a request to the board was sent."""
 
     def due(self, now: float) -> Packets:
         """The packets to write now, possibly none. They count as written."""

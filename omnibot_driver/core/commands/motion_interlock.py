@@ -36,7 +36,7 @@ class MotionInterlock:
         self._tripped_at = self._commanded_at = -math.inf
 
     def trip(self, now: float) -> None:
-        """The robot was stopped, as it did not move as commanded."""
+        """Note that the robot was stopped, as it did not move as commanded."""
         again = now - self._tripped_at <= AGAIN_S or self.until is self._for_good
         self.until = self._for_good if again else Until.RELEASE
         self.trips += 1
@@ -47,7 +47,7 @@ class MotionInterlock:
         self.until, self._tripped_at = Until.NOTHING, -math.inf
 
     def release(self) -> None:
-        """The e-stop was released, which takes the place of ~/start where there is none."""
+        """Note the release of the e-stop, which replaces ~/start on a board without it."""
         if self.until is Until.ESTOP:
             self.start()
 

@@ -14,7 +14,7 @@ from omnibot_driver.core.values import value
 
 @value(frozen=True, slots=True)
 class Stop:
-    """Stand still."""
+    """Encode an order to stand still."""
 
 
 @value(frozen=True, slots=True)

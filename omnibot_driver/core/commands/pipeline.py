@@ -124,7 +124,7 @@ class CommandPipeline:
         self._monitor.release()
 
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
-        """Drive the body. Raises CommandRefused, as all wishes do."""
+        """Drive the body. Raises CommandRefused, as all commands do."""
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s
         if age_s:
@@ -142,7 +142,7 @@ class CommandPipeline:
         return self._shaper.pose(goal), NEVER
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """A request to the board went out."""
+        """Note that a request to the board was sent."""
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:

@@ -63,7 +63,7 @@ class CommandPolicy:
         self._actuator.rate_hz = settings.rate_hz
 
     def command(self, setpoint: Setpoint, now: float, *, expires_at: float) -> None:
-        """The newest command replaces the current one; a latched e-stop takes none."""
+        """Replace the current command; a latched e-stop refuses it."""
         if self.latched:
             return
         self.current = setpoint
@@ -78,7 +78,7 @@ class CommandPolicy:
             self._actuator.apply(None, now)
 
     def connect(self, now: float) -> None:
-        """The line is new; a latched e-stop is said."""
+        """Begin a new connection; a latched e-stop is sent again."""
         self.current = self._stopping_since = None
         self.proof.begin()
         self._actuator.connect()
@@ -100,7 +100,7 @@ class CommandPolicy:
         self.proof.stopped(now)
 
     def latch(self, now: float) -> None:
-        """Emergency stop until the release."""
+        """Latch the emergency stop until the release."""
         if not self.latched:
             self.current = self._stopping_since = None
             self.latched = True

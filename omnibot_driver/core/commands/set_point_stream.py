@@ -30,7 +30,7 @@ class Encoder(Protocol):
     """A board's frames, as its settings are now."""
 
     def stop(self) -> Packets:
-        """Stand still."""
+        """Encode an order to stand still."""
 
     def emergency_stop(self) -> Packets:
         """The board's own emergency stop, and nothing else."""
@@ -73,7 +73,7 @@ class SetpointStream:
         self._said_at = self._fresh_at = self._moved_at = self._stop_at = -math.inf
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """The newest replaces what was wanted; another authority's set-point is stopped first."""
+        """Replace the wanted set-point; that of another authority is stopped first."""
         rested = now - self._stop_at >= PACE_S
         if wanted is None or isinstance(wanted, Stop | EmergencyStop):
             begins = wanted is not self._standing

@@ -39,7 +39,7 @@ class Setpoint(Protocol):
 
     @property
     def authority(self) -> Authority:
-        """Whose command it is."""
+        """The topic that gave the command."""
 
     @property
     def is_zero(self) -> bool:
@@ -47,13 +47,13 @@ class Setpoint(Protocol):
 
     @property
     def settled(self) -> bool:
-        """False while each next order is another one."""
+        """Whether the next order is the same as this one."""
 
     def order(self, now: float) -> Order:
         """The order at this time."""
 
     def check_anew(self) -> None:
-        """The board's settings have changed. Raises CommandRefused where they cannot say it."""
+        """Check the order with new settings. Raises CommandRefused if they cannot encode it."""
 
 
 class BaseSetpoint:
@@ -96,7 +96,7 @@ class BaseSetpoint:
         return self._order
 
     def check_anew(self) -> None:
-        """A ramp goes on."""
+        """Continue a ramp with new settings."""
         self.is_zero = self._is_zero(Drive(self._wanted))
         if self.is_zero:
             self._setpoint, self.settled = self._wanted, True
@@ -116,7 +116,7 @@ class SteadySetpoint:
         self.is_zero = is_zero(order)
 
     def order(self, now: float) -> Order:
-        """Always the same."""
+        """The order, which does not change."""
         return self._order
 
     def check_anew(self) -> None:
@@ -151,7 +151,7 @@ class GoalSetpoint:
         self.check_anew()
 
     def order(self, now: float) -> Order:
-        """Always the same."""
+        """The order, which does not change."""
         return self._order
 
     def check_anew(self) -> None:

@@ -47,7 +47,7 @@ class CommandShaper:
         """Wishes that went beyond the limits."""
 
     def base(self, twist: BodyTwist, *, before: Setpoint | None, since: float) -> Setpoint:
-        """Drive the body, from what was commanded ``before``."""
+        """Drive the body; a ramp starts at the set-point ``before``."""
         if self._control == "position":
             raise self._at_odds(Authority.BASE)
         limited = twist

@@ -49,7 +49,7 @@ class StopProof:
         self._still_s, self._still = 0.0, 0
 
     def moved(self) -> None:
-        """A command to move went out."""
+        """Note that a command to move was sent."""
         self.begin()
         self.owed = True
 
@@ -58,7 +58,7 @@ class StopProof:
         self._stopped_at = min(self._stopped_at, now)
 
     def paused(self) -> None:
-        """The board says that it is paused: its motors are off."""
+        """Note that the board is paused: its motors are off."""
         self.proved, self.owed = True, False
 
     @property
@@ -67,7 +67,7 @@ class StopProof:
         return max(PROOFS * self._needed_s, UNDER_WAY_S + (AT_LEAST + 1) * self._period_s)
 
     def look(self, reading: DisplacementReading, now: float) -> None:
-        """A displacement arrived."""
+        """Look at a displacement."""
         self._period_s = min(reading.duration_s or 0.0, RAREST_S)
         if not reading.duration_s or not reading.measured or now < self._stopped_at + UNDER_WAY_S:
             return

@@ -32,7 +32,7 @@ class OmniKinematics:
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:
-        """All of it: three wheels, three degrees of freedom."""
+        """The whole twist: three wheels have three degrees of freedom."""
         return twist
 
     def wheel_rates(self, twist: BodyTwist) -> tuple[float, float, float]:

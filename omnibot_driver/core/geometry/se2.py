@@ -23,21 +23,21 @@ class Pose:
         return Pose(self.x_m + other.x_m, self.y_m + other.y_m, self.yaw_rad + other.yaw_rad)
 
     def __sub__(self, other: "Pose") -> "Pose":
-        """Component by component."""
+        """The difference, component by component."""
         return Pose(self.x_m - other.x_m, self.y_m - other.y_m, self.yaw_rad - other.yaw_rad)
 
     def times(self, x: float, y: float, yaw: float) -> "Pose":
-        """Component by component."""
+        """The product, component by component."""
         return Pose(x * self.x_m, y * self.y_m, yaw * self.yaw_rad)
 
     @property
     def way_m(self) -> float:
-        """Length of the position."""
+        """Length of the position, in m."""
         return math.hypot(self.x_m, self.y_m)
 
     @property
     def finite(self) -> bool:
-        """No NaN and no infinity in it."""
+        """Whether no component is NaN or infinite."""
         return all(map(math.isfinite, (self.x_m, self.y_m, self.yaw_rad)))
 
     def turned(self, angle_rad: float) -> "Pose":

@@ -30,7 +30,7 @@ class ImuEstimate:
 
 
 class BiasCorrector:
-    """``calibration`` is for explicit requests."""
+    """Finds and removes the gyro's bias. ``calibration`` handles explicit requests."""
 
     def __init__(self, board: Board, correction: ImuCorrection) -> None:
         self._board = board
@@ -38,7 +38,7 @@ class BiasCorrector:
         self.calibration = GyroCalibration(correction.gyro_bias, refine=correction.auto_gyro_bias)
 
     def configure(self, correction: ImuCorrection) -> None:
-        """A bias that was set otherwise replaces what was found; one that was not, does not."""
+        """Use new settings. Only a changed bias parameter replaces the measured bias."""
         if correction.gyro_bias != self._correction.gyro_bias:
             self.calibration.bias = correction.gyro_bias
         self.calibration.refine = correction.auto_gyro_bias
@@ -65,7 +65,7 @@ class BiasCorrector:
 
     @property
     def figures(self) -> ImuFigures:
-        """Advice for the person who maintains the sensor."""
+        """Figures for the person who maintains the sensor."""
         return ImuFigures(
             bias_radps=self.calibration.bias,
             gravity_mps2=self.calibration.gravity_mps2,

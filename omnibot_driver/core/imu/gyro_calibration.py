@@ -48,7 +48,7 @@ class Look:
         self._x_m = self._y_m = self._yaw_rad = 0.0
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
-        """A reading of the IMU."""
+        """Look at a reading of the IMU."""
         if not self.rates:
             self.began_s = stamp_s
         self.last_s = stamp_s
@@ -56,7 +56,7 @@ class Look:
         self.forces.append(force)
 
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
-        """A displacement, in whichever axes."""
+        """Look at a displacement, in any axes."""
         self.displacements += 1
         self._x_m += dx_m
         self._y_m += dy_m
@@ -118,7 +118,7 @@ class GyroCalibration:
         self._token, self.wake_at = token, now + ANSWER_WITHIN_S
 
     def give_up(self, reason: str) -> None:
-        """A measurement under way has failed, and this is why and what to do."""
+        """Fail a running measurement, with a reason and a remedy."""
         if self.wake_at < math.inf:
             self._answer(False, f"gyro bias unchanged: {reason}")
 
@@ -128,7 +128,7 @@ class GyroCalibration:
             self.give_up("no two seconds of readings without a gap; check ~/state, then call again")
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
-        """A reading of the IMU, as the sensor gave it, but for the accelerometer's bias."""
+        """Look at a reading of the IMU, raw except for the accelerometer's bias."""
         look = self._look
         if stamp_s - look.last_s > GAP_S:
             look = self._look = Look()

@@ -48,13 +48,13 @@ class ImuScale:
     gyro_range_dps: int = 250
 
     def specific_force(self, counts: Counts) -> Vector3:
-        """Counts to m/s²."""
+        """Convert counts to m/s²."""
         unit = _MPS2_PER_COUNT[self.accel_range_g]
         x, y, z = counts
         return x * unit, y * unit, z * unit
 
     def angular_velocity(self, counts: Counts) -> Vector3:
-        """Counts to rad/s."""
+        """Convert counts to rad/s."""
         unit = _RADPS_PER_COUNT[self.gyro_range_dps]
         u, v, w = counts
         return u * unit, v * unit, w * unit

@@ -151,7 +151,7 @@ class LoisEcu:
         return self._translation.odometry.predict(now)
 
     def reset_odometry(self) -> None:
-        """The odometry frame begins where the robot stands."""
+        """Begin the odometry frame at the robot's present pose."""
         self._translation.odometry.reset()
 
     def stands(self, now: float) -> bool | None:

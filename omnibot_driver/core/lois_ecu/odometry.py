@@ -99,7 +99,7 @@ class LoisOdometry:
         return self.signed_ticks or all(wheel.course.counting for wheel in self._motion.wheels)
 
     def reset(self) -> None:
-        """The odometry frame begins where the robot stands."""
+        """Begin the odometry frame at the robot's present pose."""
         for state in (X, Y, WAY, PER_WHEEL + WAY):
             self._motion.filter.forget(state, 0.0, 0.0)
         self._motion.yaw0_rad = 0.0

@@ -32,7 +32,7 @@ class SetPoints:
         self.connect()
 
     def connect(self) -> None:
-        """The line is new."""
+        """Begin a new connection."""
         self._said: SetRpm | SetDuty | None = None
         self.stopped_at_s = math.inf
         self.stood = False

@@ -73,7 +73,7 @@ class Translation:
         self._clock = (0, 0, 0)
 
     def connect(self) -> None:
-        """The line is new."""
+        """Begin a new connection."""
         self._connect()
         self.odometry.connect()
         self.headings.forget()

@@ -98,7 +98,7 @@ class MartBoard(Board):
     # Inbound
 
     def connect(self) -> None:
-        """The line is new."""
+        """Begin a new connection."""
         self._pilot.connect()
         self._mode = Mode.UNKNOWN
 

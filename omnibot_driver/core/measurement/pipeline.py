@@ -37,7 +37,7 @@ Measured = tuple[Reading, Sequence[Estimate]]
 
 
 class MeasurementPipeline:
-    """Everything between a board's readings and the published measurements."""
+    """The steps from a board's readings to the published measurements."""
 
     def __init__(self, board: Board, settings: SessionSettings, axis_signs: Signs) -> None:
         self.odometry = Odometry(settings.odometry, axis_signs)
@@ -57,7 +57,7 @@ class MeasurementPipeline:
         """What is heard, but for ``flush``."""
 
     def configure(self, settings: SessionSettings) -> None:
-        """New settings, from the next reading on."""
+        """Use new settings from the next reading on."""
         self.odometry.configure(settings.odometry)
         self._outliers.limits = settings.motion
         self.inertial.configure(settings.imu)

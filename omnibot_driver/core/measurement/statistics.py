@@ -42,7 +42,7 @@ class StreamStatistics:
     _rate: Vector3 | None = field(default=None, repr=False)
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
-        """A read brought these, the newest of which, if it is a sample, was so old."""
+        """Count the readings of one read, and the age of its newest sample."""
         if isinstance(readings[-1], (ImuReading, DisplacementReading)):
             self.reads += 1
             self.delay_s += delay_s

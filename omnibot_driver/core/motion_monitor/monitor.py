@@ -82,7 +82,7 @@ ADVICE: Final[Mapping[Fault, str]] = {
 
 
 class MotionMonitor:
-    """``commanded``, ``measured``: what the last fault rests on."""
+    """Compares motion with commands. ``commanded``, ``measured``: of the last fault."""
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
         self.commanded = self.measured = AT_REST
@@ -111,7 +111,7 @@ class MotionMonitor:
             self._has_stood = False
 
     def release(self) -> None:
-        """The e-stop is released; the robot has not moved since."""
+        """Note the release of the e-stop; the robot has not moved since."""
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:

@@ -33,7 +33,7 @@ HISTORY_S: Final = 3.0
 
 
 class SetpointHistory:
-    """``current`` holds since the last ``add``."""
+    """The recent set-points. ``current`` holds since the last ``add``."""
 
     def __init__(self) -> None:
         self.clear()

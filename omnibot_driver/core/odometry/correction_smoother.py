@@ -27,12 +27,12 @@ class CorrectionSmoother:
         return self.target - self.pose
 
     def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:
-        """The target is elsewhere: this displacement away, in its own axes."""
+        """Move the target by this displacement, in its own axes."""
         self.target = self.target.moved(chord)
         self._settling_s = spread_s
 
     def move(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """The robot moved so, in its own axes, and could have moved as far as the room."""
+        """Move the robot, in its own axes; ``room`` is the most that it can have moved."""
         pose, target = self.pose, self.target
         self.target = target.moved(chord)
         self.pose = self.target if pose is target else pose.moved(chord)

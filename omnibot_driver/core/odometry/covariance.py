@@ -110,7 +110,7 @@ NOTHING: Final = Covariance.diagonal(0.0, 0.0)
 
 
 class Uncertainty:
-    """``noise`` may be replaced at any time."""
+    """The uncertainty of the odometry. ``noise`` may be replaced at any time."""
 
     def __init__(self, noise: OdometryNoise) -> None:
         self.noise = noise
@@ -120,7 +120,7 @@ class Uncertainty:
         """What the pose is off by, in m, m, rad, per relative size error of each wheel."""
 
     def move(self, heading_rad: float, tangent: Pose) -> None:
-        """The body moved along this tangent from this heading.
+        """Move the body along this tangent from this heading.
 
         In plain numbers: with a Pose for each it would be a third of all an odometry message costs.
         """
@@ -153,7 +153,7 @@ class Uncertainty:
             self.gap = self.gap.carried(dx_m, dy_m)
 
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
-        """The motion of this time was not reported; the speeds before and after it are known.
+        """Add a time without reports; the speeds before and after it are known.
 
         A robot that speeds up and brakes again meanwhile is a quarter of a·t² away from the even
         way, and never further than its speed allows.
@@ -165,11 +165,11 @@ class Uncertainty:
         )
 
     def settle(self) -> None:
-        """The motion in all gaps is known now."""
+        """Close all gaps, as their motion is known now."""
         self.gap = NOTHING
 
     def give_up(self) -> None:
-        """The motion in all gaps will never be known."""
+        """Close all gaps, as their motion will never be known."""
         self._walk, self.gap = self._walk + self.gap, NOTHING
 
     def total(self, open_error: Pose) -> Covariance:

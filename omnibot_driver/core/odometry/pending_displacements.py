@@ -21,11 +21,11 @@ class PendingDisplacements:
         return bool(self._waiting)
 
     def add(self, reading: DisplacementReading, stamp_s: float) -> None:
-        """The newest."""
+        """Add the newest displacement."""
         self._waiting.append((reading, stamp_s))
 
     def take(self) -> list[tuple[DisplacementReading, float]]:
-        """All of them; none waits afterwards."""
+        """Return all of them and keep none."""
         waiting, self._waiting = self._waiting, []
         return waiting
 
@@ -37,7 +37,7 @@ class PendingDisplacements:
 
     @property
     def lost(self) -> int:
-        """Displacements that are missing before the first."""
+        """The number of displacements that are missing before the first."""
         return self._waiting[0][0].lost if self._waiting else 0
 
     @property

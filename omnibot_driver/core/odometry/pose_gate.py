@@ -34,17 +34,17 @@ class PoseGate:
         self._unproved_s = 0.0
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """The board reported this motion."""
+        """Move the expected pose by a reported motion."""
         if self.doubted is not None:
             self.doubted = advanced(self.doubted, reading)
 
     def bridged(self, chord: Pose) -> None:
-        """The board is taken to have moved so, in its own axes, without a report."""
+        """Move the expected pose by an assumed motion, in the board's axes."""
         if self.doubted is not None:
             self.doubted = self.doubted.moved(chord)
 
     def passed(self, seconds: float) -> None:
-        """A span of board time has passed."""
+        """Note that this time of the board has passed."""
         self._unproved_s += seconds
 
     def possible(self, told: Pose) -> bool:
@@ -61,7 +61,7 @@ class PoseGate:
         return confirmed
 
     def believe(self, board: Pose) -> None:
-        """The board is here."""
+        """Accept this pose of the board."""
         self.proved, self.doubted, self._unproved_s = board, None, 0.0
 
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
@@ -77,7 +77,7 @@ class PoseGate:
 
 
 def expected(way: Pose, gap: Covariance) -> bool:
-    """No surprise: rounding, and what the open gaps explain."""
+    """Whether rounding and open gaps explain this deviation."""
     metres = math.sqrt(gap.xx + gap.yy) * BELIEVED_SIGMAS
     turn = math.sqrt(gap.yaw_yaw) * BELIEVED_SIGMAS
     return way.way_m <= BELIEVED_M + metres and abs(way.yaw_rad) <= BELIEVED_TURN_RAD + turn

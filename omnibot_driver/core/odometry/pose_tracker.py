@@ -40,7 +40,7 @@ class PoseTracker:
         self.uncertainty.noise = noise
 
     def begin(self) -> None:
-        """The odometry frame begins where the robot stands."""
+        """Begin the odometry frame at the robot's present pose."""
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(self.uncertainty.noise)
 
     def rates(self, tangent: Pose, seconds: float) -> tuple[BodyTwist, BodyTwist]:
@@ -62,15 +62,15 @@ class PoseTracker:
         move(chord, self._fastest_mps * stamped_s, self._fastest_radps * stamped_s)
 
     def miss(self, duration_s: float) -> None:
-        """The motion of this time was not reported."""
+        """Add a time without reports."""
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:
-        """The motion in a gap, told before anything else is made of the gap."""
+        """Add the motion of a gap, before the gap has any other effect."""
         self.follower.correct(roll(self._part(tangent)), 0.0)
 
     def correct(self, tangent: Pose) -> None:
-        """The robot is elsewhere, and all motion in gaps is known."""
+        """Correct the pose; the motion of all gaps is known."""
         if self.uncertainty.gap != NOTHING:  # more than rounding
             self.rolled += _times(tangent, self._size)
         self.follower.correct(roll(_times(tangent, self._signed_size)))

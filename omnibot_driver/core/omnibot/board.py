@@ -98,7 +98,7 @@ class OmniBot:
         self._nothing_begun = SampleBoundary(0, 0.0, (frames.IMU_LENGTH - 1) * byte_s)
 
     def connect(self) -> None:
-        """A new line: a new decoder, and no belief but in the board's counters."""
+        """Begin a new connection: keep nothing but the board's counters."""
         self._decoder = FrameDecoder(
             self._settings.pose_byte_order,
             ACCEL_COUNTS_PER_G[self._settings.imu.accel_range_g],
@@ -134,7 +134,7 @@ class OmniBot:
 
     @property
     def figures(self) -> BoardFigures:
-        """Over all connections."""
+        """Counters over all connections."""
         return BoardFigures(
             rates_hz=self._schedule.rates_hz,
             faults=self._statistics.faults,
@@ -164,22 +164,22 @@ class OmniBot:
         return self._translation.readings(found, self._decoder.skipped, now)
 
     def silence(self) -> None:
-        """The silence has lasted so long that the mode is unknown again."""
+        """Forget the mode, as the board has been silent for too long."""
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def due(self, now: float) -> Packets:
-        """Nothing: it sends by itself."""
+        """No packets: the board sends without polling."""
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
-        """Nothing: it sends by itself."""
+        """No readings: the board sends without polling."""
         return []
 
     def reset_odometry(self) -> None:
         """No effect: the board has no such request."""
 
     def actuator(self, proof: StopProof) -> SetpointStream:
-        """Frames, repeated."""
+        """The stream of repeated frames."""
         return SetpointStream(self._encoder, proof)
 
     def wake(self) -> Packets:
@@ -187,7 +187,7 @@ class OmniBot:
         return packed(STOP)
 
     def start(self) -> Packets:
-        """S."""
+        """The letter S, which starts the board."""
         self._translation.apply(Happening.SENT_START)
         return packed(transmission(frames.FORCE_START))
 
@@ -219,5 +219,5 @@ class OmniBot:
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Always the same."""
+        """The last words, which do not change."""
         return LAST_WORDS

@@ -77,7 +77,7 @@ class CommandEncoder:
         return EMERGENCY_STOP_PACKETS
 
     def velocity(self, twist: BodyTwist) -> bytes:
-        """Base vector control; Stop when it rounds to nothing."""
+        """Encode base vector control; Stop if it rounds to zero."""
         settings = self._settings
         linear, angular = settings.linear_scale, settings.angular_scale
         counts = (twist.vx_mps * linear, twist.vy_mps * linear, twist.yaw_rate_radps * angular)

@@ -200,7 +200,7 @@ class Expectation:
         return (cost if on_beat else cost + OFF_BEAT), after
 
     def learn(self, frame: ImuFrame, last: ImuFrame) -> None:
-        """Two frames in a row that were believed."""
+        """Learn from two accepted frames in a row."""
         (x, y, z), (px, py, pz) = frame.accel, last.accel
         (u, v, w), (pu, pv, pw) = frame.gyro, last.gyro
         d_accel = max(abs(x - px), abs(y - py), abs(z - pz))

@@ -49,7 +49,7 @@ it."""
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counts since the decoder was made."""
+    """Counters since the decoder was made."""
 
     frames: int = 0
     discarded_bytes: int = 0
@@ -287,7 +287,7 @@ class FrameDecoder:
             yield piece, sure
 
     def _drop(self, count: int) -> None:
-        """The first held bytes are not frames."""
+        """Drop the first held bytes, which are not frames."""
         if not count:
             return
         self.statistics.discarded_bytes += count

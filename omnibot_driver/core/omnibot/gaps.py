@@ -71,7 +71,7 @@ class InterFrameGaps:
         self.gaps.append(Gap(place, place + width, price, pause_s))
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
-        """The bytes after this pause began and ended with a frame."""
+        """Note that the bytes after this pause began and ended with a frame."""
         if pause_s - arrived * self._byte_s > GAP_S:
             self._trust(sharp=True, between=True)
 
@@ -103,7 +103,7 @@ class InterFrameGaps:
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def forget(self, count: int) -> None:
-        """The first bytes are held no longer."""
+        """Forget the pauses of the first bytes, which have been decoded."""
         if not self.gaps or self.gaps[-1].first < count:
             self.clear()
             return

@@ -51,7 +51,7 @@ class MisconfigurationChecks:
         self._moved: list[DisplacementReading] = []
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """A delta, as the settings read it."""
+        """Check a delta, as the settings read it."""
         self._moved.append(reading)
         unbroken = not (reading.lost or reading.restarted or reading.duration_s is None)
         if not unbroken or len(self._moved) > MOST_DELTAS:
@@ -60,7 +60,7 @@ class MisconfigurationChecks:
             self._moved.clear()
 
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
-        """A delta arrived at ``now``, with this many IMU frames since the one before.
+        """Check a delta that arrived at ``now``, with this many IMU frames since the one before.
 
         The IMU frames, of which some may be lost, tell the period; arrival times confirm it.
         """
@@ -84,7 +84,7 @@ class MisconfigurationChecks:
             )
 
     def posed(self, frame: PoseFrame, reading: PoseReading, order: ByteOrder) -> None:
-        """A pose, as the settings read it."""
+        """Check a pose, as the settings read it."""
         values = (frame.x, frame.y, frame.theta)
         makes_sense, swapped = _makes_sense(values), _makes_sense(_swapped(values))
         if makes_sense != swapped:

@@ -26,7 +26,7 @@ _DELTA_BYTES: Final = 9
 
 
 class Schedule:
-    """``delta_period_s``: one of ``DELTA_PERIODS_S``."""
+    """The rates of the board's frames. ``delta_period_s``: one of ``DELTA_PERIODS_S``."""
 
     def __init__(self, delta_period_s: float = 0.04) -> None:
         self.delta_period_s = delta_period_s

@@ -58,11 +58,11 @@ class Sequence:
         """The last count before one that seemed to begin anew, its time, and that one."""
 
     def pause(self) -> None:
-        """The board said that it is paused: what comes next takes up the count, or begins anew."""
+        """Note a pause: the next count continues the old one, or restarts."""
         self._paused, self._pose = True, None
 
     def reconnect(self) -> None:
-        """The line is new."""
+        """Begin a new connection."""
         self._reconnected, self._pose = True, None
 
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:

@@ -54,7 +54,7 @@ class Translation:
         self.connect()
 
     def connect(self) -> None:
-        """A new line: no belief but in the board's counters."""
+        """Begin a new connection: keep nothing but the board's counters."""
         self.modes = ModeTracker(self._schedule)
         self._rhythm = FrameSchedule(self._schedule)
         self._sequence.reconnect()

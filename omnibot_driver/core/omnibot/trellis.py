@@ -185,7 +185,7 @@ class _Search:
                 self._edge(node, self._end, price)
 
     def _undamaged(self, at: int, closed: bool) -> None:
-        """The whole frame or text that begins here."""
+        """Add an edge for the whole frame or text that begins here."""
         data, node = self._data, 2 * at + 1
         length = measure(data, at)
         if length == INCOMPLETE:
@@ -224,7 +224,7 @@ class _Search:
                 self._edge(node, 2 * end + 1, price + self._idle_within(at, end))
 
     def _open(self, at: int, price: float) -> None:
-        """A frame, whole or damaged, whose end has not come yet."""
+        """Add an edge for a frame, whole or damaged, whose end is not here yet."""
         self._edge(2 * at + 1, self._end, price + self._idle_within(at, len(self._data)))
 
     def _idle_within(self, start: int, end: int) -> float:

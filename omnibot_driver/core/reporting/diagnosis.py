@@ -53,7 +53,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """One verdict, and the figures that it rests on."""
+    """A diagnostic status: a verdict and its figures."""
 
     name: str
     level: Level
@@ -98,7 +98,7 @@ class Diagnosis:
         return [*statuses, self._imu(session)] if "IMU" in session.board.rates_hz else statuses
 
     def _remember(self, session: SessionFigures, now: float) -> None:
-        """The same state all along."""
+        """Note the state, unless it is the same as before."""
         if self._window and self._window[-1][1].state != session.state:
             self._window.clear()
         self._window.append((now, session))

@@ -81,7 +81,7 @@ class Notices:
         return news
 
     def once(self, sentence: str) -> list[str]:
-        """Unless it was reported before."""
+        """The notice as a list, empty if it was given before."""
         if sentence in self._told:
             return []
         self._told.add(sentence)

@@ -24,7 +24,7 @@ class ArrivalClock:
         self._stamp_s = -math.inf
 
     def restart(self) -> None:
-        """Stamps still go forward."""
+        """Begin a new line; stamps still increase."""
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
@@ -38,5 +38,5 @@ class ArrivalClock:
         return stamps
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """``stamps`` of one."""
+        """The stamp of one reading, as ``stamps`` gives it."""
         return self.stamps((reading,), now, edge)[0]

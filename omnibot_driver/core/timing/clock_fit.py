@@ -67,7 +67,7 @@ class ClockFit:
         return self._anchor[1] + self.slope_s * (tick - self._anchor[0])
 
     def see(self, latest: Point, *, cut: bool) -> None:
-        """A read: its newest tick had come by ``latest``; whether the read ``cut`` it."""
+        """Add a read whose newest tick had arrived by ``latest``; ``cut``: only in part."""
         tick, arrival = latest
         anchor_tick, anchor_s = self._anchor
         if arrival < anchor_s + self.slope_s * (tick - anchor_tick):
@@ -80,7 +80,7 @@ class ClockFit:
             self._best, self._not_before, self._block_from = None, [], tick
 
     def not_before(self, earliest: Point) -> None:
-        """A read that had not brought this tick by then."""
+        """Add a read that had not brought this tick by then."""
         self._not_before.append(earliest)
 
     def _end_block(self, best: Point, cut: bool) -> None:
@@ -99,7 +99,7 @@ class ClockFit:
             self._lay_under()
 
     def _height(self, point: Point) -> float:
-        """Above a line through the origin."""
+        """Height of a point above a line through the origin."""
         return point[1] - self.slope_s * point[0]
 
     def _within_skew(self, slope_s: float) -> float:

@@ -47,7 +47,7 @@ WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
 
 
 class DeviceClock:
-    """``period_s``: the board's nominal tick; each brings one ImuReading."""
+    """Stamps readings by board time. ``period_s``: the nominal tick, with one ImuReading each."""
 
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s
@@ -222,7 +222,7 @@ class DeviceClock:
         return short
 
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
-        """A new tick. One that comes right behind another had waited with it to be read."""
+        """Add a tick. One right behind another had waited with it to be read."""
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
             self._single_reads = 0
@@ -234,7 +234,7 @@ class DeviceClock:
         self._seen_tick, self._seen_at = tick, now
 
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
-        """The line's time, but no jump backwards, and forwards only little by little.
+        """Stamp by the line's time, without jumps back, and forward only in small steps.
 
         ``room_s``: how far it may go forward and leave as much to each that comes after it.
         """

@@ -40,7 +40,7 @@ class FaultyLine:
 
     @property
     def counts(self) -> Counter[str]:
-        """Bytes that met a fault, by its name."""
+        """The number of bytes of each fault, by its name."""
         return Counter(lost=self.lost, flipped=self.flipped)
 
     def carry(self, data: bytes) -> bytes:

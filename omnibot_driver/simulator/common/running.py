@@ -64,7 +64,7 @@ class RunningBoard(ABC, Generic[B]):
         }
 
     def start(self) -> None:
-        """Let time pass."""
+        """Start the board's time."""
         self._thread.start()
 
     def stop(self) -> None:

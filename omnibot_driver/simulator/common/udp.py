@@ -27,7 +27,7 @@ class UdpSocket:
         self.address = self.name = f"udp://{HOST}:{bound.getsockname()[1]}"
 
     def receive(self) -> list[bytes]:
-        """All datagrams that have come; one may be empty."""
+        """Return all datagrams that have arrived; one may be empty."""
         datagrams = []
         with contextlib.suppress(BlockingIOError):
             while True:

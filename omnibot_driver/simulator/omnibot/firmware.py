@@ -177,7 +177,7 @@ class SimulatedBoard:
         self._world.gripped = Twist(vx_mps, vy_mps, yaw_rate)
 
     def let_go(self) -> None:
-        """Be left to itself again."""
+        """Release the robot that was held."""
         self._world.gripped = None
 
     @property

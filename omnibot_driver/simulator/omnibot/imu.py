@@ -24,7 +24,7 @@ def _counts(value: float) -> int:
 
 
 class Mpu6050:
-    """Turns true motion into raw counts."""
+    """Converts true motion to raw counts."""
 
     def __init__(self, settings: BoardSettings) -> None:
         self._settings = settings

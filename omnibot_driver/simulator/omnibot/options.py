@@ -15,7 +15,7 @@ from omnibot_driver.simulator.omnibot.settings import BoardSettings
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Let the parser know them all."""
+    """Add all options to the parser."""
     parser.add_argument("--imu-only", action="store_true", help="run in IMU only mode")
     parser.add_argument(
         "--frame",

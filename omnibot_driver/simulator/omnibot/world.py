@@ -68,7 +68,7 @@ class Twist(NamedTuple):
 
 
 class World:
-    """Three motors and the floor under them."""
+    """The robot's three motors and the floor under them."""
 
     def __init__(self, settings: BoardSettings) -> None:
         self._random = Random(f"slip {settings.seed}")
@@ -104,7 +104,7 @@ class World:
 
     @property
     def rim_speeds_mps(self) -> Wheels:
-        """Momentary rim speeds."""
+        """Momentary speeds of the rims."""
         a, b, c = (
             motor.speed / TICK_S * rim_m
             for motor, rim_m in zip(self._motors, self._rim_m_per_count, strict=True)

@@ -60,7 +60,7 @@ class Client:
         )
 
     def _require_alone(self) -> None:
-        """Two drivers in one namespace would both obey."""
+        """Raise ToolError if another driver has the same namespace: both would obey."""
         here = [
             name
             for name in self._here()
@@ -112,7 +112,7 @@ class Client:
         self.parameters.update(values)
 
     def apply(self, values: Mapping[str, Value]) -> None:
-        """The same for those that may change while the driver runs."""
+        """Set the parameters that may change while the driver runs."""
         changeable = {
             name: value for name, value in values.items() if not self.table.by_name[name].fixed
         }

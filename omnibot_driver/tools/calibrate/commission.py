@@ -177,7 +177,7 @@ class Walk:
         return sign
 
     def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
-        """Have it move until the answer makes a pattern."""
+        """Repeat a motion until the answer is a valid pattern."""
         while True:
             self._console.say(f"\n{what}:")
             self._drive([(JOG_S, command)], topic=topic, obeys=self._obeys)

@@ -41,7 +41,7 @@ class Console:
         self._yes, self._read = yes, read
 
     def say(self, text: str = "") -> None:
-        """A paragraph."""
+        """Print a paragraph."""
         self.rich.print(text, markup=False)
 
     def line(self, text: str) -> None:
@@ -54,7 +54,7 @@ class Console:
             raise ToolError("you said no, so nothing was moved or written")
 
     def asks(self, question: str) -> bool:
-        """Yes or no; no unless said."""
+        """Ask for yes or no; no answer means no."""
         if self._yes:
             self.say(f"{question} yes (--yes)")
             return True
@@ -107,7 +107,7 @@ class Console:
         self.say(f"{what}: done")
 
     def table(self, title: str, findings: Sequence[Finding]) -> None:
-        """Value ± uncertainty, and what the driver has now."""
+        """Print the table: value ± uncertainty, and the driver's present value."""
         table = Table(title=title, title_justify="left", pad_edge=False)
         for heading in ("", "found", "±", "unit", "now"):
             table.add_column(heading, justify="left" if heading in ("", "unit") else "right")

@@ -65,7 +65,7 @@ def save(result: Result, output: Path, table: Table) -> None:
 
 
 def draw(result: Result, output: Path, picture: Path) -> None:
-    """The picture; raises ToolError, which says that the result is saved nevertheless."""
+    """Draw the picture; a ToolError says that the result is saved nevertheless."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure

@@ -55,12 +55,12 @@ class Geometry:
 
     @property
     def turn(self) -> float:
-        """True turn over the believed one."""
+        """The ratio of the true turn to the expected one."""
         return self.wheels / self.base
 
     @property
     def turn_sigma(self) -> float:
-        """Its standard deviation."""
+        """Standard deviation of ``turn``."""
         slope = np.array([1 / self.base, -self.wheels / self.base**2, 0.0, 0.0])
         return _sigma(slope, self.covariance)
 

@@ -17,7 +17,7 @@ Row = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """``force_mps2`` and ``rate_radps``: (n, 3), in the sensor's axes."""
+    """IMU data: ``force_mps2`` and ``rate_radps`` of shape (n, 3), in the sensor's axes."""
 
     stamp_s: Column
     force_mps2: Column
@@ -61,13 +61,13 @@ class Log:
 
     @property
     def imu(self) -> Imu:
-        """Rows of a stamp, three forces and three rates."""
+        """The IMU rows: a stamp, three forces and three rates each."""
         rows = _columns(self.imu_rows, 7)
         return Imu(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
 
     @property
     def odometry(self) -> Odometry:
-        """Rows of a stamp, a pose and a twist."""
+        """The odometry rows: a stamp, a pose and a twist each."""
         rows = _columns(self.odometry_rows, 7)
         pose = rows[:, 1:4].copy()
         pose[:, 2] = np.unwrap(pose[:, 2])
@@ -82,7 +82,7 @@ class Log:
 
     @property
     def commands(self) -> Commands:
-        """Rows of a time and three values."""
+        """The command rows: a time and three values each."""
         rows = _columns(self.command_rows, 4)
         return Commands(rows[:, 0], rows[:, 1:4])
 

@@ -46,7 +46,7 @@ class Drift:
 
     @property
     def speed_mps(self) -> float:
-        """Whichever way."""
+        """The speed in any direction."""
         return math.hypot(self.vx_mps, self.vy_mps)
 
     @property

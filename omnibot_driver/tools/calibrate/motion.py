@@ -98,7 +98,7 @@ class Obedience:
     """Whether the robot roughly follows its commands, second by second."""
 
     def __init__(self, topic: Topic, parameters: Mapping[str, object]) -> None:
-        """``parameters``: the driver's, which tell what its board has."""
+        """Take the driver's ``parameters``, which show what its board has."""
         self._topic = topic
         self._look_s = SLOW_LOOK_S if "odom_rate" in parameters else LOOK_S
         self._has_scales = "linear_scale" in parameters

@@ -40,7 +40,7 @@ INTRODUCTION: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """``wanted``: m straight ahead, or rad where it ``turns``."""
+    """A drive of ``wanted`` m straight ahead, or rad where it ``turns``."""
 
     name: str
     wanted: float
@@ -164,7 +164,7 @@ def result(ratios: Sequence[Ratio], now: Mapping[str, Any]) -> Result:
 
 
 def draw(figure: "Figure", ratios: Sequence[Ratio]) -> None:
-    """True over told, drive by drive."""
+    """Draw the ratio of true to reported motion, drive by drive."""
     axes = figure.subplots()
     names = [f"{number}. {one.drive.name}" for number, one in enumerate(ratios, 1)]
     values = [one.value for one in ratios]

@@ -25,7 +25,7 @@ PHASE_POINTS: Final = 600
 
 @dataclass(frozen=True, slots=True)
 class PiGains:
-    """Scalars, or arrays of the same shape."""
+    """Gains of a PI controller: scalars, or arrays of the same shape."""
 
     kp: Array | float
     tn_s: Array | float

@@ -25,7 +25,7 @@ WORSE: Final = 1.1
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Steps of a set-point, as recorded."""
+    """Recorded steps of a set-point."""
 
     steps: list[Response]
 
@@ -157,7 +157,7 @@ def _remarks(wheel: WheelTuned, goals: Goals) -> list[str]:
 
 
 def draw(figure: "Figure", wheels: Sequence[WheelTuned]) -> None:
-    """A row for each wheel: the start at full duty is in the numbers, the steps are shown."""
+    """Draw a row for each wheel with its steps; the numbers include the start at full duty."""
     axes: Any = figure.subplots(1, len(wheels), sharey=True, squeeze=False)
     for one, wheel in zip(axes[0], wheels, strict=True):
         _draw_wheel(one, wheel)

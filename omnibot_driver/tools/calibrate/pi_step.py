@@ -43,7 +43,7 @@ Records = dict[str, list[Column]]
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Record, fit, tune, and measure what came of it."""
+    """Record, fit and tune, then measure the result."""
     goals = Goals(
         overshoot=arguments.overshoot / 100,
         band=arguments.band / 100,

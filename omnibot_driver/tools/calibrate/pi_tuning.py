@@ -98,7 +98,7 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
 
 
 def target_of(plant: Plant, goals: Goals) -> float:
-    """Whole RPM."""
+    """The target speed, in whole RPM."""
     return float(max(round(goals.destination * plant.final_rpm(100.0)), 5))
 
 

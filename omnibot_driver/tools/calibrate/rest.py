@@ -48,7 +48,7 @@ class Rest:
 
     @property
     def gravity_mps2(self) -> float:
-        """Length of the mean force."""
+        """The length of the mean specific force."""
         return float(np.linalg.norm(self.force_mps2))
 
     @property

@@ -75,7 +75,7 @@ def connect(
 
 
 class Robot(Listener):
-    """Rests and drives."""
+    """The robot, as the calibration drives it."""
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
         super().__init__(node, context, interruption)
@@ -277,7 +277,7 @@ class Robot(Listener):
             )
 
     def _require_unforgotten(self, silence_s: float) -> None:
-        """A program that was suspended moves no robot when it wakes up."""
+        """Raise ToolError after a suspension, so that an old program moves no robot."""
         if silence_s > self.parameters["cmd_vel_timeout"]:
             raise ToolError(
                 f"this program was held up for {silence_s:.1f} s, and the driver has stopped the"

@@ -137,7 +137,7 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Along the body's axis, as it lay on average."""
+    """The distance along the body's axis, at the mean heading."""
     if axis == 2:
         return np.asarray(pose[:, 2])
     heading_rad = pose[:, 2].mean() + axis * np.pi / 2

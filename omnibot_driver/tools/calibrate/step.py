@@ -27,7 +27,7 @@ RUN_UP_S: Final = 2.0
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Record, fit, tune."""
+    """Record, fit and tune."""
     if GAINS in robot.parameters:
         return pi_step.run(robot, console, arguments)
     wheels = [WHEELS.index(name) for name in _wheels(arguments.wheels)]

@@ -21,7 +21,7 @@ PREDICTED_TICKS: Final = 60
 
 
 def draw(figure: "Figure", wheels: "Sequence[WheelFound]", now: Gains, better: Gains) -> None:
-    """Left the wheels, right what is predicted."""
+    """Draw the wheels on the left and the predictions on the right."""
     halves: Any = figure.subfigures(1, 2)
     left, right = halves
     measured: Any = left.subplots(len(wheels), 1, sharex=True, squeeze=False)

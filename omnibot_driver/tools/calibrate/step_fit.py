@@ -200,7 +200,7 @@ class WheelFound:
 
 
 def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
-    """All three models; ``now``: the gains in the firmware."""
+    """Fit all three models; ``now``: the gains in the firmware."""
     whole = alike(aligned(alike(aligned(steps))))
     first, second, motor = (
         fit(model, whole) for model in (FIRST_ORDER, SECOND_ORDER, motor_model(now))

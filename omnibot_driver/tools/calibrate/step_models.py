@@ -41,7 +41,7 @@ class Model:
 
 
 def first_order(parameters: Array, time_s: Array) -> Array:
-    """exp(-L s) / (1 + T s)."""
+    """The model exp(-L s) / (1 + T s)."""
     time_constant_s, delay_s = parameters
     after_s = np.maximum(0.0, time_s - delay_s)
     return np.asarray(after_s + time_constant_s * np.expm1(-after_s / time_constant_s))

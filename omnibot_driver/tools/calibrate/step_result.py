@@ -87,7 +87,7 @@ def _traits(fit: Fit) -> Any:
 
 
 def _recorded(wheel: WheelFound) -> dict[str, Any]:
-    """Value and standard deviation of everything, for the file."""
+    """Every value with its standard deviation, for the file."""
     return {
         fit.model.title: {
             "residual_radps": round(fit.rms_radps, 4),

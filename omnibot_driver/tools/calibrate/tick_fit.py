@@ -81,7 +81,7 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 
 
 def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
-    """Its derivative."""
+    """Speed as a part of the final one: the derivative of the angle."""
     slow = np.exp(-times_s / slow_s)
     if fast_s < 1e-4 * slow_s:
         return np.asarray(1 - slow)

@@ -82,7 +82,7 @@ def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
 
 
 def _runs(ticks_s: Column, good: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -> Iterable[Column]:
-    """Ten and more regular ones in a row."""
+    """Runs of ten or more regular ticks."""
     begin = 0
     for place in range(len(ticks_s) + 1):
         if place == len(ticks_s) or not good[place]:

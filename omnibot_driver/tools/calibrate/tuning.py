@@ -55,7 +55,7 @@ class Behaviour:
 
 
 def behaviour(motor: Motor, gains: Gains) -> Behaviour:
-    """Simulated in the manual's loop."""
+    """The simulated behaviour in the manual's loop."""
     with np.errstate(over="ignore", invalid="ignore"):
         speed = answer(motor, gains, HORIZON_TICKS).speed
         feedback = Gains(0.0, gains.proportional, gains.integral)
@@ -102,7 +102,7 @@ def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
 
 
 def _cost(behaves: Behaviour, reference: Behaviour) -> Array:
-    """Infinite beyond the limits."""
+    """The cost of these gains; infinite beyond the limits."""
     cost = (
         behaves.command_error_s / reference.command_error_s
         + behaves.load_error_s / reference.load_error_s

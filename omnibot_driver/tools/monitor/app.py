@@ -44,19 +44,19 @@ class Robot(Protocol):
         """The present view."""
 
     def estop(self) -> None:
-        """Latch."""
+        """Latch the e-stop."""
 
     def release(self) -> None:
-        """Let go."""
+        """Release the e-stop."""
 
     def start(self) -> None:
         """Run."""
 
     def pause(self) -> None:
-        """Pause."""
+        """Pause or start the board."""
 
     def reset_odometry(self) -> None:
-        """Begin here."""
+        """Set the odometry to zero."""
 
 
 class Release(ModalScreen[bool]):
@@ -71,7 +71,7 @@ class Release(ModalScreen[bool]):
         )
 
     def on_key(self, event: events.Key) -> None:
-        """The answer."""
+        """Take the key as the answer."""
         event.stop()
         self.dismiss(event.key == "y")
 
@@ -137,7 +137,7 @@ class Monitor(App[None]):
             pass
 
     def refresh_view(self) -> None:
-        """Show what is known now."""
+        """Show the present view."""
         view = self._robot.view()
         if view.lacks != self._lacks:
             self._lacks = view.lacks
@@ -215,13 +215,13 @@ class Monitor(App[None]):
         self.push_screen(Release(), lambda sure: self._robot.release() if sure else None)
 
     def action_start(self) -> None:
-        """Have the board run."""
+        """Start the board."""
         self._robot.start()
 
     def action_pause(self) -> None:
-        """Have the board pause."""
+        """Pause the board."""
         self._robot.pause()
 
     def action_reset_odometry(self) -> None:
-        """Zero where the robot stands."""
+        """Set the odometry to zero."""
         self._robot.reset_odometry()

@@ -148,17 +148,17 @@ class Feed:
         self._call(self._estop, SetBool.Request(data=False), "release")
 
     def start(self) -> None:
-        """Have the board run."""
+        """Start the board."""
         self._call(self._start, Trigger.Request(), "start")
 
     def pause(self) -> None:
-        """Have the board pause."""
+        """Pause the board."""
         if self.dead_man:
             self.dead_man.stop()
         self._call(self._pause, SetBool.Request(data=True), "pause")
 
     def reset_odometry(self) -> None:
-        """Have the odometry begin here."""
+        """Set the odometry to zero."""
         self._call(self._reset_odometry, Trigger.Request(), "zero odometry")
 
     # From ROS

@@ -132,15 +132,15 @@ class Model:
         self._path: deque[tuple[float, float]] = deque(maxlen=LONGEST_PATH)
 
     def state(self, state: str, now_s: float) -> None:
-        """``~/state``."""
+        """Note a message of ``~/state``."""
         self._state, self._heard_s = state, now_s
 
     def estop(self, active: bool, now_s: float) -> None:
-        """``~/estop_active``."""
+        """Note a message of ``~/estop_active``."""
         self._estop, self._heard_s = active, now_s
 
     def imu(self, force_mps2: Vector3, rate_radps: Vector3, now_s: float) -> None:
-        """``imu/data_raw``."""
+        """Note a message of ``imu/data_raw``."""
         self._imu.arrived(now_s)
         self._force, self._rate, self._heard_s = force_mps2, rate_radps, now_s
 
@@ -151,17 +151,17 @@ class Model:
         self._pose, self._pose_s, self._measured, self._heard_s = pose, now_s, twist, now_s
 
     def commanded(self, twist: BodyTwist, now_s: float) -> None:
-        """``cmd_vel``, from whomever: it tells nothing of the driver."""
+        """Note a ``cmd_vel``, which says nothing of the driver itself."""
         self._commanded = twist, now_s
 
     def diagnosed(self, statuses: tuple[Status, ...], now_s: float) -> None:
-        """``/diagnostics`` of this driver."""
+        """Note a ``/diagnostics`` of this driver."""
         self._statuses, self._diagnosed_s, self._heard_s = statuses, now_s, now_s
 
     def view(
         self, now_s: float, *, steers: bool = False, lacks: frozenset[str] = frozenset()
     ) -> View:
-        """All that is known now."""
+        """The present view."""
         moves = self._commanded and now_s - self._commanded[1] < COMMAND_LIVES_S
         imu, odom = (
             Flow(rate.hz(now_s), rate.age_s(now_s), rate.history(now_s))

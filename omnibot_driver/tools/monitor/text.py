@@ -41,7 +41,7 @@ def number(value: float | None, places: int = 2) -> str:
 
 
 def numbers(values: Iterable[float] | None) -> str:
-    """Three of them, or three dashes."""
+    """Three numbers, or three dashes."""
     return " ".join(number(value) for value in (values or (None, None, None)))
 
 

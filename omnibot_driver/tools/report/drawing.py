@@ -30,7 +30,7 @@ def new_figure(height_in: float) -> Figure:
 
 
 def dress(axes: Axes, label: str, title: str = "") -> None:
-    """Grid, frame, words."""
+    """Add grid, frame and words to a picture."""
     axes.set_ylabel(label)
     axes.grid(True, color="#E3E6EA", linewidth=0.7)
     axes.set_axisbelow(True)
@@ -46,7 +46,7 @@ def legend(axes: Axes) -> None:
 
 
 def legend_below(axes: Axes) -> None:
-    """Out of the way of what is drawn."""
+    """Put the legend below the drawing."""
     if axes.get_legend_handles_labels()[0]:
         place = (0.5, -0.14)
         axes.legend(loc="upper center", bbox_to_anchor=place, ncols=3, frameon=False, fontsize=9)
@@ -65,7 +65,7 @@ def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
 
 
 def line(axes: Axes, times_s: Array, values: Array, colour: str, label: str, **more: float) -> None:
-    """Broken where nothing came for a while."""
+    """Draw a line that breaks at gaps."""
     times_s, values = envelope(times_s, values)
     if len(times_s) > 1:
         steps_s = np.diff(times_s)
@@ -94,6 +94,6 @@ def shade(axes: Axes, log: Log) -> None:
 
 
 def time_axis(axes: Axes, log: Log) -> None:
-    """All of the log, below."""
+    """Label the time axis for the whole log."""
     axes.set_xlim(0.0, max(log.duration_s, 1e-3))
     axes.set_xlabel("time in s")

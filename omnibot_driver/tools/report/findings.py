@@ -27,7 +27,7 @@ class Finding:
 
 
 def headline(findings: Iterable[Finding]) -> str:
-    """All of it in a line."""
+    """Summarise all findings in one line."""
     levels = [finding.level for finding in findings]
     bad, warn = levels.count(Level.BAD), levels.count(Level.WARN)
     if bad:

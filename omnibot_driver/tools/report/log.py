@@ -34,11 +34,11 @@ class Series:
 
     @property
     def finite(self) -> Mask:
-        """Rows without NaN and infinity."""
+        """The rows without NaN and infinity."""
         return np.asarray(np.isfinite(self.values).all(axis=1))
 
     def only(self, rows: Mask) -> "Series":
-        """Some of the rows."""
+        """The selected rows."""
         return Series(self.arrived_s[rows], self.stamp_s[rows], self.values[rows])
 
     def held(self, at_s: Array, timeout_s: float = COMMAND_TIMEOUT_S) -> Array:

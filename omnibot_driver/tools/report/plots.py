@@ -135,7 +135,7 @@ def inertia(log: Log) -> Figure:
 
 
 def spectra(log: Log) -> Figure:
-    """Amplitude spectral densities at rest and in motion."""
+    """Draw amplitude spectral densities at rest and in motion."""
     figure = new_figure(4.2)
     columns = figure.subplots(1, 2)
     imu = log.imu.only(log.imu.finite & np.isfinite(log.imu.stamp_s))

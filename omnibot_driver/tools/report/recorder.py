@@ -121,7 +121,7 @@ class Recorder:
         self.count = 0
 
     def hear(self, role: str, kind: str, arrived_ns: int, message: Any) -> None:
-        """A message of this type on the topic that plays this role."""
+        """Record a message of this type on the topic of this role."""
         if role in self._columns:
             column = self._columns[role]
             joints = role == "joint_states"
@@ -176,7 +176,7 @@ class Recorder:
     def _spans(
         self, role: str, start_ns: int, end_s: float, name: Callable[[Any], str]
     ) -> tuple[Span, ...]:
-        """Equal ones after each other are one."""
+        """Join equal values that follow each other to spans."""
         spans: list[Span] = []
         for arrived_ns, value in self._events[role]:
             at_s, what = (arrived_ns - start_ns) / 1e9, name(value)

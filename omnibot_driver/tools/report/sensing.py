@@ -96,7 +96,7 @@ def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Numbers that are none, stuck values, rest, turning, vibration."""
+    """Judge invalid numbers, stuck values, rest, turns and vibration."""
     broken = int((~log.imu.finite).sum())
     if broken:
         yield Finding(

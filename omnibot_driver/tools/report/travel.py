@@ -67,7 +67,7 @@ def steps(odom: Series) -> Steps:
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Numbers that are none, the way, leaps."""
+    """Judge invalid numbers, the distance and jumps."""
     broken = int((~log.odom.finite).sum())
     odom = log.odom.only(log.odom.finite)
     if broken:
