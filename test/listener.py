@@ -81,7 +81,7 @@ def link_to(url: str, listener: Listener, session: Session, **taps: Callable[[An
 
 
 def kinds(board: SimulatedBoard) -> list[str]:
-    """Of the commands that it obeyed."""
+    """The kinds of the commands that it obeyed."""
     return [command.kind for command in board.commands]
 
 

@@ -47,7 +47,7 @@ class PseudoTerminal:
         self.hang_up()
 
     def hang_up(self) -> None:
-        """Close the window."""
+        """Close the terminal's window."""
         self._hung_up.set()
         self._reader.join()
 

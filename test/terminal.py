@@ -37,7 +37,7 @@ class Terminal:
         self.path = os.ttyname(self._near)
 
     def fill(self) -> None:
-        """Until it takes no more."""
+        """Write until the terminal accepts no more."""
         fill(self._near)
 
     def read_until(self, words: bytes) -> bytes:

@@ -32,7 +32,7 @@ REMAINS: Final = (
 def test_without_the_folders_of_one_board_the_tests_of_the_rest_are_green(
     board: str, tmp_path: Path
 ) -> None:
-    """On a copy."""
+    """The folders are removed in a copy."""
     ignored = shutil.ignore_patterns(board, f"{board}.py", f"{board}_*.py", "__pycache__")
     for folder in ("omnibot_driver", "test"):
         shutil.copytree(HOME / folder, tmp_path / folder, ignore=ignored)

@@ -78,7 +78,7 @@ def test_every_profile_names_its_simulated_board(name: str) -> None:
 
 @pytest.mark.parametrize("wrong", ["martha", "", 5, True, None, ["omnibot"]])
 def test_what_is_no_board_is_refused_with_those_there_are(wrong: object) -> None:
-    """Of whatever type."""
+    """The value may have any type."""
     with pytest.raises(ParameterError, match="'board' must be "):
         boards.check_all({"board": wrong})
 

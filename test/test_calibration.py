@@ -17,7 +17,7 @@ BIAS = [0.01, -0.02, 0.03]
 
 @pytest.mark.parametrize("bias", [BIAS, [1 / 3, -1e-9, 1.0], [0.0, -0.0, 5e-324]])
 def test_what_is_saved_is_loaded_exactly(tmp_path: Path, bias: list[float]) -> None:
-    """To the last digit."""
+    """The values are equal to the last digit."""
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": bias})
     assert calibration.load(path, PARAMETERS) == {"gyro_bias": bias}
@@ -33,7 +33,7 @@ def test_no_file_yet_is_no_calibration(tmp_path: Path) -> None:
 
 
 def test_other_names_in_the_file_stay(tmp_path: Path) -> None:
-    """Also in their order."""
+    """Their order stays, too."""
     path = tmp_path / "robot.yaml"
     path.write_text("robot: no. 7\ngyro_bias: [0, 0, 0]\naccel_bias: [1, 2, 3]\n")
     assert calibration.load(path, PARAMETERS) == {
@@ -106,7 +106,7 @@ def test_a_symbolic_link_stays_one(tmp_path: Path) -> None:
 
 
 def test_a_home_that_nobody_has_is_refused() -> None:
-    """Any other is filled in."""
+    """Known home folders are filled in."""
     assert calibration.locate("~/robot.yaml") == Path.home() / "robot.yaml"
     with pytest.raises(ParameterError, match="no such home folder; give the whole path"):
         calibration.locate("~nosuchuser/robot.yaml")

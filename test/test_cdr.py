@@ -47,7 +47,7 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
 def message_name(message: object) -> str:
-    """As in "sensor_msgs/msg/Imu"."""
+    """The name in the form "sensor_msgs/msg/Imu"."""
     return f"{type(message).__module__.split('.')[0]}/msg/{type(message).__name__}"
 
 
@@ -113,7 +113,7 @@ def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
 
 @pytest.mark.parametrize("length", range(21))
 def test_no_frame_length_is_refused_at_start(length: int) -> None:
-    """So each alignment is fast."""
+    """Each alignment therefore has a fast way."""
     values = boards.check_all({"imu_frame": "i" * length or "x", "odom_frame": "o" * 7})
     assert difference(MessageSettings.from_parameters(values, omnibot.kinematics(values))) == ""
 
@@ -164,7 +164,7 @@ def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense
 
 @pytest.mark.parametrize("length", range(52))
 def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> None:
-    """Whatever a middleware lets through."""
+    """A middleware may let short messages through."""
     data = cdr.LITTLE_ENDIAN + struct.pack("<6d", *[0.1] * 6)
     with pytest.raises(CommandRefused, match="not a valid Twist"):
         cdr.twist(data[:length])

@@ -49,7 +49,7 @@ class Line:
         return self.heard
 
     def fill(self) -> None:
-        """See ``terminal``."""
+        """Fill the terminal's buffer."""
         fill(self.near)
 
     def hang_up(self) -> None:

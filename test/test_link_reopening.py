@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
-    """Closing works before, too."""
+    """The link can also be closed before."""
     listener, ours = Listener(), session()
     name = str(tmp_path / "omnibot")
     link = link_to(name, listener, ours)

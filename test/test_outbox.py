@@ -131,7 +131,7 @@ def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
 
 
 def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
-    """After it."""
+    """They leave after it."""
     outbox = Outbox()
     left: list[int] = []
     outbox.put(lambda: outbox.put(partial(left.append, 2)) or left.append(1))

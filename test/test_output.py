@@ -27,7 +27,7 @@ def taken(pipe: int) -> None:
 
 
 def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
-    """Once there is room again."""
+    """It is written once there is room again."""
     (source, pipe), (heard, room) = os.pipe(), os.pipe()
     disk = os.open("/dev/full", os.O_WRONLY)
     copier = threading.Thread(target=_copy, args=(source, disk))

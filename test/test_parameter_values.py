@@ -30,7 +30,7 @@ def name_of(parameter: object) -> str | None:
 
 @pytest.mark.parametrize("parameter", FLOATS, ids=name_of)
 def test_an_integer_will_do_for_a_float(parameter: Parameter) -> None:
-    """YAML's 1 is meant as 1.0."""
+    """YAML's 1 is taken as 1.0."""
     assert parameter.high is not None
     value = parameter.check(int(parameter.high))
     assert type(value) is float
@@ -160,7 +160,7 @@ def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
 def test_a_frame_name_is_not_empty_and_has_no_leading_slash(
     parameter: Parameter, wrong: str
 ) -> None:
-    """tf2 takes neither."""
+    """Both are refused by tf2."""
     with pytest.raises(ParameterError, match=f"'{parameter.name}'"):
         parameter.check(wrong)
 

@@ -206,7 +206,7 @@ TAPE = simulated(100)
 
 
 def test_a_recording_that_breaks_off_says_so() -> None:
-    """What was read so far counts."""
+    """The messages until then are valid."""
 
     def broken() -> Iterator[tuple[int, bytes]]:
         yield from TAPE

@@ -27,7 +27,7 @@ def test_an_adapter_that_keeps_bytes_is_told_of_with_the_remedy(tmp_path: Path) 
 
 
 def test_a_link_leads_to_the_adapter(tmp_path: Path) -> None:
-    """/dev/omnibot is one."""
+    """An example is /dev/omnibot."""
     sysfs = adapter(tmp_path / "sys", "ttyUSB7", "16\n")
     (tmp_path / "ttyUSB7").touch()
     link = tmp_path / "omnibot"
@@ -45,7 +45,7 @@ def test_a_short_timer_or_one_that_says_nothing_is_left_alone(tmp_path: Path, la
 
 @pytest.mark.parametrize("port", ["/dev/ttyACM0", "/dev/pts/3", "socket://host:1", "sim://", ""])
 def test_a_port_without_such_a_timer_is_left_alone(tmp_path: Path, port: str) -> None:
-    """Other adapters, pseudo-terminals, URLs."""
+    """Examples are other adapters, pseudo-terminals and URLs."""
     assert selfcheck.latency_advice(port, adapter(tmp_path, "ttyUSB0", "16\n")) == ""
 
 
@@ -62,7 +62,7 @@ def test_a_port_without_such_a_timer_is_left_alone(tmp_path: Path, port: str) ->
 def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
     port: str, use_sim_time: bool, warned: bool
 ) -> None:
-    """Stamps and ages would be nonsense."""
+    """Stamps and ages would be wrong."""
     text = selfcheck.clock_advice(port, use_sim_time)
     assert bool(text) == warned
     assert not warned or (port in text and "use_sim_time:=false" in text)

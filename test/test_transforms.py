@@ -12,7 +12,7 @@ from omnibot_driver.transforms import transform_publisher
 
 
 class FakeNode:
-    """Notes warnings."""
+    """A node that records warnings."""
 
     def __init__(self) -> None:
         self.warnings: list[str] = []

@@ -85,7 +85,7 @@ def step(what: str, path: str, namespace: str) -> Program:
 
 
 def ear(*namespaces: str) -> Program:
-    """Somebody who listens, once this returns."""
+    """A listening process, ready when this returns."""
     program = Program(str(HERE / "ear.py"), *namespaces)
     program.line()
     return program

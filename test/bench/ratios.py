@@ -28,7 +28,7 @@ class Figure:
 
     @property
     def row(self) -> str:
-        """As a row of the table."""
+        """The ratio as a row of the table."""
         low, high = min(self._ratios), max(self._ratios)
         if len(self._ratios) > 3:
             low, _, high = quantiles(self._ratios, n=4, method="inclusive")
@@ -43,7 +43,7 @@ class Figure:
 
 
 def table(figures: Sequence[Figure]) -> list[str]:
-    """All of them."""
+    """The whole table."""
     return [
         "| figure | ours | floor | ratio (median) | quartiles | goal |",
         "|---" * 6 + "|",

@@ -29,7 +29,7 @@ SCALES = (1, 2, 4, 8, 16)
 
 
 def say(what: str) -> None:
-    """What is under way."""
+    """Print what is measured now."""
     print(f"... {what}", file=sys.stderr, flush=True)
 
 
@@ -59,7 +59,7 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
 
 
 def main() -> int:
-    """Run, print, write."""
+    """Run the measurements, print and write them."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
         "--board", choices=("omnibot", *OTHERS), default="omnibot", help="that is measured"

@@ -85,7 +85,7 @@ class Relay:
         self.publish(estimates)
 
     def decode(self, data: bytes) -> None:
-        """Frames are proven."""
+        """Decode frames and prove them."""
         estimates: Estimates = []
         for frame in self._decoder.feed(data, time.monotonic()):
             if isinstance(frame, ImuFrame):

@@ -31,7 +31,7 @@ def by_velocity(bench: Bench, command: Triple) -> None:
 
 
 def by_wheels(bench: Bench, command: Triple) -> None:
-    """Rates that make this twist."""
+    """The wheel rates of this twist."""
     x, y, yaw = command
     along_x, along_y, turn = math.cos(math.radians(30)) * x, y / 2, 0.143 * yaw
     bench.turn_wheels(

@@ -49,7 +49,7 @@ class Line:
         self._speeds = [random.uniform(0.4, 1.6) for _ in range(3)]
 
     def run(self, seconds: float) -> list[OdometryEstimate]:
-        """What came of it, in order."""
+        """Run the drive and return the events in order."""
         begun = len(self.estimates)
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S

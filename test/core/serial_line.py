@@ -75,7 +75,7 @@ def bursts(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
 
 
 def singles(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
-    """Byte by byte."""
+    """Split the stream into single bytes."""
     for at, byte in line:
         yield at, bytes([byte])
 
@@ -90,7 +90,7 @@ def crumbs(line: list[Byte], rng: random.Random) -> Iterator[Read]:
 
 
 def blocks(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
-    """4096 bytes at once."""
+    """Split the stream into blocks of 4096 bytes."""
     for start in range(0, len(line), 4096):
         piece = line[start : start + 4096]
         yield piece[-1][0], bytes(byte for _, byte in piece)

@@ -22,7 +22,7 @@ small_moves = st.builds(Pose, st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.flo
 
 
 def displacements(frame: str) -> st.SearchStrategy[DisplacementReading]:
-    """Readings of one kind."""
+    """The displacements among readings."""
     return st.builds(
         DisplacementReading,
         dx_m=st.floats(-0.1, 0.1),

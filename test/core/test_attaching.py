@@ -199,7 +199,7 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 
 
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
-    """Goals in it must be discarded."""
+    """The change makes goals in the old frame invalid."""
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))
     counted = [odometry.alignments]

@@ -39,7 +39,7 @@ def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -
 
 
 def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) -> None:
-    """None of a hundred is refused."""
+    """None of a hundred commands is refused."""
     for _ in range(100):
         bench.drive(0.2)
         bench.run(0.05)
@@ -47,7 +47,7 @@ def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) 
 
 
 def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: AnyBench) -> None:
-    """No motion comes back by itself."""
+    """Motion does not return by itself."""
     bench.drive_on()
     assert not bench.robot.stands
     bench.run(0.6)

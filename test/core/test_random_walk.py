@@ -157,7 +157,7 @@ class Walk(Bench):
         self.board.reboot()
 
     def act_letter(self) -> None:
-        """Somebody else's."""
+        """Send a letter that the driver did not."""
         self.meddled_at = self.now
         self.board.receive(self.random.choice([b"P", b"S", b"R"]))
 

@@ -40,7 +40,7 @@ def losing_bursts(rate: float, random: Random) -> Damage:
 
 
 def gaining(rate: float, random: Random) -> Damage:
-    """Bytes of any value, anywhere."""
+    """Insert bytes of any value, anywhere."""
 
     def damage(data: bytes) -> bytes:
         out = bytearray()

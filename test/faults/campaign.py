@@ -134,7 +134,7 @@ class Campaign(Outcome):
             print("the log ends:", *rig.driver.lines[-20:], sep="\n    ", flush=True)
 
     def judge(self, rig: Rig, *, damaged_bytes: bool = True) -> None:
-        """What one rig published."""
+        """Judge the messages that one rig published."""
         rig.judge_stream(damaged_bytes)
         self.published += rig.findings.published
         self.wrong += rig.findings.wrong
@@ -155,7 +155,7 @@ class Campaign(Outcome):
         self._one_life(GoalRig, lambda _: GOALS, damaged_bytes=False)
 
     def ending(self, name: str) -> None:
-        """What ends a driver."""
+        """Run one way to end a driver."""
         ending = ENDINGS[name]
         self._ends(f"the driver ends: {name}", ending, before=ending.before)
 
@@ -236,7 +236,7 @@ class Campaign(Outcome):
             self.judge(rig)
 
     def soak(self, minutes: float) -> None:
-        """Random walks in one driver's life."""
+        """Run random walks within one driver's life."""
         row = self.row(f"soak: random walks of {SOAK_STEPS} faults")
         end, seed = time.monotonic() + 60 * minutes, 0
         with self.rig() as rig:
@@ -316,7 +316,7 @@ def _walk(seed: int, steps: int, rig: Rig) -> None:
 
 
 def main() -> int:
-    """Run, print, write."""
+    """Run the campaign, print and write it."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
         "--board", choices=BOARDS, default="omnibot", help="that this is measured on"

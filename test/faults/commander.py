@@ -20,7 +20,7 @@ class Hand(Protocol):
     """Any sender."""
 
     def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
-        """Command about this."""
+        """Send commands for about this time."""
 
     def leave(self) -> None:
         """Let go; whatever was commanded is to end."""

@@ -67,7 +67,7 @@ def _ends(by: signal.Signals, exit_code: int, rig: Rig) -> None:
 
 
 def is_interrupted(rig: Rig) -> None:
-    """Ctrl-C."""
+    """Press ctrl-C."""
     _ends(signal.SIGINT, 0, rig)
 
 

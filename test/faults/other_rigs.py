@@ -25,7 +25,7 @@ class NetworkRig(Rig):
 
     @property
     def server(self) -> Server:
-        """What is plugged in."""
+        """Start the server that the driver connects to."""
         assert isinstance(self._terminal, Server)
         return self._terminal
 

@@ -44,7 +44,7 @@ ENDS_WITHIN_S: Final = 2.0
 
 @dataclass(slots=True)
 class Findings:
-    """What went wrong; empty is good."""
+    """The complaints; empty if all went well."""
 
     complaints: list[str] = field(default_factory=list)
     stood_after_s: list[float] = field(default_factory=list)
@@ -278,7 +278,7 @@ class Rig:
         self.findings.published += len(imu) + len(odom)
 
     def cost(self) -> tuple[int, int]:
-        """Open descriptors, and resident kB."""
+        """Open descriptors, and resident memory in kB."""
         folder = Path(f"/proc/{self.driver.process.pid}")
         status = (folder / "status").read_text()
         kilobytes = int(status.split("VmRSS:")[1].split()[0])

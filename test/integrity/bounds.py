@@ -86,7 +86,7 @@ def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
 
 
 def add(total: Scores, more: Scores) -> None:
-    """Into the total."""
+    """Add these counts to the total."""
     for key, score in more.items():
         total.setdefault(key, Score()).__iadd__(score)
 

@@ -32,7 +32,7 @@ SEGMENT_BYTES = (300, 6000)
 
 
 def delay_s(random: Random, now: float = 0.0) -> float:
-    """How late one wake-up is."""
+    """Delay of one wake-up, in s."""
     late_s = random.expovariate(1.0 / JITTER_S)
     kind = random.random()
     if kind < LATE_SHARE:
@@ -49,7 +49,7 @@ class Turns:
         self._late_s, self._steady_s, self._until_s = late_s, 0.0, 0.0
 
     def delay_s(self, random: Random, now: float) -> float:
-        """How late one wake-up is."""
+        """Delay of one wake-up, in s."""
         late_s = random.expovariate(1.0 / JITTER_S)
         kind = random.random()
         if kind < BEHIND_SHARE:
@@ -91,7 +91,7 @@ def few_bytes_straddling(received: Received, random: Random) -> Chunks:
 
 
 def all_at_once(pieces: Chunker) -> Chunker:
-    """All that is there, however late."""
+    """Read everything that is there, however late."""
     return lambda received, random: read(pieces(received, random), random, lambda: 1 << 30)
 
 

@@ -153,7 +153,7 @@ def ftdi(received: Received, random: Random) -> Chunks:
 
 
 def blocks(received: Received, random: Random) -> Chunks:
-    """4096 bytes at a time."""
+    """Read 4096 bytes at a time."""
     length = len(received.data)
     ends = [*range(4096, length, 4096), length]
     return [(end, received.times_s[end - 1]) for end in ends]

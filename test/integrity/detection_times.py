@@ -73,7 +73,7 @@ def row(
 
 
 def main() -> None:
-    """All rows."""
+    """Print all rows."""
     print("| the robot | commanded | stopped after | with `delta_period: 0.1` |\n|---|---|---|---|")
     row(
         "the board's switch stands on position, 3 m from its origin",

@@ -20,7 +20,7 @@ or within the read itself."""
 
 @dataclass(slots=True)
 class Score:
-    """Counts; they add up."""
+    """Counts that can be added."""
 
     out: int = 0
     wrong: int = 0

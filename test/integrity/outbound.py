@@ -45,7 +45,7 @@ class Bound:
     overdue: bool = True
 
     def missed(self, score: Score) -> list[str]:
-        """What is beyond it."""
+        """The figures beyond the bound."""
         found = {
             "stray motion": score.strayed,
             "false letters": score.false_letters,
@@ -186,7 +186,7 @@ def _others(scores: Scores) -> Iterator[str]:
 
 
 def main() -> int:
-    """Run, print, write."""
+    """Run the trials, print and write the figures."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
         "--board", choices=("omnibot", *OTHERWISE), default="omnibot", help="that is measured"

@@ -142,7 +142,7 @@ class Judge:
         return ""
 
     def no_setpoint(self, at_s: float) -> None:
-        """What was in force ends."""
+        """End the set-point in force."""
         score = self.score
         if self._uncommanded_from_s is not None:
             lasted_s = at_s - self._uncommanded_from_s

@@ -28,7 +28,7 @@ class Line(Protocol):
     whole: int
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """What arrives of a write."""
+        """The bytes that arrive of a write."""
 
 
 Fault = Callable[[Random], Line]
@@ -42,7 +42,7 @@ class SingleFaults:
         self._rate, self._change, self._random = rate, change, random
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """What arrives of a write."""
+        """The bytes that arrive of a write."""
         arrivals: list[Arrival] = []
         at = 0
         while at < len(data):
@@ -62,7 +62,7 @@ class NoFaults:
     whole = 1 << 62
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """All of it."""
+        """The line without faults: all bytes arrive."""
         return [(byte, at, at) for at, byte in enumerate(data)]
 
 
@@ -74,7 +74,7 @@ class Bursts:
         self._rate, self._longest, self._random = rate, longest, random
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """What arrives of a write."""
+        """The bytes that arrive of a write."""
         arrivals: list[Arrival] = []
         for at, byte in enumerate(data):
             if self.whole:

@@ -86,7 +86,7 @@ def one(
 
 
 def add(total: Scores, more: Scores) -> None:
-    """Into the total."""
+    """Add these counts to the total."""
     for key, score in more.items():
         total.setdefault(key, Score()).__iadd__(score)
 

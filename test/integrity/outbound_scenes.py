@@ -172,7 +172,7 @@ def switch(random: Random) -> Scene:
 
 
 def pause(random: Random) -> Scene:
-    """``~/pause``, while it drives or stands."""
+    """A scene with ``~/pause`` while the robot drives or stands."""
     wishes, last_s = _leg(random) if random.random() < 0.7 else ([], FROM_S)
     asked_s = last_s + random.choice((0.005, 0.03, 0.3))
     wishes.append(Command(asked_s, _request(Request.PAUSE)))

@@ -94,7 +94,7 @@ def table(ours: Scores, plain: Scores) -> tuple[list[str], bool]:
 
 
 def main() -> int:
-    """Run, print, write."""
+    """Run the streams, print and write the figures."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--seconds", type=float, default=60.0)
     arguments.add_argument(

@@ -60,7 +60,7 @@ def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", [*ENDED, "drive 20"])
 def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
-    """Every receiver, one script, some trials."""
+    """It tries every receiver with one script."""
     scores, _ = one(0.05, (scene, 0), LOSSES)
     for fault in LOSSES:
         score = Score()
@@ -176,7 +176,7 @@ def test_a_write_is_read_by_the_layout_alone() -> None:
 
 
 def test_sums_of_one_scene_and_of_all_that_end() -> None:
-    """What only drives is apart."""
+    """Scenes that only drive are counted apart."""
     scores = {
         ("a", "r", "timeout"): Score(trials=1),
         ("a", "r", "kill"): Score(trials=2),

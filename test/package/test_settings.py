@@ -119,7 +119,7 @@ def test_nav2_keeps_to_the_drivers_limits() -> None:
 
 
 def test_nav2_knows_that_the_robot_moves_sideways() -> None:
-    """Localisation, control and thresholds alike."""
+    """Localisation, control and thresholds allow it."""
     file = load("nav2_omnibot.yaml")
     controller = file["controller_server"]["ros__parameters"]
     assert controller["FollowPath"]["motion_model"] == "Omni"

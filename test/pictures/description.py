@@ -111,7 +111,7 @@ def close(centre: Array, reach: Any, origins: Array, directions: Array) -> NDArr
 
 @dataclass
 class Link:
-    """Solids that are near each other."""
+    """A group of solids near each other."""
 
     solids: list[Solid]
 

@@ -53,7 +53,7 @@ def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
 
 
 def test_the_boards_are_the_packages_beside_what_they_share() -> None:
-    """Nothing lists them a second time."""
+    """They are not listed a second time."""
     folder = Path(simulators.__file__).parent
     packages = {path.parent.name for path in folder.glob("*/__init__.py")}
     assert {*boards(), "common"} == packages

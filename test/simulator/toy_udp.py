@@ -15,7 +15,7 @@ CHANNELS = (Channel(datagrams=True),)
 
 
 class ToyServer:
-    """``requests``: all that came, in order."""
+    """A server that records ``requests``, in order."""
 
     channels, tick_s = CHANNELS, 0.01
 

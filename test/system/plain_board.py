@@ -43,7 +43,7 @@ PARAMETERS: Final = table(
 
 
 class PlainBoard(OmniBot):
-    """Deaf to the IMU."""
+    """A board without an IMU."""
 
     traits = TRAITS
 
@@ -59,7 +59,7 @@ class PlainBoard(OmniBot):
 
 @dataclass(frozen=True, slots=True)
 class Heard:
-    """What only this board measures."""
+    """A reading that only this board has."""
 
     times: int
 

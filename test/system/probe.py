@@ -15,7 +15,7 @@ from std_msgs.msg import String
 
 
 class Probe:
-    """Subscribes, publishes and calls."""
+    """A ROS node that subscribes, publishes and calls."""
 
     def __init__(self, namespace: str) -> None:
         self.node = Node("probe", namespace=namespace)

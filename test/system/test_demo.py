@@ -241,7 +241,7 @@ def test_every_board_has_a_demo(name: str) -> None:
 def test_a_board_that_is_not_built_is_one_sentence_and_code_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Before anything starts."""
+    """The message comes before anything starts."""
     assert main(["--board", "zeppelin"]) == 2
     told = capsys.readouterr().err
     assert told.startswith("demo: parameter 'board' must be one of omnibot")

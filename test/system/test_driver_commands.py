@@ -74,7 +74,7 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
 
 
 def test_a_zero_twist_is_the_stop_frame(probe: Probe, board: PtyBoard) -> None:
-    """Never zeros in mode 1."""
+    """It is never sent as zeros in mode 1."""
     commands = probe.publisher(Twist, "cmd_vel")
     commands.publish(Twist())
     assert board.wait_for(lambda b: newest(b).kind == "wheels", 20.0)
@@ -154,7 +154,7 @@ def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoar
 def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """geometry_msgs/TwistStamped on the same topic."""
+    """The topic then has the type geometry_msgs/TwistStamped."""
     stamps = {"enable_stamped_cmd_vel": True, "cmd_vel_timeout": 10.0}
     probe: Probe = probe_of(start_driver(board.path, **stamps))
     probe.wait_for_state("nominal")

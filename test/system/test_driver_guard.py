@@ -202,7 +202,7 @@ def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
 def test_every_connection_has_one_guard_and_no_process_stays_behind(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """Over reconnections, and after the end."""
+    """This holds over reconnections and after the end."""
     link = tmp_path / "omnibot"
     driver: Driver = start_driver(str(link), reconnect_interval=0.05)
     probe: Probe = probe_of(driver)
@@ -232,7 +232,7 @@ def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: P
 
 
 def test_the_guard_can_be_done_without(board: PtyBoard, start_driver: Start) -> None:
-    """``guard: false``, for a debugger's sake."""
+    """A debugger needs ``guard: false``."""
     driver: Driver = start_driver(board.path, guard=False)
     driver.wait_for_line("state: nominal")
     assert driver.guards() == []

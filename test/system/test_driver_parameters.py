@@ -41,7 +41,7 @@ Start = Callable[..., Any]
 def test_wrong_parameters_end_the_start_with_a_sentence(
     start_driver: Start, parameters: dict[str, object], message: str
 ) -> None:
-    """Exit code 2, no traceback."""
+    """The exit code is 2, without a traceback."""
     driver: Driver = start_driver("/dev/null", **parameters)
     driver.wait_for_line(message)
     assert driver.end() == 2
@@ -72,7 +72,7 @@ def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -
 )
 @pytest.mark.parametrize("before", [[], ["--ros-args"]])
 def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list[str]) -> None:
-    """Alike on both sides of ``--ros-args``."""
+    """The message is the same on both sides of ``--ros-args``."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *before, *words]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
     assert ended.returncode == 2

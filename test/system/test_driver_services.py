@@ -30,7 +30,7 @@ def still(board: SimulatedBoard) -> bool:
 
 
 def drive(probe: Probe, board: PtyBoard) -> None:
-    """Forward, until the robot moves."""
+    """Drive forward until the robot moves."""
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.x = 0.3

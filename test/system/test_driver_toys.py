@@ -105,7 +105,7 @@ def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: To
 def test_the_estop_stops_a_toy_until_it_is_released(
     start_driver: Start, probe_of: Start, toy: Toy
 ) -> None:
-    """Although commands go on."""
+    """Commands continue meanwhile."""
     probe: Probe = probe_of(start_toy(start_driver, toy))
     probe.wait_for_state("nominal")
     with driven(probe, toy):
@@ -132,7 +132,7 @@ def test_whatever_ends_the_driver_stops_a_toy(
 
 
 def test_each_toy_runs_inside_the_driver_too(start_driver: Start, probe_of: Start) -> None:
-    """``sim://`` is the board's own simulator."""
+    """The port ``sim://`` is the board's own simulator."""
     for name in ROBOTS:
         driver = start_driver("sim://", before=TOYS, board=name)
         probe: Probe = probe_of(driver)
@@ -158,7 +158,7 @@ def test_wheels_have_the_boards_number_and_names(
 def test_the_raw_bytes_of_each_line_have_a_topic(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """By the names of the lines."""
+    """The topics have the names of the lines."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     probe: Probe = probe_of(start_toy(start_driver, toy, publish_raw=True))
     told = probe.listen(UInt8MultiArray, "omnibot_driver/raw_rx/sense")
@@ -192,7 +192,7 @@ def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
 
 
 def test_a_host_that_does_not_answer_is_told(start_driver: Start) -> None:
-    """Nothing listens there."""
+    """No server listens at that address."""
     driver = start_driver("udp://127.0.0.1:9", before=TOYS, board="request_board")
     driver.wait_for_line("no data from the board for 1.5 s")
 

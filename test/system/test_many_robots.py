@@ -28,7 +28,7 @@ class Robot:
     estop_active: list[Any]
 
     def heard(self) -> bool:
-        """Something on every topic."""
+        """Whether each topic has had a message."""
         return bool(self.imu and self.odom and self.estop_active)
 
     @property
@@ -106,7 +106,7 @@ def test_each_has_an_emergency_stop_of_its_own(fleet: list[Robot]) -> None:
 
 
 def test_two_of_the_same_name_are_told_of_each_other() -> None:
-    """Whichever came first: both would drive."""
+    """The order of their starts does not matter."""
     with Driver(port="sim://") as first, Driver(port="sim://", namespace=first.namespace) as second:
         for driver in (first, second):
             driver.wait_for_line(f"another node has the name /{first.namespace}/omnibot_driver,")

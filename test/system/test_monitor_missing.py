@@ -73,7 +73,7 @@ def sentence(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 def test_without_a_driver_one_sentence_says_how_to_start_one(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With the domain that was searched."""
+    """The message names the domain that was searched."""
     domain = str((int(os.environ["ROS_DOMAIN_ID"]) + 50) % 101 + 1)
     monkeypatch.setenv("ROS_DOMAIN_ID", domain)
     said = sentence(capsys, "--once", "--timeout", "1")

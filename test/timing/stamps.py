@@ -127,7 +127,7 @@ def busy_readers(seconds: float, seeds: int) -> None:
 
 
 def main() -> None:
-    """Run, print, write."""
+    """Run the streams, print and write the figures."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--seconds", type=float, default=30.0)
     arguments.add_argument("--seeds", type=int, default=30)

@@ -45,7 +45,7 @@ class Rig:
         return self.folder / "robot.yaml"
 
     def calibrate(self, *words: str, answer: Answer = yes) -> int:
-        """Its exit code."""
+        """The exit code of a calibration."""
 
         def read(question: str) -> str:
             self.questions.append(question)
@@ -55,7 +55,7 @@ class Rig:
         return main([*words, *files, "--namespace", self.driver.namespace], read)
 
     def written(self) -> dict[str, Any]:
-        """What is in the file."""
+        """The content of the written file."""
         content: dict[str, Any] = yaml.safe_load(self.output.read_text())
         return content
 

@@ -71,7 +71,7 @@ def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
 def test_what_ros_cannot_take_is_a_sentence(
     words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """No traceback."""
+    """There is no traceback."""
     assert main(["imu", "--plot", str(tmp_path), *words]) == 1
     assert sentence in capsys.readouterr().err
 

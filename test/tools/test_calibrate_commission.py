@@ -31,7 +31,7 @@ def _quickly(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def told(capsys: pytest.CaptureFixture[str]) -> str:
-    """All of it, in one line."""
+    """The whole output in one line."""
     return " ".join(capsys.readouterr().out.split())
 
 
@@ -125,7 +125,7 @@ def test_a_single_reversed_wheel_is_nothing_that_a_parameter_mends() -> None:
 
 
 def test_who_keeps_answering_what_cannot_be_is_sent_to_read_on() -> None:
-    """After three times."""
+    """The tool gives up after three times."""
     with pytest.raises(ToolError, match=r"wheel B was seen to turn.*docs/commissioning.md"):
         walk("000", "+++", "0-0")
 

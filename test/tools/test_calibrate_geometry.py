@@ -165,7 +165,7 @@ def test_sizes_that_were_found_are_those_believed_next_time() -> None:
 def test_planted_sizes_are_found_through_a_driver_and_applied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Lines and turns in real time."""
+    """The drives are in real time."""
     quick = {"max_angular_speed": 1.5}
     planted: dict[str, Any] = {"wheel_radius_scale": (1.04,) * 3, "base_radius_scale": 0.97}
     with rig(tmp_path, quick, **planted) as robot:

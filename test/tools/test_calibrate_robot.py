@@ -75,7 +75,7 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
 def test_what_happens_on_the_way_ends_it_at_rest(
     robot: Robot, rigged: Rig, what: str, sentence: str
 ) -> None:
-    """Tripped, rebooted, commanded by others, interrupted."""
+    """It is tripped, rebooted, commanded by others, or interrupted."""
     node = robot._node
     estop = node.create_publisher(Bool, "estop", 10)
     other = node.create_publisher(Twist, "cmd_vel", 1)
@@ -168,7 +168,7 @@ def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
 def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
     robot: Robot, rigged: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Beside whatever else is wrong."""
+    """The message adds this to the original error."""
     monkeypatch.setattr(robot_module, "STANDING", -1.0)
     monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)
     with pytest.raises(

@@ -162,7 +162,7 @@ def test_who_looks_elsewhere_does_not_steer() -> None:
 
 
 def test_nothing_in_a_message_is_markup() -> None:
-    """Brackets of a sentence are brackets."""
+    """Brackets in a sentence are shown as they are."""
     robot = FakeRobot()
     robot.shown = view(said="[/bold] [red", driver="/[b]")
 

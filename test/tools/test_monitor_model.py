@@ -146,7 +146,7 @@ def test_diagnostics_are_missing_where_somebody_publishes_them() -> None:
 
 
 def test_a_level_that_is_none_counts_as_an_error() -> None:
-    """Anybody may publish anything on /diagnostics."""
+    """Any node may publish anything on /diagnostics."""
     assert [level(byte) for byte in (0, 1, 2, 3, 4, 255)] == [
         *(Level.OK, Level.WARN, Level.ERROR, Level.STALE),
         *(Level.ERROR, Level.ERROR),

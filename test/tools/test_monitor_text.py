@@ -76,7 +76,7 @@ def test_what_needs_somebody_stands_first() -> None:
 
 
 def test_what_has_happened_is_counted() -> None:
-    """Zeros are not worth a word."""
+    """Zero counts are not shown."""
     stream = Status("Stream", Level.OK, "complete", {"Framing faults": "3", "Sequence gaps": "0"})
     assert text.counts(view(statuses=(stream,))) == "since its start: framing faults 3"
     assert text.counts(view()) == "since its start: nothing lost, nothing refused"
@@ -122,7 +122,7 @@ def test_the_picture_of_a_square_is_a_square() -> None:
     [(0.0, "→"), (math.pi / 2, "↑"), (math.pi, "←"), (-math.pi / 4, "↘"), (20 * math.pi, "→")],
 )
 def test_the_robot_points_where_it_looks(yaw_rad: float, arrow: str) -> None:
-    """x to the right, y up."""
+    """In the picture x is to the right and y up."""
     assert any(arrow in row for row in draw_path([], 10, 5, Pose(1.0, 1.0, yaw_rad)).rows)
 
 

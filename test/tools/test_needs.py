@@ -21,7 +21,7 @@ def test_a_library_that_is_there_is_imported() -> None:
 
 
 def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
-    """Its own name, not the submodule's."""
+    """The message has the library's own name, not the submodule's."""
     with pytest.raises(ToolError) as refusal:
         need("no_such_library.part")
     assert str(refusal.value) == (

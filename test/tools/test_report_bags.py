@@ -79,7 +79,7 @@ def test_a_single_file_of_a_bag_is_enough(
 
 
 def test_stamped_commands_are_commands(drive: Drive, tmp_path: Path) -> None:
-    """TwistStamped instead of Twist."""
+    """The type is TwistStamped instead of Twist."""
     drive.stamped_commands = True
     log = log_of(write(tmp_path / "bag", [drive]))
     np.testing.assert_array_equal(log.cmd_vel.values, drive.cmd_vel.values)
@@ -87,7 +87,7 @@ def test_stamped_commands_are_commands(drive: Drive, tmp_path: Path) -> None:
 
 
 def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) -> None:
-    """Then only its topics are read."""
+    """Only the topics of the chosen robot are read."""
     one, other = Drive(SECONDS, "/robot1"), Drive(SECONDS, "/fleet/robot2", seed=2)
     bag = write(tmp_path / "bag", [one, other])
     with pytest.raises(ToolError, match=r"--namespace, of /fleet/robot2, /robot1"):
@@ -131,7 +131,7 @@ def test_what_is_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Topics, but no message."""
+    """It has topics, but no message."""
     with Writer(tmp_path / "bag", version=9) as writer:
         writer.add_connection("/imu/data_raw", "sensor_msgs/msg/Imu", typestore=TYPES)
     assert "is empty" in refused(tmp_path / "bag", capsys)

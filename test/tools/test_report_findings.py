@@ -30,7 +30,7 @@ def test_a_healthy_drive_is_called_healthy(drive: Drive) -> None:
 
 
 def test_a_gap_is_told_with_its_place_and_what_is_missing(drive: Drive) -> None:
-    """15 readings from 6 s on."""
+    """The stream lacks 15 readings from 6 s on."""
     drive.imu.drop(6.0, 6.15)
     (gap,) = troubles(drive)
     assert gap.level is Level.WARN
@@ -87,7 +87,7 @@ def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
 
 
 def test_uneven_stamps_are_noticed(drive: Drive) -> None:
-    """Stamps that are arrival times, say."""
+    """An example is stamps that are arrival times."""
     drive.imu.stamp_s = drive.imu.stamp_s + np.random.default_rng(2).uniform(0, 4e-3, 2000)
     (jitter,) = troubles(drive)
     assert jitter.subject == "Timing"
@@ -95,7 +95,7 @@ def test_uneven_stamps_are_noticed(drive: Drive) -> None:
 
 
 def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) -> None:
-    """Two states, one cable."""
+    """The two states have one cause, the cable."""
     drive.states += [(8.0, "disconnected"), (8.5, "connecting"), (9.0, "nominal")]
     for topic in (drive.imu, drive.odom, drive.joints):
         topic.drop(8.0, 9.0)
@@ -115,7 +115,7 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
 
 
 def test_a_wrong_rate_is_no_gap_but_a_wrong_rate(drive: Drive) -> None:
-    """Every other reading."""
+    """Every other reading is missing throughout."""
     for name in ("stamp_s", "values", "late_s"):
         setattr(drive.imu, name, getattr(drive.imu, name)[::2])
     found = [finding.text for finding in troubles(drive) if finding.subject in ("Timing", "Gaps")]
@@ -142,7 +142,7 @@ def test_the_rate_that_a_stream_should_have_is_the_one_that_its_driver_says(
 
 
 def test_stamps_that_go_back_are_wrong(drive: Drive) -> None:
-    """Time does not."""
+    """Stamps must increase."""
     drive.odom.stamp_s[100:] -= 0.2
     drive.odom.late_s[100:] += 0.2
     assert said(drive, "Timing", "1 stamp of odom").level is Level.BAD
@@ -157,7 +157,7 @@ def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
 
 
 def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
-    """Half a minute, for every topic."""
+    """The offset is half a minute, for every topic."""
     drive.imu.late_s = drive.imu.late_s + 30.0
     (clock,) = troubles(drive)
     assert "30 s after its stamp" in clock.text
@@ -221,7 +221,7 @@ def test_topics_that_are_missing_are_named(drive: Drive) -> None:
 
 
 def test_stamps_of_zero_are_told(drive: Drive) -> None:
-    """Somebody else publishes."""
+    """They come from another publisher."""
     log = drive.log()
     log.imu.stamp_s[:3] = np.nan
     assert any("3 messages of imu/data_raw without a stamp" in item.text for item in judge(log))

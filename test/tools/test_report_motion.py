@@ -35,7 +35,7 @@ def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
 
 
 def test_a_tilt_at_rest_is_told(drive: Drive) -> None:
-    """Ten degrees."""
+    """The tilt is ten degrees."""
     tilt = np.radians(10.0)
     force = drive.imu.values[:, 3:].copy()
     drive.imu.values[:, 3] = force[:, 0] * np.cos(tilt) + force[:, 2] * np.sin(tilt)
@@ -44,7 +44,7 @@ def test_a_tilt_at_rest_is_told(drive: Drive) -> None:
 
 
 def test_a_biased_gyro_is_told_with_the_service_that_mends_it(drive: Drive) -> None:
-    """0.05 rad/s about y."""
+    """The bias is 0.05 rad/s about y."""
     drive.imu.values[:, 1] += 0.05
     (bias,) = troubles(drive)
     assert "+0.05" in bias.text
@@ -96,7 +96,7 @@ def test_a_sensor_that_stands_upright_is_noted(drive: Drive) -> None:
 
 
 def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
-    """20 Hz while driving."""
+    """The robot shakes at 20 Hz while driving."""
     times_s = drive.imu.stamp_s
     on = (times_s > 5.0) & (times_s < 15.0)
     drive.imu.values[:, 3] += 6.0 * np.sin(2 * np.pi * 20.0 * times_s) * on
@@ -122,7 +122,7 @@ def test_a_robot_that_is_too_slow_is_told_with_the_scale_to_set(drive: Drive) ->
 
 
 def test_a_robot_that_goes_the_wrong_way_is_told_with_the_signs(drive: Drive) -> None:
-    """Yaw alone."""
+    """The sign of yaw is wrong."""
     drive.odom.values[:, 2] *= -1.0
     drive.odom.values[:, 5] *= -1.0
     assert "axis_signs" in said(drive, "Commands", "followed").advice
@@ -151,7 +151,7 @@ def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:
 
 
 def test_an_estop_is_noted_and_what_it_stops_is_no_trouble(drive: Drive) -> None:
-    """Commands go on; the robot stands."""
+    """Commands continue and the robot stands."""
     drive.estops += [(10.0, True), (19.0, False)]
     rows = drive.odom.stamp_s > 10.1
     drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]

@@ -48,7 +48,7 @@ def test_every_picture_lies_beside_the_page(folder: Path) -> None:
 
 
 def test_a_name_cannot_become_markup(folder: Path) -> None:
-    """Files may be called anything."""
+    """Files may have any name."""
     text = (folder / "report.html").read_text()
     assert "&lt;a &amp; b&gt;" in text
     assert "<a & b>" not in text

@@ -19,5 +19,5 @@ def said(drive: Drive, subject: str, *words: str) -> Finding:
 
 
 def troubles(drive: Drive) -> list[Finding]:
-    """What is worse than a note."""
+    """The findings that are worse than a note."""
     return [finding for finding in judge(drive.log()) if finding.level > Level.NOTE]

@@ -21,7 +21,7 @@ PATIENCE_S = 20.0
 
 
 class Host:
-    """Two ports, one above the other."""
+    """A host with two ports, one above the other."""
 
     def __init__(self) -> None:
         while True:

@@ -142,7 +142,7 @@ def test_what_comes_after_a_stop_begins_at_rest() -> None:
 
 
 def test_wheels_are_not_ramped() -> None:
-    """Acceleration limits are the base's."""
+    """Acceleration limits apply to the base only."""
     bench = running(limits=GENTLE)
     start = len(bench.written)
     bench.turn_wheels(10.0, 0.0, 0.0)

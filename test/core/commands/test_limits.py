@@ -112,7 +112,7 @@ def test_the_linear_speed_is_limited_as_a_vector_and_not_by_axis() -> None:
 
 
 def test_wheels_are_limited_by_the_fastest() -> None:
-    """34 rad/s halves all three."""
+    """A command of 34 rad/s halves all three."""
     limited = SpeedLimits(wheel_radps=17.0).wheels((34.0, -17.0, 1.0))
     assert limited == pytest.approx((17.0, -8.5, 0.5))
 
@@ -163,7 +163,7 @@ def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
 
 
 def test_an_acceleration_of_zero_is_no_limit() -> None:
-    """0 switches it off."""
+    """The value 0 switches the limit off."""
     wanted = BodyTwist(0.5, -0.5, 0.5)
     assert SpeedLimits().approach(BodyTwist(-0.5, 0.5, -0.5), wanted, 0.0) == wanted
 

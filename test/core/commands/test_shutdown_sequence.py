@@ -26,7 +26,7 @@ def test_the_farewell_stops_the_robot_whatever_else_it_does(
 
 
 def test_a_farewell_to_a_paused_board_does_not_unpause_it() -> None:
-    """P is a toggle."""
+    """The letter P is a toggle, so it is not sent."""
     bench = paused()
     assert bench.last_words("pause") == 3 * STOP
 
@@ -96,7 +96,7 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
 
 
 def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
-    """Its motors are off."""
+    """The motors of a paused board are off."""
     bench = paused()
     left(bench)
     assert not bench.session.fall_silent(bench.now)

@@ -41,7 +41,7 @@ def proof() -> StopProof:
 
 
 def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof) -> None:
-    """0.12 s; two are not."""
+    """They take 0.12 s; two displacements are not enough."""
     assert not shown(proof, 0.0, 0.0)
     assert shown(proof, 0.0, 0.0, 0.0)
 

@@ -45,7 +45,7 @@ def test_about_a_wheel_that_stands() -> None:
 def test_wheels_and_back_is_the_feasible_part(
     robot: DifferentialKinematics, twist: BodyTwist
 ) -> None:
-    """Sideways it cannot."""
+    """The base cannot move sideways."""
     back = robot.body_twist(robot.wheel_rates(twist))
     assert triple(back) == pytest.approx(triple(robot.feasible(twist)), rel=1e-9, abs=1e-9)
     assert robot.feasible(twist).vy_mps == 0.0
@@ -55,7 +55,7 @@ def test_wheels_and_back_is_the_feasible_part(
 def test_body_and_back_is_the_same_wheels(
     robot: DifferentialKinematics, wheel_rates: tuple[float, float]
 ) -> None:
-    """Two wheels, two degrees of freedom."""
+    """Two wheels have two degrees of freedom."""
     back = robot.wheel_rates(robot.body_twist(wheel_rates))
     assert back == pytest.approx(wheel_rates, rel=1e-9, abs=1e-7)
 

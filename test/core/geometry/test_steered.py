@@ -38,7 +38,7 @@ def triple(twist: BodyTwist) -> tuple[float, float, float]:
 def test_the_wheel_is_steered_across_the_line_to_the_centre_of_rotation(
     twist: tuple[float, float, float], degrees: float
 ) -> None:
-    """Worked out with a pencil."""
+    """The expected angles are computed by hand."""
     assert math.degrees(ROBOT.steering_rad(BodyTwist(*twist))) == pytest.approx(degrees)
 
 
@@ -57,7 +57,7 @@ def test_the_driven_wheels_run_on_circles_about_the_same_centre() -> None:
 
 @given(sizes, twists)
 def test_wheels_and_back_is_the_feasible_part(robot: SteeredKinematics, twist: BodyTwist) -> None:
-    """Sideways it cannot."""
+    """The base cannot move sideways."""
     back = robot.body_twist(robot.wheel_rates(twist))
     assert triple(back) == pytest.approx(triple(robot.feasible(twist)), rel=1e-9, abs=1e-9)
 

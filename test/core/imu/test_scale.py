@@ -28,7 +28,7 @@ def test_one_g_is_the_datasheets_counts(range_g: int, counts: int) -> None:
 def test_ten_degrees_a_second_are_the_datasheets_counts(
     range_dps: int, counts_per_10_dps: int
 ) -> None:
-    """Sensitivity scale factors of section 6.1."""
+    """The sensitivity is that of the datasheet's section 6.1."""
     scale = ImuScale(gyro_range_dps=range_dps)
     assert scale.angular_velocity((0, counts_per_10_dps, -counts_per_10_dps)) == pytest.approx(
         (0.0, 0.17453292519943295, -0.17453292519943295)
@@ -36,7 +36,7 @@ def test_ten_degrees_a_second_are_the_datasheets_counts(
 
 
 def test_two_g_and_250_degrees_a_second_are_the_default() -> None:
-    """What the sensor wakes up with."""
+    """The sensor starts with these ranges."""
     assert ImuScale().specific_force((0, 0, 16384))[2] == pytest.approx(9.80665)
     assert ImuScale().angular_velocity((131, 0, 0))[0] == pytest.approx(math.radians(1.0))
 

@@ -45,7 +45,7 @@ def admitted(readings: list[Reading], through: OutlierFilter) -> list[list[Readi
 
 
 def trembling(random: Random) -> list[float]:
-    """What a sensor at rest adds."""
+    """The noise of a sensor at rest."""
     return [random.gauss(0.0, 0.03) for _ in range(3)] + [random.gauss(0.0, 9e-4) for _ in range(3)]
 
 
@@ -117,7 +117,7 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 
 @pytest.mark.parametrize(("scale_g", "leap"), [(4, 19.613), (16, 4.903), (16, 78.45)])
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
-    """``full_scale_mps2`` says how much."""
+    """The setting ``full_scale_mps2`` gives the scale."""
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
     assert came[50] == []

@@ -313,7 +313,7 @@ def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> No
 
 
 def test_in_imu_only_mode_nothing_is_found() -> None:
-    """No displacement tells anything."""
+    """There are no displacements to compare."""
     bench = Bench(BoardSettings(running=True, imu_only=True, **FAST))  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("imu_only")

@@ -68,7 +68,7 @@ def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
 
 
 def test_a_robot_at_rest_grows_no_less_sure() -> None:
-    """No way, no slip."""
+    """Without motion there is no slip."""
     odometry = Odometry(SETTINGS)
     for _ in range(100):
         (estimate,) = odometry.displace(body(0.0, 0.0), 0.0)

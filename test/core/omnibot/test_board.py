@@ -161,7 +161,7 @@ def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> N
 
 
 def test_a_regular_sequence_has_no_losses() -> None:
-    """Over more than one wrap."""
+    """The sequence has more than one wrap."""
     assert sum(lost(bot(), *[moved(n % 256) for n in range(600)])) == 0
 
 
@@ -228,7 +228,7 @@ def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -
 
 @pytest.mark.parametrize("mode", Mode)
 def test_reset_is_stop_and_r(mode: Mode) -> None:
-    """Afterwards the mode is unknown."""
+    """The mode is unknown afterwards."""
     board = in_mode(mode)
     assert joined(board.reset()) == STOP + ZEROS + b"\x52"
     assert board.mode is Mode.UNKNOWN
@@ -236,7 +236,7 @@ def test_reset_is_stop_and_r(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_after_silence_or_on_a_new_line_the_mode_is_unknown(mode: Mode) -> None:
-    """PoseGate rests on what is heard."""
+    """The mode depends on received data only."""
     board = in_mode(mode)
     board.silence()
     assert board.mode is Mode.UNKNOWN

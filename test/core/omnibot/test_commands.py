@@ -81,7 +81,7 @@ def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -
 
 @pytest.mark.parametrize("tiny", [0.0, -0.0, 0.005, -0.007, 5e-324])
 def test_almost_nothing_is_the_stop_frame(tiny: float) -> None:
-    """Body and wheels."""
+    """This holds for the body and for wheels."""
     assert encoder().velocity(BodyTwist(tiny, -tiny, tiny / 10)) == STOP
     assert encoder().wheels((tiny, -tiny, tiny)) == STOP
 

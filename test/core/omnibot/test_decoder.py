@@ -53,7 +53,7 @@ def test_an_undamaged_stream_is_decoded_whole_by_ticks_and_byte_by_byte(name: st
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STREAMS)
 def test_an_undamaged_stream_is_decoded_in_random_chunks(name: str) -> None:
-    """Twenty ways of cutting it."""
+    """There are twenty different cuts."""
     stream = b"".join(ticks_of(name))
     sent = [frame for _, frame in frames_of(stream)]
     random = Random(11)
@@ -212,7 +212,7 @@ def test_two_frames_with_nonsense_behind_them_are_not_believed() -> None:
 
 @pytest.mark.parametrize("start", range(12))
 def test_a_paused_board_is_understood_from_the_first_whole_text(start: int) -> None:
-    """Starting anywhere within a text."""
+    """The stream may start anywhere within a text."""
     texts = [b"Paused: 7 \n", b"Paused: 8 \n", b"Paused: 9 \n"]
     found = decoded([texts[0][start:], *texts[1:]], step_s=1.0)
     assert found == [PausedFrame(n) for n in (7, 8, 9)][start > 0 :]
@@ -223,7 +223,7 @@ def test_a_paused_board_is_understood_from_the_first_whole_text(start: int) -> N
 
 @pytest.mark.parametrize("name", STREAMS)
 def test_an_undamaged_stream_has_no_faults(name: str) -> None:
-    """Every byte is a frame's."""
+    """Every byte belongs to a frame."""
     made = FrameDecoder()
     for number, tick in enumerate(ticks_of(name)):
         made.feed(tick, number * TICK_S)
@@ -236,7 +236,7 @@ def test_an_undamaged_stream_has_no_faults(name: str) -> None:
 @given(st.lists(st.one_of(frames.map(encode), st.binary(max_size=20)), max_size=20))
 @example([LEAD_IN, b"\x00", LEAD_IN])
 def test_every_byte_is_a_frames_or_counted_as_discarded(pieces: list[bytes]) -> None:
-    """None is lost in silence."""
+    """No byte is lost silently."""
     made, stream = FrameDecoder(), b"".join(pieces)
     found = made.feed(stream, 0.0) + made.flush(0.0)
     in_frames = sum(len(encode(frame)) for frame in found if not isinstance(frame, PausedFrame))

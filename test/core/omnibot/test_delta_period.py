@@ -141,7 +141,7 @@ def test_a_lost_delta_is_bridged_and_settled() -> None:
 
 @EVERY_PERIOD
 def test_sequence_counts_what_is_lost_in_this_period(period_s: float) -> None:
-    """Over any number of wraps."""
+    """This holds over any number of wraps."""
     schedule = Schedule(period_s)
     for lost in (0, 1, 7, 200, 256, 300, 1000):
         sequence = Sequence(schedule)

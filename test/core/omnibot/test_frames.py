@@ -176,7 +176,7 @@ def test_the_simulated_board_understands_every_command(command: CommandFrame) ->
 
 
 def test_a_pose_that_is_not_a_number_is_still_a_pose() -> None:
-    """Decoding judges no values."""
+    """The decoder does not judge values."""
     frame = decode(bytes.fromhex("FF FC 7F C0 00 00 FF 80 00 00 00 00 00 00 01"))
     assert isinstance(frame, PoseFrame)
     assert math.isnan(frame.x)
@@ -222,7 +222,7 @@ def test_a_value_that_does_not_fit_its_field_is_refused(frame: Frame | CommandFr
 
 @given(st.one_of(frames, commands), st.integers(0, 14))
 def test_a_part_of_a_frame_is_not_a_frame(frame: Frame | CommandFrame, length: int) -> None:
-    """Cut short anywhere it is refused."""
+    """A frame that is cut anywhere is refused."""
     data = encode(frame)
     with pytest.raises(FrameError, match="not one whole frame"):
         decode(data[: min(length, len(data) - 1)])

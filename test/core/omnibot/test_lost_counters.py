@@ -49,7 +49,7 @@ def test_a_short_gap_is_bridged_at_once() -> None:
 
 
 def test_lost_poses_alone_cost_nothing_but_rounding() -> None:
-    """Ten seconds without one."""
+    """Ten seconds pass without a pose."""
     on = line(1)
     lose(on, 10.0, POSE)
     assert on.error.way_m < 0.005

@@ -119,7 +119,7 @@ def test_nobody_is_told_anything_of_right_settings(
 
 
 def test_the_user_is_told_once_and_odom_goes_on_by_deltas() -> None:
-    """No absurd pose moves it."""
+    """An impossible pose does not move it."""
     start = BoardPose(3000.0, -2000.0, 0.0)
     bench = Bench(BoardSettings(running=True, pose_byte_order="little", initial_pose=start))
     bench.open()

@@ -71,7 +71,7 @@ def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
 def test_words_that_would_act_take_the_nearest_value_that_does_not(
     counts: tuple[float, float, float], typed: str
 ) -> None:
-    """Typed by hand."""
+    """The expected words are typed by hand."""
     assert payload(*harmless(counts)) == bytes.fromhex(typed)
 
 
@@ -99,7 +99,7 @@ def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
 
 
 def test_a_goal_whose_low_byte_is_a_letter_is_moved_by_a_millimetre() -> None:
-    """0.083 m is 53 hex."""
+    """The coordinate 0.083 m has the byte 53 hex, a letter."""
     encoder = CommandEncoder(OmniBotSettings())
     assert bare(encoder.drive_to(Pose(0.083, 0.0, 0.0)))[3:5] == bytes.fromhex("00 54")
 

@@ -98,7 +98,7 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_of_another_rhythm_tells_nothing() -> None:
-    """Two deltas to a pose, say."""
+    """An example is two deltas to a pose."""
     sequence = Sequence()
     for count in range(20):
         assert sequence.delta(count, count * 0.04) == Step(0)
@@ -117,7 +117,7 @@ def test_a_pose_counter_that_begins_anew_is_no_gap() -> None:
 
 
 def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
-    """Its count fits neither."""
+    """The other board's count fits neither a restart nor a gap."""
     sequence = begun(7)
     sequence.reconnect()
     assert sequence.delta(200, 103.0) == Step(0, None, restarted=True)

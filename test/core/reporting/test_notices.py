@@ -15,7 +15,7 @@ from omnibot_driver.core.traits import Traits
 @pytest.mark.parametrize("traits", [OmniBot.traits, LineBoard.traits])
 @pytest.mark.parametrize("bytes_came", [True, False])
 def test_a_baudrate_is_advice_only_where_it_can_be_set(traits: Traits, bytes_came: bool) -> None:
-    """Datagrams and USB have none."""
+    """Datagrams and USB have no baud rate."""
     text = why_silent(1.5, bytes_came=bytes_came, baudrate=traits.baudrate)
     assert ("`baudrate`" in text) is (bytes_came and traits.baudrate)
     assert " cable" in text

@@ -31,7 +31,7 @@ def test_a_good_network_hands_over_at_once_and_in_order() -> None:
 
 
 def test_datagrams_are_lost_at_the_given_rate() -> None:
-    """Whole, and each way by itself."""
+    """Each direction loses its own."""
     network = FaultyNetwork(NetworkFaults(lose=0.1))
     there, back = through(network.to_board), through(network.from_board)
     assert set(there) <= set(SENT)
@@ -62,7 +62,7 @@ def test_a_delay_is_never_longer_than_given_and_lets_others_overtake() -> None:
 
 @given(st.integers(0, 5))
 def test_equal_seeds_meet_equal_fates(seed: int) -> None:
-    """Different ones do not."""
+    """Different seeds give different losses."""
     faults = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.1)
     first = through(FaultyNetwork(faults, seed).to_board)
     assert first == through(FaultyNetwork(faults, seed).to_board)

@@ -188,7 +188,7 @@ def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> N
 
 
 def test_a_link_that_cannot_be_made_is_named_with_what_to_do(tmp_path: Path) -> None:
-    """Its folder does not exist."""
+    """The link's folder does not exist."""
     with (
         pytest.raises(FileNotFoundError, match=r"nowhere/board .*choose a folder that exists"),
         PtyBoard(Ticker(), tmp_path / "nowhere/board"),

@@ -137,7 +137,7 @@ def test_a_port_that_is_taken_or_does_not_exist_is_one_sentence() -> None:
 
 
 def test_the_facts_add_what_became_of_the_lines() -> None:
-    """Those of the board first."""
+    """The board's own facts come first."""
     with ServedBoard(ToyServer()) as served, served.lock:
         assert served.facts == {
             "x_m": 0.0,

@@ -44,7 +44,7 @@ def last(board: SimulatedBoard, header: bytes, count: int) -> tuple[int, ...]:
 def test_a_reversed_axis_moves_the_robot_the_other_way_and_the_board_does_not_know(
     command: bytes, signs: tuple[int, int, int], axis: int
 ) -> None:
-    """Commands and odometry alike."""
+    """Commands and odometry are reversed together."""
     straight, reversed_ = driven(command), driven(command, axis_signs=signs)
     truth = (reversed_.truth.x_m, reversed_.truth.y_m, reversed_.truth.yaw_rad)
     assert truth[axis] < -0.05
