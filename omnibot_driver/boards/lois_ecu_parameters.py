@@ -32,7 +32,7 @@ WHEELS: Final = (
         "track",
         0.47,
         "m",
-        "From one wheel to the other.",
+        "Distance between the wheels.",
         low=0.01,
         high=10.0,
         calibrated=True,
@@ -49,7 +49,7 @@ WHEELS: Final = (
         "inverted",
         False,
         "",
-        "Whether the board's left wheel is the robot's right one, and the other way round.",
+        "Whether the board's left wheel is the robot's right one, and vice versa.",
         fixed=True,
         calibrated=True,
     ),
@@ -60,9 +60,9 @@ DRIVING: Final = (
         "drive_mode",
         "rpm",
         "",
-        "How motion is commanded: as the wheels' RPM, which the board controls, or as the motors'"
-        " duty. In duty mode the robot is driven without speed control, and there is duty_cmd. A"
-        " change stops the robot first.",
+        "How motion is commanded: by the wheels' RPM, which the board controls, or by the motors'"
+        " duty. Duty mode has no speed control, and has the topic duty_cmd. A change stops the"
+        " robot first.",
         choices=("rpm", "duty"),
     ),
     Parameter(
@@ -86,8 +86,8 @@ DRIVING: Final = (
         "low_pass",
         1.0,
         "",
-        "Part of a new RPM that the speed controller takes over in each of its steps (0x23). It is"
-        " always written: with the public firmware's own value, 0, the wheels never turn.",
+        "Fraction of a new RPM that the speed controller applies in each of its steps (0x23). It"
+        " is always written: with the public firmware's default of 0 the wheels never turn.",
         low=0.001,
         high=1.0,
     ),
@@ -103,7 +103,7 @@ DRIVING: Final = (
         "magnetic_declination",
         0.0,
         "rad",
-        "Of magnetic north from true north, east positive, for imu/heading.",
+        "Declination of magnetic north from true north, east positive, for imu/heading.",
         low=-3.15,
         high=3.15,
     ),
@@ -119,16 +119,17 @@ DRIVING: Final = (
         "terminal_mode",
         "host",
         "",
-        "Whose lines the board sends: its own, or those of its GPS or compass, which go to"
-        " ~/terminal (0x11). A change stops the robot first; other modes than host refuse motion.",
+        "Source of the lines that the board sends: itself (host), or its GPS or compass, whose"
+        " lines go to ~/terminal (0x11). A change stops the robot first. Motion is refused in all"
+        " modes but host.",
         choices=("host", "gps", "compass"),
     ),
     Parameter(
         "record_samples",
         200,
         "",
-        "Samples of each wheel, or headings, in a record (~/record_rpm, ~/record_torque,"
-        " ~/record_heading). The board completes no more than 1024.",
+        "Number of samples of each wheel, or of headings, in a record (~/record_rpm,"
+        " ~/record_torque, ~/record_heading). The board completes at most 1024.",
         low=1,
         high=MOST_SAMPLES,
     ),
@@ -142,8 +143,8 @@ DRIVING: Final = (
         "checksum",
         True,
         "",
-        "Whether the board checks what it is sent. The board is set to it (0x11). It cannot change"
-        " while the driver runs, as the last words of the guard are in this form.",
+        "Whether the board verifies checksums (0x11). It cannot change while the driver runs,"
+        " since the guard's last words depend on it.",
         fixed=True,
     ),
 )

@@ -34,10 +34,10 @@ GPS_VARIANCE_M2: Final = 5.0**2
 ABSENT: Final = [-1.0] + [0.0] * 8
 TERMINAL_DEPTH: Final = 100
 LEFT: Final = (
-    "the board is out of its terminal mode; whether the e-stop button was pressed or released"
-    " meanwhile is unknown: look at it"
+    "the board has left its terminal mode; check the e-stop button, as presses and releases"
+    " meanwhile are unknown"
 )
-NOT_HEARD: Final = "the board is not heard; connect it and switch it on, then call again"
+NOT_HEARD: Final = "no data from the board; connect it and switch it on, then call again"
 
 
 class LoisEcuTopics:

@@ -35,8 +35,8 @@ LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
 NAN: Final = float("nan")
 TIME_EVERY_S: Final = 5.0
 NOT_READY: Final = (
-    "the robot is not proved to stand, or the controller is not heard: stop the sender, wait a"
-    " second, then call again"
+    "the standstill is not proved, or there is no data from the controller; stop the sender, wait"
+    " a second, then call again"
 )
 
 

@@ -50,10 +50,10 @@ def _advice(seen: bytes) -> str:
     if len(lengths) >= 5:
         usual = max(set(lengths), key=lengths.count)
         if usual == 12:
-            return "lines come without checksum: turn the parameter for checksums off"
+            return "lines arrive without checksums; set the parameter `checksum` to false"
         if usual == 14:
-            return "lines come with wrong checksums: check the cable and the baud rate"
+            return "lines arrive with wrong checksums; check the cable and the baud rate"
         return f"lines of {usual} characters come instead of 14: this is another firmware or board"
     if sum(byte > 126 for byte in seen) > len(seen) / 10:
         return "the bytes are not text: check baudrate (115200), and that the port is the ECU's"
-    return "nothing that comes is a line of this board: check that the port is the ECU's"
+    return "no valid line of this board; check that the port is the ECU's"

@@ -71,7 +71,7 @@ class Ground:
     def connect(self) -> None:
         """The line is new: the server may be moving the robot."""
         self.conversation.connect()
-        self.jobs.cancel("the line was lost meanwhile; call again once it is back")
+        self.jobs.cancel("the connection was lost; call again when it is back")
         self.jobs.logging = self.jobs.ended = False
         self.odometry.connect()
         self._polls.connect()

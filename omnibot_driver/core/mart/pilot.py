@@ -294,8 +294,8 @@ class Pilot(Starts):
             )
             return
         self._notice(
-            "the robot moves without a command: a late copy of one, another client, or a push;"
-            " it is stopped",
+            "robot moves without a command; the driver stops it (a late copy of a command, another"
+            " client, or a push)",
             halt=True,
         )
         self.motion = Motion.UNKNOWN

@@ -268,7 +268,7 @@ class Stops(Ground):
             self._blocked = motion
             where = "behind" if motion is Motion.REVERSE else "in front"
             self._notice(
-                f"obstacle {where} ({why}): that way is refused until another command comes",
+                f"obstacle {where} ({why}); this direction is refused until another command",
                 halt=False,
             )
 

@@ -21,9 +21,9 @@ WRONG = {
     "another board": (OMNIBOT, "OmniBot board's frames: set board to omnibot"),
     "NMEA": (NMEA, "NMEA sentences"),
     "noise": (Random(1).randbytes(500), "the bytes are not text: check baudrate"),
-    "too short": (SHORT, "lines come without checksum"),
+    "too short": (SHORT, "lines arrive without checksums"),
     "too long": (LONG, "lines of 16 characters come instead of 14"),
-    "a wrong checksum": (SUMLESS_SUM, "lines come with wrong checksums"),
+    "a wrong checksum": (SUMLESS_SUM, "lines arrive with wrong checksums"),
 }
 
 
