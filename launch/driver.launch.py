@@ -11,6 +11,7 @@ from launch_ros.substitutions import FindPackageShare
 
 OVERRIDES = {
     "port": (str, "Serial device or pyserial URL of the board"),
+    "front_port": (str, "Serial device of the front board, for a robot that has one (fejemis)"),
     "publish_tf": (bool, "Whether the driver publishes odom to base_link on /tf"),
     "frame_prefix": (str, "Text put before every frame name, without adding a slash: robot1/"),
 }
