@@ -136,6 +136,7 @@ BOARD: Final = RigBoard(
             "wheel_cmd has the wrong size",
             "two commanders in turn",  # the other one uses wheel_cmd
             "~/reset",
+            "SIGTERM while a call is pending",  # of ~/reset
             "full for long, and told once",  # each attempt hears the board for a moment
             "e-stop into a full port",  # judged by the OmniBot's frames
             "faults_of_the_network",
