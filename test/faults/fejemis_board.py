@@ -6,6 +6,7 @@ What it sends comes of two boards at rhythms of their own, so no message is comp
 sent. It has no wheel command and no reset.
 """
 
+import re
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -19,22 +20,26 @@ TICKS: Final = 5
 """Of the simulated boards, in one of the rig's."""
 SILENCE_S: Final = 1.6
 ANGLE_S: Final = 0.2
-DRIVE, FRONT = 0, 1
+MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.MULTILINE)
 
 
 class Pair:
-    """Both Teensys as one board with the ticks of the rig. ``received``: by the drive half."""
+    """Both Teensys as one board with the ticks of the rig.
+
+    ``received``: lines of motion at the drive half, without sums and padding.
+    """
 
     channels = CHANNELS
 
     def __init__(self, settings: FejemisSettings | None) -> None:
         self.pair = SimulatedFejemis(settings)
         self.tick = 0
-        self.deaf = [False, False]
 
     @property
     def received(self) -> bytearray:
-        return self.pair.drive.received
+        return bytearray(
+            b"".join(text + end for text, end in MOTION.findall(bytes(self.pair.drive.received)))
+        )
 
     @property
     def driven(self) -> bool:
@@ -117,8 +122,9 @@ BOARD: Final = RigBoard(
     parameters={"board": "fejemis"},
     ports=lambda link: {"port": f"{link}-drive", "front_port": f"{link}-front"},
     old_command=b";07rc 2 0.4 0\n",
-    stop=b";92rc 2 0 0 \n",
-    opening=b"\nrc 2 0 0",
+    stop=b"rc 2 0 0\n",
+    opening=b"rc 2 0 0\n",
+    ends_later_s=1.0,  # two ports are opened and closed
     wheels=2,
     services=frozenset({"start", "pause", "reset_odometry", "estop"}),
     tuning=(
