@@ -32,7 +32,7 @@ unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WH
 ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export ROS_AUTOMATIC_DISCOVERY_RANGE
 
-.PHONY: help demo check test docs pictures integrity bench faults soak lint format clean
+.PHONY: help demo check test compiled docs pictures integrity bench faults soak lint format clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1: /p' Makefile | while IFS= read -r line; do \
@@ -46,6 +46,12 @@ test: lint $(VENV)/.docs  ## run every check and test
 
 check: lint  ## check formatting, style and types, and run the quick tests (a minute)
 	$(PY) -m pytest -n 2 -q -m "not slow" $(QUICK)
+
+compiled: $(VENV)/.test  ## compile the core into build/compiled, and run its quick tests on that (5 minutes)
+	rm -rf build/compiled
+	OMNIBOT_DRIVER_COMPILE=1 $(PY) setup.py -q build --build-lib build/compiled
+	@ls build/compiled/omnibot_driver__mypyc.*
+	PYTHONSAFEPATH=1 PYTHONPATH=build/compiled $(PY) -m pytest -n 2 -q -m "not slow" test/core
 
 docs: $(VENV)/.docs  ## write what is generated, and build the documents as a site in build/docs
 	$(PY) docs/generate.py

@@ -1,12 +1,107 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Says what colcon and pip install, and where ``ros2 run`` and ``ros2 launch`` look for it."""
+"""Says what colcon and pip install, and where ``ros2 run`` and ``ros2 launch`` look for it.
 
+With ``OMNIBOT_DRIVER_COMPILE=1`` in the environment the core's inbound half is compiled with mypyc.
+Where that fails, for whatever reason, the package is installed as plain Python, and says why.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
 from glob import glob
+from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import Extension, find_packages, setup
+from setuptools.command.build_ext import build_ext
+from setuptools.command.install_lib import install_lib
 
 NAME = "omnibot_driver"
+CORE = f"{NAME}/core"
+
+COMPILED = ("geometry/se2", "geometry/twist", "imu/*", "measurement/*", "odometry/*", "timing/*")
+COMPILED_OF_OMNIBOT = (
+    *("cost_model", "decoder", "fast_path", "frame_schedule", "gaps", "late_reads", "lower_bound"),
+    *("misconfiguration", "modes", "schedule", "sequence", "single_imu", "translation", "trellis"),
+)
+"""What is made of bytes. What decides whether a robot moves stays as it is debugged; so do classes
+of which others are derived, and frames, which are made faster without mypyc's dataclasses."""
+
+
+class CompileCore(build_ext):
+    """All of it or nothing: a half-compiled core must not be installed."""
+
+    def run(self) -> None:
+        """Never raises: plain Python is complete."""
+        if self.inplace:
+            print(f"{NAME}: a development installation runs its sources; core: interpreted")
+            return
+        remove_compiled(self.build_lib)
+        try:
+            self._compile()
+        except (Exception, SystemExit) as error:  # mypyc exits when it meets what it cannot do
+            remove_compiled(self.build_lib)
+            self.distribution.ext_modules = []
+            print(f"{NAME}: not compiled ({error!r}); core: interpreted", file=sys.stderr)
+
+    def get_outputs(self) -> list[str]:
+        """What was built."""
+        return [str(path) for path in compiled_in(self.build_lib)]
+
+    def _compile(self) -> None:
+        from mypyc.build import mypycify
+
+        modules = [
+            *(f"{CORE}/{name}.py" for name in COMPILED),
+            *(f"{CORE}/omnibot/{name}.py" for name in COMPILED_OF_OMNIBOT),
+        ]
+        files = [file for pattern in modules for file in sorted(glob(pattern))]
+        with tempfile.TemporaryDirectory() as sources:
+            self.distribution.ext_modules = mypycify(
+                [file for file in files if not file.endswith("__init__.py")],
+                opt_level="2",
+                debug_level="0",
+                group_name=NAME,
+                target_dir=sources,
+            )
+            builder = build_ext(self.distribution)
+            builder.build_lib, builder.build_temp = self.build_lib, sources
+            builder.ensure_finalized()
+            builder.run()
+        environment = {**os.environ, "PYTHONPATH": os.path.abspath(self.build_lib)}
+        command = f"import {NAME}.core.session, {NAME}.core.omnibot"
+        subprocess.run([sys.executable, "-P", "-c", command], env=environment, check=True)
+        print(f"{NAME}: core: compiled")
+
+
+class InstallAnew(install_lib):
+    """colcon leaves an earlier installation in place, and Python prefers what is compiled in it."""
+
+    def install(self) -> list[str]:
+        """Without what an earlier one compiled."""
+        remove_compiled(self.install_dir)
+        return super().install()
+
+
+def compiled_in(folder: str) -> list[Path]:
+    """What mypyc made of this package's modules, and what they share."""
+    return [*Path(folder).glob(f"{NAME}__mypyc.*"), *Path(folder, CORE).rglob("*.so")]
+
+
+def remove_compiled(folder: str) -> None:
+    """So that the sources beside it are what runs."""
+    for path in compiled_in(folder):
+        path.unlink()
+
+
+def compiling() -> dict[str, object]:
+    """What setuptools is told of it; ``CompileCore`` finds out what there is to compile."""
+    commands = {"build_ext": CompileCore, "install_lib": InstallAnew}
+    if os.environ.get("OMNIBOT_DRIVER_COMPILE", "0") in ("", "0"):
+        return {"cmdclass": commands}
+    return {"cmdclass": commands, "ext_modules": [Extension(f"{NAME}.core", [])]}
+
 
 setup(
     name=NAME,
@@ -55,4 +150,5 @@ setup(
         ],
     },
     zip_safe=False,
+    **compiling(),
 )

@@ -84,6 +84,7 @@ class OmniBotDriver(Node):
             )
         if advice := selfcheck.clock_advice(port, self.get_parameter("use_sim_time").value):
             self.get_logger().warning(advice)
+        self.get_logger().info(f"core: {selfcheck.core_kind()}")
         self._publishing.publish_state()
         self._link.start()
 

@@ -11,12 +11,19 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Final
 
+from omnibot_driver.core.timing import clock_fit
+
 SYSFS: Final = Path("/sys")
 LONGEST_LATENCY_MS: Final = 5
 """Half a tick of the board. FTDI's default is 16 ms, its least 1 ms."""
 RECORDING: Final = "replay://"
 WITHOUT_CLOCK: Final = ("sim://", RECORDING)
 """Ports that no real robot is behind."""
+
+
+def core_kind() -> str:
+    """Whether the part of the core that can be compiled is: ``compiled`` or ``interpreted``."""
+    return "interpreted" if clock_fit.__file__.endswith(".py") else "compiled"
 
 
 def latency_advice(port: str, sysfs: Path = SYSFS) -> str:

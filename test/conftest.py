@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
+from interpreted import INTERPRETED
 from terminal import Terminal
 
 # Domains 0 to 101 are safe on every platform; 0 is everybody's default.
@@ -21,6 +22,11 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 settings.register_profile("exploring", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("same", settings.get_profile("exploring"), derandomize=True)
 settings.load_profile("same")
+
+
+def pytest_report_header() -> str:
+    """Which core is tested."""
+    return f"core: {'interpreted' if INTERPRETED else 'compiled'}"
 
 
 @pytest.fixture

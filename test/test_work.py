@@ -13,6 +13,7 @@ from collections.abc import Callable
 from types import FrameType
 
 import pytest
+from interpreted import interpreted_only
 
 from omnibot_driver import boards, parameters
 from omnibot_driver.boards import omnibot
@@ -26,6 +27,8 @@ from omnibot_driver.core.omnibot import FrameDecoder
 from omnibot_driver.core.session import Session
 from omnibot_driver.messages import MessageSettings, turned, unturned
 from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
+
+pytestmark = interpreted_only
 
 DEFAULTS = boards.check_all({})
 TICK_S = 0.01

@@ -14,6 +14,7 @@ import pytest
 from carriage import CHUNKERS, FAULTS, receive
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from interpreted import interpreted_only
 from truth import SCENARIOS, generate
 
 from omnibot_driver.core.errors import RequestRefused
@@ -35,6 +36,8 @@ from omnibot_driver.core.omnibot.gaps import BYTE_S, InterFrameGaps
 from omnibot_driver.core.omnibot.lower_bound import least_costs
 from omnibot_driver.core.omnibot.single_imu import take_single
 from omnibot_driver.core.omnibot.translation import Translation
+
+pytestmark = interpreted_only
 
 SECONDS = 6.0
 Outcome = list[tuple[list[Frame], list[int], DecoderStatistics, bytes | None]]

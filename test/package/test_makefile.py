@@ -62,4 +62,4 @@ def test_make_alone_lists_every_target() -> None:
     """The default target explains the others in a line each."""
     listed = {line.split()[1] for line in make().stdout.splitlines()}
     targets = {"demo", "check", "test", "docs", "pictures", "integrity", "bench", "faults", "soak"}
-    assert listed == {"help", *targets, "lint", "format", "clean"}
+    assert listed == {"help", *targets, "compiled", "lint", "format", "clean"}

@@ -18,6 +18,7 @@ import pytest
 from frame_strategies import any_streams, believable_frames, calm_frames, paused_frames
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from interpreted import interpreted_only
 from strategies import chunkings
 
 from omnibot_driver.core.omnibot import FrameDecoder, ImuFrame, decoder, encode, trellis
@@ -148,6 +149,7 @@ def work(
     return done, most
 
 
+@interpreted_only
 @pytest.mark.slow
 @pytest.mark.parametrize("pattern", ADVERSARIES.values(), ids=ADVERSARIES.keys())
 @pytest.mark.parametrize(("chunk_length", "pause_s"), [(1, 0), (1, 0.005), (13, 0), (1_000_000, 0)])

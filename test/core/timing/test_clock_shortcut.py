@@ -7,6 +7,7 @@ import random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from interpreted import interpreted_only
 from serial_line import Board, Chunker, bursts, crumbs, ftdi, late, singles
 
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
@@ -19,6 +20,8 @@ from omnibot_driver.core.readings import (
 )
 from omnibot_driver.core.timing import device_clock
 from omnibot_driver.core.timing.device_clock import DeviceClock
+
+pytestmark = interpreted_only
 
 WHOLE = SampleBoundary(0, 0.0, 13 * 10 / 115200)
 SAMPLE = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

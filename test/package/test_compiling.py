@@ -1,0 +1,107 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""`OMNIBOT_DRIVER_COMPILE=1`: whatever goes wrong, a whole package of plain Python is installed.
+
+A stand-in for mypyc makes one small module of C, for mypyc itself takes a minute; `make compiled`
+runs that one.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = "omnibot_driver"
+MODULE = f"{PACKAGE}.core.timing.clock_fit"
+ENDING = sysconfig.get_config_var("EXT_SUFFIX")
+
+STAND_IN = '''
+from pathlib import Path
+from setuptools import Extension
+
+def mypycify(files, *, target_dir, **_):
+    assert any(file.endswith("clock_fit.py") for file in files)
+    {fails}
+    source = Path(target_dir, "clock_fit.c")
+    source.write_text("""{source}""")
+    return [Extension("{module}", [str(source)])]
+'''
+GOOD = """
+#include <Python.h>
+static struct PyModuleDef it = {PyModuleDef_HEAD_INIT, "clock_fit"};
+PyMODINIT_FUNC PyInit_clock_fit(void) {
+    PyObject *module = PyModule_Create(&it);
+    PyModule_AddObject(module, "ClockFit", Py_NewRef(Py_None));
+    PyModule_AddObject(module, "Point", Py_NewRef(Py_None));
+    return module;
+}
+"""
+FAILURES = {
+    "mypyc is not installed": ("raise ImportError('no mypyc')", GOOD),
+    "mypyc gives up": ("raise SystemExit(1)", GOOD),
+    "the compiler gives up": ("pass", "no C"),
+    "what is made cannot be imported": ("pass", GOOD.replace('"Point"', '"Other"')),
+}
+
+
+def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
+    """Build the package into ``lib`` of this folder with such a mypyc, and return what was said."""
+    (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
+    (folder / "stand_in/mypyc/__init__.py").touch()
+    (folder / "stand_in/mypyc/build.py").write_text(
+        STAND_IN.format(fails=fails, source=source.replace("\\", "\\\\"), module=MODULE)
+    )
+    build = ["build", "--build-base", folder / "base", "--build-lib", folder / "lib"]
+    done = subprocess.run(
+        [sys.executable, "setup.py", "-q", *build],
+        cwd=ROOT,
+        env={
+            **os.environ,
+            "OMNIBOT_DRIVER_COMPILE": wanted,
+            "PYTHONPATH": str(folder / "stand_in"),
+        },
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+def compiled_modules(folder: Path) -> list[str]:
+    return [str(path.relative_to(folder)) for path in folder.rglob("*.so")]
+
+
+@pytest.mark.parametrize(("fails", "source"), FAILURES.values(), ids=FAILURES)
+def test_what_cannot_be_compiled_is_installed_as_it_is(
+    tmp_path: Path, fails: str, source: str
+) -> None:
+    """Nothing half-compiled is left, and one line says why."""
+    output = built(tmp_path, fails, source)
+    assert f"{PACKAGE}: not compiled (" in output
+    assert not compiled_modules(tmp_path / "lib")
+    for path in (ROOT / PACKAGE / "core").rglob("*.py"):
+        assert (tmp_path / "lib" / path.relative_to(ROOT)).is_file(), path
+
+
+@pytest.mark.skipif(
+    not shutil.which((sysconfig.get_config_var("CC") or "cc").split()[0]), reason="no C compiler"
+)
+def test_what_is_compiled_goes_where_the_source_is_and_goes_away_again(tmp_path: Path) -> None:
+    """A later installation that compiles nothing must not leave what an earlier one compiled."""
+    assert f"{PACKAGE}: core: compiled" in built(tmp_path, "pass", GOOD)
+    assert compiled_modules(tmp_path / "lib") == [MODULE.replace(".", "/") + ENDING]
+    assert built(tmp_path, "raise SystemExit(1)", GOOD)
+    assert not compiled_modules(tmp_path / "lib")
+
+
+def test_nothing_is_compiled_unless_it_is_asked_for(tmp_path: Path) -> None:
+    """Neither mypyc nor a compiler is looked for."""
+    assert "compiled" not in built(tmp_path, "raise SystemExit(1)", "no C", wanted="0")
+    assert not compiled_modules(tmp_path / "lib")
