@@ -106,7 +106,7 @@ class FejemisDecoder:
             self.doubtful = self.contradicted = False
         if isinstance(message, Comment):
             self.statistics.comments += 1
-        elif not self._forms.admit(text):
+        elif not self._forms.admit(text, summed=right is True):
             return None
         self.statistics.lines += 1
         return message

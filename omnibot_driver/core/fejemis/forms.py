@@ -11,7 +11,9 @@ from typing import Final
 
 IN_A_ROW: Final = 3
 VARIES: Final = 8
-"""Lines of another form than expected, of the last ``OF``, after which the kind varies."""
+VARIES_WITHOUT_SUM: Final = 18
+"""Lines of another form than expected, of ``OF``, after which the kind varies. Where a sum is right
+damage is rare, so fewer of them tell."""
 OF: Final = 24
 
 Form = tuple[int, ...]
@@ -23,14 +25,14 @@ class Forms:
     def __init__(self) -> None:
         self._kinds: dict[bytes, _Kind] = {}
 
-    def admit(self, text: bytes) -> bool:
-        """Whether the line looks like those of its kind before it."""
+    def admit(self, text: bytes, *, summed: bool) -> bool:
+        """Whether the line looks like those of its kind before it; ``summed``: its sum is right."""
         keyword, *fields = text.split()
         form = tuple(map(_shape, fields))
         kind = self._kinds.get(keyword)
         if kind is None:
             kind = self._kinds[keyword] = _Kind(form)
-        return kind.admit(form)
+        return kind.admit(form, VARIES if summed else VARIES_WITHOUT_SUM)
 
 
 class _Kind:
@@ -41,7 +43,7 @@ class _Kind:
         self._others = self._seen = self._strange = 0
         self._varies = False
 
-    def admit(self, form: Form) -> bool:
+    def admit(self, form: Form, varies: int) -> bool:
         if self._varies:
             return True
         self._seen += 1
@@ -53,7 +55,7 @@ class _Kind:
         self._strange += 1
         self._others = self._others + 1 if form == self._other else 1
         self._other = form
-        if self._strange >= VARIES:
+        if self._strange >= varies:
             self._varies = True
         elif self._others >= IN_A_ROW:
             self._form, self._others, self._strange = form, 0, 0

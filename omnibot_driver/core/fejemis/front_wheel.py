@@ -17,8 +17,8 @@ OLDEST_S: Final = 0.06
 HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
 """Without the counter of frames."""
-SICK_LINES: Final = 2
-"""In a row: one may be damaged."""
+SICK_LINES: Final = 3
+"""In a row: two may be damaged."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
 """No servo turns the wheel further between two lines."""

@@ -16,7 +16,7 @@ from typing import Final
 
 from omnibot_driver.core.fejemis.messages import BoardPose, WheelSpeeds
 from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
-from omnibot_driver.core.readings import DisplacementReading
+from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
 """Part of a difference within rounding that one displacement makes up for."""
@@ -33,6 +33,9 @@ FRESH_S: Final = 0.1
 LEAST_S: Final = 0.001
 STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
+SETTLE_EVERY_S: Final = 0.2
+NEW_FRAME: Final = 4
+"""Poses in a row that agree with each other, and with nothing before, are of a new frame."""
 
 
 class PoseOdometry:
@@ -45,11 +48,14 @@ class PoseOdometry:
         self._pose: BoardPose | None = None
         self._told = Pose()
         self._restarted = False
+        self._settled_s = -math.inf
         self.begin()
 
     def begin(self) -> None:
         """The line is new; the frame may be as it was."""
         self._doubted: BoardPose | None = None
+        self._agreed = 0
+        """How often doubted poses have agreed, one after the other."""
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
         self._speeds_at = -math.inf
@@ -63,12 +69,26 @@ class PoseOdometry:
     def forget(self) -> None:
         """The board has restarted: its frame begins anew, somewhere on the way."""
         self._restarted |= self._pose is not None
+        self._settled_s = -math.inf
         self._pose = None
         self.begin()
 
     def speeds(self, speeds: WheelSpeeds, now: float) -> None:
         """Of both wheels."""
         self._before, self._speeds, self._speeds_at = self._speeds, speeds, now
+
+    def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
+        """The displacement up to here, and now and then where it has led: a displacement that is
+        refused afterwards is made up for by that.
+        """
+        displacement = self.pose(pose, now)
+        if displacement is None:
+            return []
+        if not displacement.restarted and pose.time_s - self._settled_s < SETTLE_EVERY_S:
+            return [displacement]
+        self._settled_s = pose.time_s
+        place = self._told
+        return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad)]
 
     def pose(self, pose: BoardPose, now: float) -> DisplacementReading | None:
         """The displacement up to here; None for the first pose, and for one that is doubted."""
@@ -82,7 +102,7 @@ class PoseOdometry:
         way = log_of(self._told.way_to(_place(pose)))
         if seconds < LEAST_S or not self._explained(way, seconds, now):
             return self._doubt(pose)
-        self._doubted = None
+        self._doubted, self._agreed = None, 0
         displacement = self._drawn(way, seconds, pose.decimals, now)
         self._pose = pose
         self._told = self._told.moved(roll(displacement))
@@ -90,23 +110,27 @@ class PoseOdometry:
 
     def _begin_at(self, pose: BoardPose) -> None:
         self._pose, self._told = pose, _place(pose)
-        self._doubted = None
+        self._doubted, self._agreed = None, 0
 
     def _doubt(self, pose: BoardPose) -> DisplacementReading | None:
         before, self._doubted = self._doubted, pose
         self.refused += 1
-        if before is None:
+        if before is None or self._pose is None:
             return None
         seconds = pose.time_s - before.time_s
         way = log_of(_place(before).way_to(_place(pose)))
         if seconds < LEAST_S or not _possible(way, seconds):
+            self._agreed = 0
             return None
-        assert self._pose is not None
         since_s = pose.time_s - self._pose.time_s
         whole = log_of(self._told.way_to(_place(pose)))
-        self._begin_at(pose)
+        self._agreed += 1
         if since_s > 0.0 and _possible(whole, since_s):
+            self._begin_at(pose)
             return _reading(whole, since_s)
+        if self._agreed < NEW_FRAME:
+            return None
+        self._begin_at(pose)
         return DisplacementReading(
             way.x_m, way.y_m, way.yaw_rad, "body", seconds, 0, restarted=True
         )
@@ -127,8 +151,8 @@ class PoseOdometry:
         if not _possible(way, seconds):
             return False
         rolled = self._rolled(seconds, now)
-        if rolled is None:
-            return True
+        if rolled is None:  # behind a gap the next pose must confirm what is no small step
+            return seconds <= FRESH_S or (way.way_m <= SLACK_M and abs(way.yaw_rad) <= SLACK_RAD)
         off = way - rolled
         slack_m = SLACK_M + SPEED_UP_MPS2 * seconds * seconds
         return off.way_m <= slack_m and abs(off.yaw_rad) <= SLACK_RAD + slack_m / self.track_m

@@ -18,7 +18,7 @@ EARLY_S: Final = 0.005
 """A time that is ahead of the arrivals by more was not measured yet."""
 LATE_S: Final = 1.0
 """One that is behind by more is another time, even where the host was busy."""
-AGAIN: Final = 2
+AGAIN: Final = 3
 """Such times in a row that agree with each other are those of a board that has restarted."""
 SMALLEST_STEP_S: Final = 1e-6
 

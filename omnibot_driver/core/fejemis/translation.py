@@ -99,9 +99,9 @@ class Translation:
         match message:
             case BoardPose():
                 self._pose_s = message.time_s
-                reading = self.odometry.pose(message, now)
-                if reading is not None:
-                    self.stamped.add(reading, clock.host_s(message.time_s), now)
+                stamp_s = clock.host_s(message.time_s)
+                for reading in self.odometry.readings(message, now):
+                    self.stamped.add(reading, stamp_s, now)
             case WheelSpeeds():
                 self.odometry.speeds(message, now)
             case Gyro():

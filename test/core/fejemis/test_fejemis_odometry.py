@@ -296,13 +296,14 @@ def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
 
 
 def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
-    """A lost digit; but two that agree are those of a board that has restarted."""
+    """A lost digit; but three that agree are those of a board that has restarted."""
     clock = TeensyClock()
     assert all(clock.see(100.0 + 0.02 * n, 5.0 + 0.02 * n) for n in range(50))
     assert not clock.see(10.98, 6.0)
     assert clock.see(101.02, 6.02)
     assert not clock.see(0.1, 6.1)
-    assert clock.see(0.12, 6.12)
+    assert not clock.see(0.12, 6.12)
+    assert clock.see(0.14, 6.14)
     assert clock.restarted
 
 
