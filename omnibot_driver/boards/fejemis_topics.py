@@ -10,6 +10,7 @@ import rclpy
 from geometry_msgs.msg import Quaternion, Vector3
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.task import Future
 from sensor_msgs.msg import BatteryState, Imu, JointState, MagneticField, Range
 from std_msgs.msg import ColorRGBA, Float32, Header
@@ -55,7 +56,7 @@ class FejemisTopics:
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
         self._node, self._link, self._values = node, link, values
         self._prefix = values["frame_prefix"]
-        self._steering = node.create_publisher(JointState, "joint_states", 10)
+        self._steering = _publisher_of(node, "joint_states")
         self._imu = node.create_publisher(Imu, "imu/data", 10)
         self._mag = node.create_publisher(MagneticField, "imu/mag", 10)
         self._battery = node.create_publisher(BatteryState, "battery_state", 10)
@@ -241,6 +242,12 @@ class FejemisTopics:
 
     def _warn(self, text: str) -> None:
         self._node.get_logger().warning(text, throttle_duration_sec=WARN_EVERY_S)
+
+
+def _publisher_of(node: Node, topic: str) -> Publisher:
+    """The one that the driver has on any board."""
+    name = node.resolve_topic_name(topic)
+    return next(one for one in node.publishers if one.topic_name == name)
 
 
 def _vector(parts: tuple[float, float, float]) -> Vector3:

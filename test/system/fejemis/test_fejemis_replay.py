@@ -1,0 +1,50 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A recorded wire of both Teensys is heard again, line by line, and says the same."""
+
+import signal
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+pytest.importorskip("rosbags")
+
+from bag import Recorder
+from driver_process import Driver
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from probe import Probe
+from rosbags.rosbag2 import StoragePlugin
+
+RAW: Final = [
+    f"omnibot_driver/raw_{way}/{name}" for way in ("rx", "tx") for name in ("drive", "front")
+]
+
+
+def test_a_recorded_drive_of_both_lines_is_replayed(tmp_path: Path) -> None:
+    """With the same way in odom at its end."""
+    with ExitStack() as stack:
+        driver = stack.enter_context(Driver(port="sim://", board="fejemis", publish_raw="true"))
+        probe = stack.enter_context(Probe(driver.namespace))
+        recorder = Recorder(probe)
+        recorder.record(*RAW)
+        odometry = probe.listen(Odometry, "odom")
+        probe.wait_for_state("nominal")
+        cmd_vel, twist = probe.publisher(Twist, "cmd_vel"), Twist()
+        twist.linear.x = 0.3
+        timer = probe.node.create_timer(0.1, lambda: cmd_vel.publish(twist))
+        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.3)
+        probe.remove(timer)
+        probe.wait_for(lambda: abs(odometry[-1].twist.twist.linear.x) < 0.001)
+        assert driver.end(signal.SIGINT) == 0
+        end_m = odometry[-1].pose.pose.position.x
+    bag = tmp_path / "bag"
+    recorder.write(bag, StoragePlugin.MCAP)
+    with ExitStack() as stack:
+        port = f"replay://{bag}?speed=5&delay=5"
+        again = stack.enter_context(Driver(port=port, board="fejemis"))
+        heard = stack.enter_context(Probe(again.namespace)).listen(Odometry, "odom")
+        again.wait_for_line("the recording has ended")
+        assert heard[-1].pose.pose.position.x == pytest.approx(end_m, abs=0.01)
