@@ -81,7 +81,8 @@ class Doubt:
         ]
         self._walk = self._walk.carried(dx_m, dy_m).with_errors(errors)
         drift_rad = seconds if way_m or turn_rad else 0.0
-        astray = min(1.0, ASTRAY * self._walk.yaw_yaw)
+        yaw_variance = self._walk.yaw_yaw + self._levers[2][2] ** 2
+        astray = min(1.0, ASTRAY * yaw_variance)
         own = (
             (dx_m, dy_m, 0.0),
             (0.0, 0.0, drift_rad),

@@ -101,6 +101,9 @@ class Ground:
         self._rested_s = -math.inf
         self._counted_at_rest = 0
         self._fresh = False
+        self._conflict = self._lost_told = False
+        self._asked_count: tuple[int, float] | None = None
+        self._name_from_s = self._named_s = self._stop_again_s = self._ask_s = -math.inf
         self._told: set[str] = set()
         self.heard_s = -math.inf
         self.greeted = False

@@ -9,14 +9,14 @@ import math
 
 from omnibot_driver.core.commands.orders import GoTo
 from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.asking import Asking
 from omnibot_driver.core.mart.goal import Done, Move, next_move
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.states import NEEDS_IMU, Motion
-from omnibot_driver.core.mart.stops import Stops
 from omnibot_driver.core.mart.words import Request
 
 
-class Moves(Stops):
+class Moves(Asking):
     """The part of the pilot that leads to a goal."""
 
     @property

@@ -32,6 +32,8 @@ STOPS_S: Final = 1.0
 """The answer to a stop takes no longer, as a rule."""
 COPY_S: Final = 0.25
 """After a controlled move the encoder is answered by then, unless a copy of the move runs."""
+BLIND_PART: Final = 0.15
+"""By so much the sides may have changed against each other while no heading is told."""
 STRAY_COUNTS: Final = 3
 """A robot that stands and is counted so far since the last count moves."""
 STRAY_AGAIN_S: Final = 3.0
@@ -57,7 +59,7 @@ class Pilot(Starts):
     @property
     def stop_words(self) -> tuple[Word, ...]:
         """What stops the present state, for a caller that cannot receive the replies."""
-        if self.state is State.LOST:
+        if self.state in (State.LOST, State.ASKING):
             return LAST_HALTS[self.motion] or LAST_HALTS[Motion.UNKNOWN]
         if self.motion is Motion.NONE:
             return HALTS[Motion.UNKNOWN]
@@ -99,6 +101,8 @@ class Pilot(Starts):
             return self._stopping.wake_at if self._stopping is not None else now
         if self.state is State.LOST:
             return self._said_lost_s + LOST_REPEAT_S
+        if self.state is State.ASKING:
+            return self._ask_s if pending is None else pending.until_s
         if pending is not None:
             return min(pending.until_s, self.jobs.wake_at, self._copy_stop_s)
         if self.state is State.SERVING:
@@ -125,6 +129,8 @@ class Pilot(Starts):
             return self._keep_stopping(now)
         if self.state is State.LOST:
             return self._repeat_lost(now)
+        if self.state is State.ASKING:
+            return self._keep_asking(now)
         if why := self._why_stop(now):
             self._halt(now, "" if why == "wanted" else why)
             return self._keep_stopping(now)
@@ -188,13 +194,17 @@ class Pilot(Starts):
         self.conversation.hear(reply, now)
         if self._stopping is not None and self._stopping.asks_name(now):
             self._stopped(now)  # the command port is free: the move is over, its reply was lost
+        if self.state is State.ASKING:
+            self._named_s = now
         if self.state is State.LOST:
-            self._notice("the server answers again; it is stopped first", halt=True)
-            self.state, self.motion = State.UNKNOWN, Motion.UNKNOWN
+            self._ask_what_moves(now)
+            self._named_s = self._name_from_s
 
     def _answered(self, answer: Answer, now: float) -> None:
         word, reply = answer.word, answer.reply
-        if word.kind is Kind.QUERY:
+        if self.state is State.ASKING:
+            self._asked(answer, now)
+        elif word.kind is Kind.QUERY:
             self._measured(answer, now)
         elif word.kind is Kind.CHECK:
             self._checked(answer, now)
@@ -215,7 +225,9 @@ class Pilot(Starts):
 
     def _missed(self, word: Word, now: float) -> None:
         """No reply came in time."""
-        if word.kind is Kind.START:
+        if self.state is State.ASKING:
+            self._unanswered(word)
+        elif word.kind is Kind.START:
             self._halt(now, f"{word.text} was not answered")
         elif word.kind is Kind.MOVE:
             self._halt(now)  # its reply is lost, or it takes too long; the way is planned anew
@@ -227,6 +239,8 @@ class Pilot(Starts):
             self.jobs.missed(word, now)
         elif word.kind is Kind.CHANGE:
             self.loop.missed()
+            if self.odometry.left_over_right is not None and self.loop.part > BLIND_PART:
+                self._halt(now)  # nothing would tell how it turns; it begins anew
         else:
             self._polls.press(word)
 

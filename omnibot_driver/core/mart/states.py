@@ -60,6 +60,7 @@ class State(Enum):
     MOVING = "controlled move by TF, TB, MCR or MCL"
     SERVING = "still, while the server is busy"
     STOPPING = "stopping"
+    ASKING = "not known: the stop port was used, and the server is asked what is in progress"
     LOST = "lost: the server must be restarted"
 
 
@@ -91,6 +92,7 @@ MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
     State.MOVING: frozenset({SL, SS}),
     State.SERVING: frozenset(),
     State.STOPPING: frozenset({SRM, SM, SL, SS}),
+    State.ASKING: frozenset({HELLO, ENC, RESET, SL, SS}),
     State.LOST: frozenset({HELLO, SRM, SM, SL, SS}),
 }
 """All that start, and SB, besides only right after a proof of the IMU (RESET or CHECK)."""

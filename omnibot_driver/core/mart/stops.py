@@ -157,12 +157,10 @@ class Stops(Ground):
         stopping = self._stopping
         assert stopping is not None
         if stopping.failed and now >= stopping.wake_at:
-            if self.greeted:
-                self._lose(now)
-            else:
-                self.state = State.UNKNOWN
-                self._halt(now)
-                return self._greet(now)
+            if self.motion is Motion.UNKNOWN and not self.greeted:
+                self._ask_what_moves(now)
+                return NO_PACKETS
+            self._lose(now)
             return self._repeat_lost(now)
         said = stopping.due(now)
         packets = self._send(said, now)
@@ -226,15 +224,19 @@ class Stops(Ground):
             steady_radps = self._spin_seen_radps * abs(math.radians(degrees)) / whole_rad
             self.loop.spun(self._spin_units, steady_radps)
 
-    def _lose(self, now: float) -> None:
-        """The server answers no more, and may be moving the robot."""
+    def _lose(self, now: float, why: str = "") -> None:
+        """The server answers no more, or begins nothing any more, and may be moving the robot."""
         self._stopping = None
         self.state = State.LOST
+        self._said_lost_s = now if why else -math.inf
+        if self._lost_told:
+            return
+        self._lost_told = True
         self.lost += 1
-        self._said_lost_s = -math.inf
+        why = why or f"the server does not answer the stop of {NAMES[self.motion]}"
         self._notice(
-            f"lost: the server does not answer the stop of {NAMES[self.motion]}; motion is refused;"
-            " cut the motor power if the robot moves, then restart the server",
+            f"lost: {why}; motion is refused; cut the motor power if the robot moves, then restart"
+            " the server",
             halt=True,
         )
 
@@ -242,8 +244,12 @@ class Stops(Ground):
         if now < self._said_lost_s + LOST_REPEAT_S:
             return NO_PACKETS
         self._said_lost_s = now
-        said = HALTS[self.motion] if self.motion is not Motion.UNKNOWN else HALTS[Motion.UNKNOWN]
+        said = () if self.motion is Motion.UNKNOWN else HALTS[self.motion]
         return self._send(said, now) + self._greet(now)
+
+    def _ask_what_moves(self, now: float) -> None:
+        """What comes where the stop port was used for a motion that is not known (``Asking``)."""
+        raise NotImplementedError
 
     def _obstacle(self, reply: Fail, motion: Motion) -> str:
         """What a failure within a motion means."""
