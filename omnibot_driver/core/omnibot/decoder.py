@@ -25,6 +25,7 @@ from omnibot_driver.core.omnibot import cost_model
 from omnibot_driver.core.omnibot.cost_model import NOTHING_KNOWN, Context, Expectation
 from omnibot_driver.core.omnibot.fast_path import Walk, goes_on, take_run
 from omnibot_driver.core.omnibot.frames import (
+    DELTA_LENGTH,
     INCOMPLETE,
     NO_FRAME,
     ByteOrder,
@@ -42,6 +43,8 @@ SPOKEN_AGAINST: Final = 3.0
 """A content of this cost waits for what follows."""
 DOUBT_BYTES: Final = 170
 """100 ms of the nominal stream."""
+SHORTEST_RUN: Final = DELTA_LENGTH
+"""Bytes; fewer hold no frame that the fast path takes. Adapters hand over pieces."""
 FRAMES_TO_SETTLE: Final = 3
 """Number of certain frames behind a doubtful one after which nothing more will be learnt about
 it."""
@@ -172,7 +175,7 @@ class FrameDecoder:
         at, size, walk = 0, len(held), Walk(context)
         while at < size:
             paused = gaps and gaps[-1].first > at  # within what follows
-            if not paused:
+            if not paused and size - at >= SHORTEST_RUN:
                 at, context = take_run(held, at, context, expectation, order, walk)
                 if at == size:
                     break
