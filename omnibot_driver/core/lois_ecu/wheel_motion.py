@@ -37,6 +37,8 @@ DRY_MPS2: Final = 0.7
 """Without power: time constant and dry friction."""
 COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
+ROLLED_OUT_S: Final = 1.0
+"""After a change of sign no wheel goes on for longer in the old direction."""
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
 
@@ -80,6 +82,9 @@ class Wheel:
         self.rolls_on = False
         """The reported speed may be that from before the target changed its sign."""
         self.rolls_on_s = 0.0
+        self.rolled_mps = 0.0
+        self.rolled_s = math.inf
+        """The speed when the controller began anew, and how long ago that was."""
         self.locked = False
         """It stands, and the speed that it keeps is more than its target: it gets no power."""
         self.rests = False
@@ -90,6 +95,7 @@ class Wheel:
         """The controller was set back while the wheel had this speed."""
         self.cut, self.wound_m = True, 0.0
         self.rests = False
+        self.rolled_mps, self.rolled_s = speed_mps, 0.0
         if abs(speed_mps) > STANDS_MPS:
             self.rolls_on, self.rolls_on_s = True, ROLLS_ON_S
 
@@ -105,6 +111,11 @@ class Wheel:
         """One step. ``holds``: the measured speed is kept; ``signed``: ticks count both ways."""
         base, dt, new = self.base, step.dt, step.new
         speed = new[base + SPEED]
+        self.rolled_s += dt
+        if target_mps * speed < 0 and (
+            speed * self.rolled_mps <= 0 or self.rolled_s > ROLLED_OUT_S
+        ):
+            speed = new[base + SPEED] = new[base + PUSH] = 0.0  # no wheel starts the wrong way
         counts = self.counts(speed, signed=signed)
         if not target_mps or target_mps * speed < 0 or (self.cut and speed):
             self._coast(step, target_mps, holds=holds)
