@@ -105,7 +105,8 @@ class Wheel:
             return 1.0
         if not self.course.counting:
             return 0.0
-        return -1.0 if speed_mps < 0 else 1.0
+        rolls_back = speed_mps < 0 and self.rolled_mps < 0 and self.rolled_s < ROLLED_OUT_S
+        return -1.0 if rolls_back else 1.0
 
     def roll(self, step: Step, target_mps: float, *, holds: bool, signed: bool) -> None:
         """One step. ``holds``: the measured speed is kept; ``signed``: ticks count both ways."""
