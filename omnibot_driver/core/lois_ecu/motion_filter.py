@@ -12,9 +12,9 @@ commanded course and the firmware's counters; no messages.
 """
 
 import math
-from collections import deque
 from typing import Final
 
+from omnibot_driver.core.lois_ecu.filter_history import FilterHistory
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
 from omnibot_driver.core.lois_ecu.wheel_motion import (
     ALONG,
@@ -39,8 +39,6 @@ from omnibot_driver.core.odometry.covariance import Covariance
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
 """What was not heard of for longer is not predicted any further."""
-KEPT: Final = 32
-"""Groups that may come until a restart is noticed."""
 ROLLED_OUT_S: Final = 0.15
 """At the speed that it had, a wheel without power rolls on for about this time."""
 LATE_PART: Final = 0.6
@@ -73,7 +71,7 @@ class MotionFilter:
         self.differing_mps = math.inf
         """The least difference of both measured speeds since this was last set."""
         self._kinds: tuple[str, str] | None = None
-        self._kept: deque[tuple[float, list[float], list[list[float]]]] = deque(maxlen=KEPT)
+        self.history = FilterHistory(self.filter)
 
     @property
     def yaw_rad(self) -> float:
@@ -113,6 +111,13 @@ class MotionFilter:
             turn * turn * (matrix[left][left] + matrix[right][right] - 2 * matrix[left][right]),
         )
 
+    def twist_variances(self) -> tuple[float, float]:
+        """Of the speed in (m/s)² and the turning in (rad/s)²."""
+        left, right, estimate = SPEED, PER_WHEEL + SPEED, self.filter
+        speed = estimate.variance_of([(left, 0.5), (right, 0.5)])
+        turning = estimate.variance_of([(left, -1 / self.track_m), (right, 1 / self.track_m)])
+        return 1e-4 + speed, 1e-3 + turning
+
     @property
     def resting(self) -> bool:
         """Whether nothing is commanded and nothing moves."""
@@ -134,27 +139,15 @@ class MotionFilter:
             self._step(end_s - at_s)
             at_s = end_s
 
-    def forget_kept(self) -> None:
-        """What was remembered is in another frame."""
-        self._kept.clear()
-
-    def keep(self, now: float) -> None:
-        """Remember how it is now, for ``restart``."""
-        estimate = self.filter
-        covariance = [list(row) for row in estimate.covariance]
-        self._kept.append((now, list(estimate.mean), covariance))
-
     def restart(self, then_s: float) -> None:
         """The board restarted then, and the wheels have rolled out since.
 
         What was believed of the time after is taken back, and no set-point is in force. Where ticks
         count both ways they have begun at zero, and tell how far the wheels rolled out.
         """
-        while len(self._kept) > 1 and self._kept[-1][0] > then_s:
-            self._kept.pop()
-        if not self._kept:
+        kept_s = self.history.go_back(then_s)
+        if kept_s is None:
             return
-        kept_s, self.filter.mean, self.filter.covariance = self._kept.pop()
         powered_s = max(min(then_s - kept_s, LONGEST_STEP_S), 0.0)
         for index, wheel in enumerate(self.wheels):
             speed = self.speed_mps(index)

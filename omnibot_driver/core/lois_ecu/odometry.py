@@ -23,7 +23,7 @@ from omnibot_driver.core.lois_ecu.plausibility import wrapped
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.size_errors import LoisOdometrySettings, SizeErrors
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
-from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, SPEED, WAY, X, Y
+from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, WAY, X, Y
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, Uncertainty
 
 __all__ = ["FusedOdometry", "LoisOdometry", "LoisOdometrySettings", "Source"]
@@ -106,7 +106,7 @@ class LoisOdometry:
         self._uncertainty = Uncertainty(self._uncertainty.noise)
         self._sizes = SizeErrors(self._noise.wheel_scale, self._noise.wheel_slip)
         self._pose, self._ways_m = Pose(), (0.0, 0.0)
-        self._motion.forget_kept()
+        self._motion.history.forget()
 
     def connect(self) -> None:
         """The line is new: counters may have begun anew, the pose goes on."""
@@ -198,7 +198,7 @@ class LoisOdometry:
     def _keep(self, now: float) -> None:
         """This was heard: what is predicted from now on may be taken back."""
         self._heard_at_s = now
-        self._motion.keep(now)
+        self._motion.history.keep(now)
 
     def _after_silence(self, now: float) -> None:
         """What the wheels did in a long silence is not known; nor what 0x20 was compared with."""
@@ -279,7 +279,7 @@ class LoisOdometry:
             pose,
             twist,
             covariance,
-            self._twist_variances(),
+            motion.twist_variances(),
             displacement,
             ways_m,
             self._source,
@@ -297,11 +297,3 @@ class LoisOdometry:
         late_m, late_rad = late_s * twist.vx_mps, late_s * twist.yaw_rate_radps
         along = (late_m**2, math.cos(yaw_rad), math.sin(yaw_rad), 0.0)
         return whole.with_errors([along, (late_rad**2, 0.0, 0.0, 1.0)])
-
-    def _twist_variances(self) -> tuple[float, float]:
-        """Of the speed in (m/s)² and the turning in (rad/s)²."""
-        left, right, track = SPEED, PER_WHEEL + SPEED, self._settings.track_m
-        estimate = self._motion.filter
-        speed = estimate.variance_of([(left, 0.5), (right, 0.5)])
-        turning = estimate.variance_of([(left, -1 / track), (right, 1 / track)])
-        return 1e-4 + speed, 1e-3 + turning
