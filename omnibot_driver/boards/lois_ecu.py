@@ -58,7 +58,7 @@ def make(values: Mapping[str, Any]) -> LoisEcuBoard:
 
 
 def settings(values: Mapping[str, Any]) -> LoisEcuSettings:
-    """What its wire does not tell, by checked values."""
+    """The settings that the wire does not reveal, from checked values."""
     wheels = kinematics(values)
     return LoisEcuSettings(
         wheel_radius_m=wheels.wheel_radius_m,

@@ -76,7 +76,7 @@ class Recorder:
         self._end(self._token, False, f"the record failed: {failed.reason}")
 
     def _on_record(self, reading: RecordReading, _stamp_ns: int) -> None:
-        """On a thread of its own: a disk may take its time, and the reader does not wait for it."""
+        """Write the file on a thread of its own, so that a slow disk does not delay the reader."""
         save = partial(self._save, self._token, reading)
         threading.Thread(target=save, name="omnibot-record", daemon=True).start()
 

@@ -57,7 +57,7 @@ def table(reading: RecordReading) -> Iterator[Row]:
 
 
 def remark(reading: RecordReading) -> str:
-    """What the file does not tell, in a sentence; empty where it tells all."""
+    """A sentence on the limits of the file; empty if there are none."""
     if reading.record.kind is not RecordKind.RPM:
         return ""
     if reading.count_s is None:
@@ -70,7 +70,7 @@ def remark(reading: RecordReading) -> str:
 
 
 def file_name(kind: RecordKind, at_s: float) -> str:
-    """Of a record that ended then, in s of UTC since 1970."""
+    """File name of a record that ended at this time, in s of UTC since 1970."""
     return f"{kind.value}_{datetime.fromtimestamp(at_s, UTC):%Y%m%dT%H%M%S_%f}.csv"
 
 

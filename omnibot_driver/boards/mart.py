@@ -48,7 +48,7 @@ def make(values: Mapping[str, Any]) -> MartBoard:
 
 
 def settings(values: Mapping[str, Any]) -> MartSettings:
-    """What its wire does not tell, by checked values."""
+    """The settings that the wire does not reveal, from checked values."""
     wheels = kinematics(values)
     sign = -1 if values["encoder_inverted"] else 1
     return MartSettings(

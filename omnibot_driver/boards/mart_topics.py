@@ -146,7 +146,7 @@ class MartTopics:
         return done
 
     async def _save(self, done: JobDone) -> tuple[bool, str]:
-        """On a thread of its own: a disk may take its time."""
+        """Write the file on a thread of its own, since a disk may be slow."""
         answer = Future()
         directory = Path(self._values["record_directory"]).expanduser()
         path = (directory / PurePosixPath(done.name).name).absolute()
@@ -176,7 +176,7 @@ class MartTopics:
             self._timer.cancel()
 
     def _set_time(self) -> None:
-        """Once, when the robot is proved to stand: the server integrates its gyro by this clock."""
+        """Set the clock once, at a proved standstill: the server integrates its gyro by it."""
         utc = time.gmtime()
         fields = (utc.tm_mon, utc.tm_mday, utc.tm_year, utc.tm_hour, utc.tm_min, utc.tm_sec)
 

@@ -27,7 +27,7 @@ def line(seed: int, settings_: OdometrySettings | None = None, frame: str = "ear
 
 
 def lose(on: Line, seconds: float, *headers: bytes) -> None:
-    """Lose everything, or what begins so, for a while."""
+    """Lose all bytes, or frames that begin like this, for a while."""
     on.loses = lambda data, _now: not headers or data[:2] in headers
     on.run(seconds)
     on.loses = loses_nothing

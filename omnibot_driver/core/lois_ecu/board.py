@@ -42,7 +42,7 @@ from omnibot_driver.core.lois_ecu.upkeep import Upkeep
 
 
 class LoisEcu:
-    """One board on one line. ``settings`` may be replaced at any time."""
+    """One LOIS ECU on one line. ``settings`` may be replaced at any time."""
 
     traits = TRAITS
 
@@ -64,7 +64,7 @@ class LoisEcu:
 
     @property
     def settings(self) -> LoisEcuSettings:
-        """What the wire does not tell."""
+        """The settings that the wire does not reveal."""
         return self._settings
 
     @settings.setter
@@ -133,21 +133,21 @@ class LoisEcu:
         )
 
     def silence(self) -> None:
-        """Nothing was understood for so long that the mode is unknown again."""
+        """Forget the mode, as the board has been silent for too long."""
         self.mode = Mode.UNKNOWN
 
     @property
     def translation(self) -> Translation:
-        """What is known of the robot."""
+        """The translation, which knows the robot's state."""
         return self._translation
 
     @property
     def held_until(self) -> float:
-        """When ``receive`` without bytes tells what was held; infinity while nothing is."""
+        """The time at which ``receive`` without bytes returns held data; infinity without any."""
         return self._decoder.resolves_at
 
     def predicted(self, now: float) -> FusedOdometry | None:
-        """Where the robot should be now; None before the first ticks."""
+        """The predicted pose of the robot now; None before the first ticks."""
         return self._translation.odometry.predict(now)
 
     def reset_odometry(self) -> None:
@@ -184,7 +184,7 @@ class LoisEcu:
 
     @property
     def advice(self) -> str | None:
-        """What a user should set otherwise, by what comes; None while all is well."""
+        """Advice on settings that contradict the data; None if there is none."""
         return self._suspicion.advice
 
     @property
@@ -207,7 +207,7 @@ class LoisEcu:
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has to be asked again."""
+        """The time at which ``due`` must be called again."""
         return min(self._upkeep.wake_at, self._decoder.resolves_at)
 
     @property
@@ -236,7 +236,7 @@ class LoisEcu:
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
-        """By the drive mode; Stop when it rounds to nothing."""
+        """Encode a velocity by the drive mode; Stop if it rounds to zero."""
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:

@@ -34,7 +34,7 @@ class Told:
 
 
 class OdometryReader:
-    """Of a board with these wheels."""
+    """Reads odometry of a board with these wheels."""
 
     def __init__(self, track_m: float, rpm_mps: float) -> None:
         self._track_m, self._rpm_mps = track_m, rpm_mps
@@ -79,7 +79,7 @@ class OdometryReader:
 
 
 def rim_speeds(group: BoardOdometry, track_m: float) -> tuple[float, float] | None:
-    """Of both rims, left and right, by the velocity; None where it is not a number."""
+    """Speeds of the left and right rim by the velocity; None where it is not a number."""
     along = group.dx_mps * math.cos(group.yaw_rad) + group.dy_mps * math.sin(group.yaw_rad)
     # Of a tick that took a rest the velocity points to the middle of a large turn.
     forward = math.copysign(math.hypot(group.dx_mps, group.dy_mps), along)

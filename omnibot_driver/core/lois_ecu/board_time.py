@@ -56,7 +56,7 @@ class BoardTime:
         self._lines += lines
 
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
-        """For ticks that came now: at least zero, and so that none is older than those before."""
+        """Delay of ticks that arrive now: at least zero, and never older than earlier ones."""
         late_s = max(min(self._above_s(counts, unit, now), now - self._taken_s), 0.0)
         self._taken_s = now - late_s
         return late_s
@@ -84,7 +84,7 @@ class BoardTime:
 
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
-    """How far each is above a line under them: through the lowest of either half."""
+    """Height of each point above a line through the lowest points of either half."""
     half = len(kept) // 2
     points = list(kept)
     first_s, first = min(points[:half], key=itemgetter(1))

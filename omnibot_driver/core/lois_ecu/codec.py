@@ -60,7 +60,7 @@ from omnibot_driver.core.lois_ecu.messages import (
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """One command: its byte, its kind, and its payload from its fields and back."""
+    """The form of a command: its byte, its kind, and its payload from its fields and back."""
 
     code: Code
     kind: type
@@ -126,7 +126,7 @@ def _said(command: Command) -> tuple[int, int]:
 
 
 def decode_command(data: bytes, *, with_sum: bool = True) -> Command:
-    """What the one line of a host says. Raises FrameError when it says nothing."""
+    """Decode one line of a host. Raises FrameError if it is not a command."""
     line = line_of(data, sum_required=with_sum)
     if line is None or (not with_sum and len(data.replace(b"\r", b"")) != 12):
         raise FrameError(f"not one whole line: {data!r}")
@@ -191,7 +191,7 @@ def _encode_record(record: Record) -> bytes:
 
 
 def single_report(line: Line) -> Report | None:
-    """What a line reports that is a report by itself; None if it reports nothing, or nonsense."""
+    """Decode a line that is a report by itself; None if it is not a valid one."""
     payload = line.payload
     low = payload & 0xFFFF
     high, middle, last = payload >> 16, low >> 8, low & 0xFF

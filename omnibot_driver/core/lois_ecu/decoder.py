@@ -53,17 +53,17 @@ class LoisDecoder:
 
     @property
     def group_statistics(self) -> GroupStatistics:
-        """What became of the lines."""
+        """Counters of groups of lines."""
         return self._assembler.statistics
 
     @property
     def clock_unit(self) -> ClockUnit | None:
-        """Of ``Ticks.time_counts``; None while unknown."""
+        """The unit of ``Ticks.time_counts``; None while unknown."""
         return self._assembler.clock_unit
 
     @property
     def resolves_at(self) -> float:
-        """When ``feed`` should be called at the latest, also without bytes."""
+        """The latest time for the next ``feed``, with or without bytes."""
         return self._assembler.resolves_at
 
     @property
@@ -110,7 +110,7 @@ class LoisDecoder:
         return [report for _, report in found]
 
     def _take(self, text: bytes, now: float) -> list[Timed]:
-        """One piece of the stream between two line feeds."""
+        """Decode the characters between two line feeds."""
         before, self._cut_bytes = self._cut_bytes, 0
         at = text.rfind(BEGIN)
         line = None

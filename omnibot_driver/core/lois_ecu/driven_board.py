@@ -44,7 +44,7 @@ HEARD: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=Fals
 
 
 class LoisEcuBoard(Board):
-    """One ECU. ``settings`` may be replaced at any time."""
+    """One LOIS ECU. ``settings`` may be replaced at any time."""
 
     traits = TRAITS
 
@@ -64,7 +64,7 @@ class LoisEcuBoard(Board):
 
     @property
     def settings(self) -> LoisEcuSettings:
-        """What the wire does not tell."""
+        """The settings that the wire does not reveal."""
         return self._ecu.settings
 
     @settings.setter
@@ -84,7 +84,7 @@ class LoisEcuBoard(Board):
 
     @property
     def advice(self) -> str | None:
-        """What a user should set otherwise; None while all is well."""
+        """Advice on settings that contradict the data; None if there is none."""
         return self._ecu.advice
 
     @property
@@ -101,7 +101,7 @@ class LoisEcuBoard(Board):
         self._connect()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """What these bytes complete."""
+        """Decode bytes; returns the readings that they complete."""
         before = self.mode
         readings = self._read(self._ecu.receive(data, now))
         if not readings and self.mode is not before:
@@ -113,7 +113,7 @@ class LoisEcuBoard(Board):
         return self._read(self._ecu.flush(now))
 
     def silence(self) -> None:
-        """It is not known to be there any more."""
+        """Note that the board is silent, and may be lost."""
         self._ecu.silence()
 
     def elapse(self, now: float) -> list[Reading]:
@@ -161,7 +161,7 @@ class LoisEcuBoard(Board):
         return [ResetReading(proof.remark)]
 
     def _tangent(self, fused: FusedOdometry) -> Pose:
-        """What both wheels made of the robot since the estimate before."""
+        """The robot's motion since the last estimate, by both wheels."""
         left_m, right_m = fused.wheel_ways_m
         sign = -1.0 if self.settings.inverted else 1.0
         return Pose((left_m + right_m) / 2, 0.0, sign * (right_m - left_m) / self.settings.track_m)
@@ -181,7 +181,7 @@ class LoisEcuBoard(Board):
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` or ``elapse`` have something."""
+        """The time of the next ``due`` or ``elapse``."""
         odometry_at = self._odometry_at if self.mode is Mode.NOMINAL else math.inf
         once_at = -math.inf if self._once else math.inf
         return min(self._ecu.wake_at, odometry_at, once_at, self._reset_at_s)

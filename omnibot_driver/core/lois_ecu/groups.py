@@ -79,12 +79,12 @@ class Assembler:
 
     @property
     def clock_unit(self) -> ClockUnit | None:
-        """Of ``Ticks.time_counts``; None while unknown."""
+        """The unit of ``Ticks.time_counts``; None while unknown."""
         return self._ticks_gate.unit
 
     @property
     def resolves_at(self) -> float:
-        """When a group that is held comes out if nothing follows it; infinity without one."""
+        """The time at which a held group comes out if nothing follows it; infinity without one."""
         return self._at + QUIET_S if self._code is not None and not self._done else math.inf
 
     @property
@@ -132,7 +132,7 @@ class Assembler:
         self._record.damage()
 
     def rest(self, now: float) -> list[Timed]:
-        """Nothing came until now."""
+        """Note that nothing has arrived until now."""
         return self._end(now) if now >= self.resolves_at else []
 
     def finish(self, now: float) -> list[Timed]:
@@ -172,7 +172,7 @@ class Assembler:
         return self._believed(group, now)
 
     def _end(self, now: float) -> list[Timed]:
-        """What was begun is over."""
+        """End the group that was begun."""
         code = self._code
         if code is None:
             return []

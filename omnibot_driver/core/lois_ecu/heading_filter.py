@@ -64,7 +64,7 @@ class HeadingFilter:
 
 
 def _expected(before: tuple[float, float], yaw_rad: float) -> float:
-    """By the odometry, -180..180."""
+    """The heading that the odometry expects, -180..180."""
     return _difference(before[0] - math.degrees(yaw_rad - before[1]), 0.0)
 
 

@@ -87,7 +87,7 @@ class TerminalMode(IntEnum):
 
 
 class RecordKind(Enum):
-    """What can be recorded."""
+    """The kinds of records."""
 
     RPM = "rpm"
     TORQUE = "torque"
@@ -145,7 +145,7 @@ class RecordHeading:
 
 @dataclass(frozen=True, slots=True)
 class WriteSetting:
-    """One float32."""
+    """A command that writes a setting, one float32."""
 
     setting: Setting
     value: float
@@ -161,14 +161,17 @@ class SetPeriod:
 
 @dataclass(frozen=True, slots=True)
 class SetTerminalMode:
-    """Also turns the check of what the host sends on or off."""
+    """A command that sets the terminal mode, and the check of the host's lines."""
 
     mode: TerminalMode
 
 
 @dataclass(frozen=True, slots=True)
 class Reset:
-    """By the manual all controllers, interfaces and counters; in the firmware the ticks alone."""
+    """A command that resets.
+
+    The manual: controllers, interfaces and counters; the firmware: ticks.
+    """
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ class Suspicion:
         self._seen = b""
 
     def understood(self) -> None:
-        """It is the right board."""
+        """Note a valid line: it is the right board."""
         self._seen, self.advice = b"", None
 
     def look(self, data: bytes) -> None:

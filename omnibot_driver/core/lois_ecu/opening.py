@@ -77,7 +77,7 @@ class SettingsWriter:
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has something; infinity while nothing is left."""
+        """The time of the next ``due``; infinity while nothing is left."""
         if self._queue:
             return self._queue[0][0]
         return self._round_at_s if self._rounds_left else math.inf
@@ -91,7 +91,7 @@ class SettingsWriter:
         self._in_period = self._answered = False
 
     def write(self, command: Command, now: float) -> None:
-        """One more, as often."""
+        """Queue one more command, repeated like the others."""
         for count in range(ROUNDS):
             self._queue.append((now + count * ROUND_S, command))
         self._queue = deque(sorted(self._queue, key=lambda entry: entry[0]))
@@ -139,7 +139,7 @@ class SettingsWriter:
         return [*found[:first], *rest[place:], *rest[:place]]
 
     def commands(self) -> Iterable[Command]:
-        """In the order in which they are written."""
+        """The commands in the order in which they are written."""
         settings = self.settings
         if not settings.with_sum:
             yield SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
@@ -153,7 +153,7 @@ class SettingsWriter:
             yield WriteSetting(setting, number)
 
     def recovery(self) -> bytes:
-        """For a board that is silent or obeys nothing, whatever it expects."""
+        """The commands for a board that is silent or does not obey, in any mode."""
         self.overwritten = True
         mode = TerminalMode.HOST if self.settings.with_sum else TerminalMode.HOST_WITHOUT_SUM
         back = SetTerminalMode(mode)

@@ -47,7 +47,7 @@ def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], 
 
 
 def set_points(data: bytes, *, with_sum: bool) -> list[SetRpm | SetDuty]:
-    """Those in bytes that were written, whole lines, in their order."""
+    """The set-points in written bytes, whole lines, in order."""
     length = LENGTH if with_sum else LENGTH_WITHOUT_SUM
     found: list[SetRpm | SetDuty] = []
     for line in data.splitlines(keepends=True):
@@ -59,5 +59,5 @@ def set_points(data: bytes, *, with_sum: bool) -> list[SetRpm | SetDuty]:
 
 
 def lines(*commands: Command, with_sum: bool) -> bytes:
-    """One after the other."""
+    """The lines one after the other."""
     return b"".join(encode_command(command, with_sum=with_sum) for command in commands)

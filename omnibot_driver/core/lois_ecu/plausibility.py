@@ -40,7 +40,7 @@ Group = TypeVar("Group")
 
 
 def wrapped(difference: int) -> int:
-    """Of two counters of 32 bits: -2³¹..2³¹-1."""
+    """The difference of two counters of 32 bits: -2³¹..2³¹-1."""
     return (difference + _HALF) % _WRAP - _HALF
 
 
@@ -74,11 +74,11 @@ class Gate(Generic[Group]):
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """What was learnt of the board's counters is void."""
+        """Forget what was learnt of the board's counters."""
 
 
 class TicksGate(Gate[Ticks]):
-    """Also learns the unit of the board's clock, and then holds the board to it."""
+    """Checks ticks. It also learns the unit of the board's clock, and then requires it."""
 
     def __init__(self) -> None:
         super().__init__(_ticks_follow)
@@ -134,7 +134,7 @@ def _unit_of(before: Ticks, after: Ticks, duration_s: float) -> ClockUnit | None
 
 
 def odometry_gate() -> Gate[BoardOdometry]:
-    """By pose; the velocities may be anything."""
+    """A gate that checks the board's odometry by its pose; the velocities may be anything."""
     return Gate(_odometry_follows)
 
 

@@ -23,7 +23,7 @@ class FixReading:
 
 @dataclass(frozen=True, slots=True)
 class TimeReading:
-    """Of the GPS, in s of UTC since 1970; None while the date is unknown."""
+    """Time of the GPS, in s of UTC since 1970; None while the date is unknown."""
 
     utc_s: int | None
 
@@ -63,7 +63,7 @@ class TerminalLeft:
 
 @dataclass(frozen=True, slots=True)
 class WheelReading:
-    """What both wheels turned since the last one, in rad, by ticks where they count."""
+    """Rotation of both wheels since the last reading, in rad, by ticks where they count."""
 
     left_rad: float
     right_rad: float

@@ -36,7 +36,7 @@ COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
 
 
 def command_of(kind: RecordKind, samples: int) -> Command:
-    """What asks for it. Raises RequestRefused where it could not complete."""
+    """The command for a record. Raises RequestRefused if it could not complete."""
     if not 0 < samples <= MOST_SAMPLES:
         raise RequestRefused(
             f"record refused: {samples} samples; the board completes 1 to {MOST_SAMPLES}"
@@ -60,7 +60,7 @@ class RecordRequest:
         self._said = self._damaged = 0
 
     def begin(self, kind: RecordKind, samples: int, decoder: LoisDecoder) -> None:
-        """From the next ``due`` on; what was awaited before is not awaited any more."""
+        """Begin with the next ``due``; an earlier request is abandoned."""
         self._command, self.kind = command_of(kind, samples), kind
         self._begun_s, self._said = math.inf, 0
         decoder.expect_record(kind, samples, 0 if kind is RecordKind.HEADING else samples)
@@ -100,7 +100,7 @@ class RecordRequest:
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has something."""
+        """The time of the next ``due``."""
         if self._command is None or self._said == len(SAID_AFTER_S):
             return math.inf
         if self._begun_s == math.inf:
@@ -108,7 +108,7 @@ class RecordRequest:
         return self._begun_s + SAID_AFTER_S[self._said]
 
     def due(self, now: float) -> Command | None:
-        """What to say now."""
+        """The command to send now; None if none is due."""
         if now < self.wake_at:
             return None
         self._begun_s = min(self._begun_s, now)

@@ -64,12 +64,12 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel that stands
 
     def clear_again(self) -> None:
-        """It is to be said before the next set-points."""
+        """Send the clearing command again before the next set-points."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property
     def clears_at(self) -> float:
-        """When it is to be said some time after a Stop."""
+        """The time of the clearing command after a Stop; infinity if none is due."""
         return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
 
     def clears(self, now: float) -> bool:
@@ -125,7 +125,7 @@ class SetPoints:
 
     @property
     def kinematics(self) -> DifferentialKinematics:
-        """Of the robot's own left and right."""
+        """Kinematics of the robot's own left and right wheel."""
         settings = self.settings
         return DifferentialKinematics(
             wheel_radius_m=settings.wheel_radius_m, track_m=settings.track_m

@@ -52,5 +52,5 @@ class LoisEcuSettings:
 
     @property
     def tick_m(self) -> float:
-        """What a wheel rolls in one tick."""
+        """Distance that a wheel rolls in one tick."""
         return 6.283185307179586 * self.wheel_radius_m / self.ticks_per_revolution

@@ -49,7 +49,7 @@ class SparseFilter:
         self.mean[state] = mean
 
     def variance_of(self, terms: Terms) -> float:
-        """Of this combination of states."""
+        """Variance of this combination of states."""
         covariance = self.covariance
         return max(sum(a * b * covariance[i][j] for i, a in terms for j, b in terms), 0.0)
 

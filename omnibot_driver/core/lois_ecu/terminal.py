@@ -64,7 +64,7 @@ class ModeChange:
 
     @property
     def reason(self) -> str:
-        """Why no motion is commanded."""
+        """The reason why motion is refused."""
         if self.sensor_wanted:
             return (
                 f"terminal_mode is {self.wanted.name.lower()}, and the board reports no motion;"
@@ -76,7 +76,7 @@ class ModeChange:
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has to be asked again."""
+        """The time at which ``due`` must be called again."""
         if self._stopping:
             return -math.inf if self._stopping_since_s is None else self._again_at_s
         waits = self.sensor_wanted or self._told is not None

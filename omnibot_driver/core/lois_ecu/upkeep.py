@@ -65,7 +65,7 @@ class Upkeep:
 
     @property
     def wake_at(self) -> float:
-        """When ``due`` has to be asked again."""
+        """The time at which ``due`` must be called again."""
         if not self.opened:
             return -math.inf
         return min(

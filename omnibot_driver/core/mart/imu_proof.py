@@ -39,7 +39,7 @@ class ImuProof:
         self.connect()
 
     def connect(self) -> None:
-        """Nothing is proved."""
+        """Begin a new connection: nothing is proved."""
         self.word: Word = RESET
         self.dead = False
         self.again_s = self._proved_s = -math.inf
@@ -59,7 +59,7 @@ class ImuProof:
 
     @property
     def request(self) -> Request:
-        """What to ask."""
+        """The request to send."""
         return RESET.request() if self.word is RESET else CHECK.request(0)
 
     def missed(self, now: float) -> None:

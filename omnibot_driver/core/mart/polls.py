@@ -35,7 +35,7 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
 
 
 class Polls:
-    """When each query was asked last."""
+    """The times of the last queries."""
 
     def __init__(self) -> None:
         self._asked_s: dict[Word, float] = {}
@@ -53,15 +53,15 @@ class Polls:
         return sorted(late, key=lambda word: self._at(word, state) + periods[word])
 
     def asked(self, word: Word, now: float) -> None:
-        """It was sent."""
+        """Note that the query was sent."""
         self._asked_s[word] = now
 
     def press(self, word: Word) -> None:
-        """It is due at once."""
+        """Make the query due at once."""
         self._asked_s.pop(word, None)
 
     def wake_at(self, state: State) -> float:
-        """When the next one is due."""
+        """The time of the next query."""
         return min((self._at(word, state) for word in PERIODS.get(state, {})), default=math.inf)
 
     def _at(self, word: Word, state: State) -> float:

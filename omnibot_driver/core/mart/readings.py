@@ -32,7 +32,7 @@ class DockedReading:
 
 @dataclass(frozen=True, slots=True)
 class JobDone:
-    """What came of a service. ``name``, ``content``: of a file, where one was asked for."""
+    """The result of a service. ``name``, ``content``: of a file, if one was requested."""
 
     token: object
     success: bool

@@ -32,12 +32,12 @@ class Ok:
 
     @property
     def number(self) -> float:
-        """Of an INTEGER or a DECIMAL."""
+        """The value of an INTEGER or a DECIMAL."""
         return float(self.text)
 
     @property
     def file(self) -> tuple[str, int]:
-        """Of a FILE: its name and size in bytes."""
+        """The name of a FILE and its size in bytes."""
         name, _, size = self.text.rpartition(" ")
         return name, int(size)
 
@@ -51,7 +51,7 @@ class Fail:
 
 @dataclass(frozen=True, slots=True)
 class Other:
-    """What is not a reply: a piece of a file, or another program's datagram."""
+    """A datagram that is not a reply: a piece of a file, or of another program."""
 
     data: bytes
 
@@ -66,7 +66,7 @@ class MartDecoder:
         self.foreign = 0
 
     def feed(self, data: bytes, now: float) -> list[Reply]:
-        """What one datagram says; an empty one says nothing."""
+        """Parse one datagram; an empty one gives nothing."""
         if not data:
             return []
         reply = parse(data)
@@ -74,12 +74,12 @@ class MartDecoder:
         return [reply]
 
     def flush(self, now: float) -> list[Reply]:
-        """Nothing is held."""
+        """Return nothing, as no data is held."""
         return []
 
 
 def parse(data: bytes) -> Reply:
-    """One datagram."""
+    """Parse one datagram."""
     if len(data) > LONGEST_REPLY or not data.isascii():
         return Other(data)
     head, _, rest = data.rstrip(b" \0\r\n").decode("ascii").partition(" ")
@@ -94,5 +94,5 @@ def parse(data: bytes) -> Reply:
 
 
 def signed(count: int) -> int:
-    """Of 32 bits: some servers write a negative count without its sign."""
+    """A signed number of 32 bits, as some servers omit the sign of a negative count."""
     return (count + 2**31) % 2**32 - 2**31

@@ -61,7 +61,7 @@ class Notices:
         self._standing = ""
 
     def counted(self, lost: int, overruns: int, refused: Refused, now: float) -> list[str]:
-        """What was lost and refused since it was last told. ``overruns``: of the port."""
+        """A notice of losses and rejections since the last one. ``overruns``: of the port."""
         news = []
         if more := self._lost.since_told(lost, now):
             overrun, self._overruns = overruns > self._overruns, overruns

@@ -113,7 +113,7 @@ class SimulatedLois:
 
     @property
     def truth(self) -> TrueState:
-        """Where the robot is."""
+        """The true pose of the robot."""
         return self._vehicle.truth
 
     @property
@@ -123,7 +123,7 @@ class SimulatedLois:
 
     @property
     def lost_bytes(self) -> int:
-        """Of those, what the board did not hear."""
+        """The number of received bytes that the board missed."""
         return self._uart.lost_bytes
 
     @property
@@ -156,7 +156,7 @@ class SimulatedLois:
             channel.release()
 
     def hold(self, *, left: bool = False, right: bool = False) -> None:
-        """Somebody holds these wheels."""
+        """Hold these wheels by hand."""
         self.motors[0].held, self.motors[1].held = left, right
 
     def receive(self, data: bytes, now: float | None = None, channel: int = 0) -> None:
@@ -170,7 +170,7 @@ class SimulatedLois:
 
     @property
     def facts(self) -> dict[str, object]:
-        """Of the robot and its board."""
+        """Facts of the robot and its board."""
         truth, (left, right) = self.truth, self.wheels
         return {
             "x_m": truth.x_m,
@@ -261,7 +261,7 @@ class SimulatedLois:
             self._uart.say(data, deaf=False)
 
     def _catch_up(self) -> None:
-        """What waited while interrupts were off."""
+        """Serve the interrupts that waited while they were off."""
         pending, self._pending = self._pending, {}
         for index, (is_long, direction) in pending.items():
             self._edge(index, self.now_s, is_long, direction)
@@ -274,7 +274,7 @@ class SimulatedLois:
     # The main loop
 
     def _main_loop(self) -> None:
-        """What is left of a scan, then a whole one: both take less than a millisecond."""
+        """Finish a scan, then do a whole one: both take less than a millisecond."""
         for _ in range(2):
             if not self._scan:
                 self._read_input()
@@ -316,7 +316,7 @@ class SimulatedLois:
         self._say(self._sayings.group(code, self._clock_ms, self.now_s))
 
     def _say_record(self, data: bytes) -> None:
-        """One that is complete; it puts the periodic messages off."""
+        """Send a complete record, which delays the periodic messages."""
         if data:
             self._say(data)
             for timer in self._timers.values():

@@ -50,7 +50,7 @@ class WheelChannel:
     # What the encoder tells
 
     def edge(self, at_s: float, is_long: bool, direction: int) -> None:
-        """One edge, when its interrupt is served."""
+        """Process one edge when its interrupt is served."""
         quirks = self._quirks
         if not quirks.ticks_of_forward_targets:
             self.ticks += direction
@@ -92,7 +92,7 @@ class WheelChannel:
         self._records_torque = torque
 
     def torque(self) -> None:
-        """One reading of the current."""
+        """Take one reading of the current."""
         if self.record_left and self._records_torque and len(self.record) < RECORD_DEPTH:
             self._sample(200 + 25 * abs(self.duty_percent))
 
@@ -124,7 +124,7 @@ class WheelChannel:
             self._next_target = 0
 
     def reset(self) -> None:
-        """By the manual, of everything."""
+        """Reset everything, as the manual says."""
         self.ticks = 0
         if not self._quirks.reset_clears_ticks_only:
             self.command_duty(0)
@@ -132,7 +132,7 @@ class WheelChannel:
             self._next_target = 0
 
     def control(self) -> None:
-        """One step of the controller."""
+        """Run one step of the controller."""
         if self.open_loop:
             return
         target = self._next_target if not self._quirks.reverse_runs_fast else self._target

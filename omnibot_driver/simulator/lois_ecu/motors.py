@@ -66,14 +66,14 @@ class Motor:
         return self._through_gap((before + self.rpm) / 2 * dt_s / 60)
 
     def _late(self, duty_percent: float, dt_s: float) -> float:
-        """What was ordered a dead time ago."""
+        """The order of one dead time ago."""
         self._on_the_way.append(duty_percent)
         if len(self._on_the_way) <= round(self._settings.dead_time_s / dt_s):
             return 0.0
         return self._on_the_way.popleft()
 
     def _through_gap(self, turns: float) -> float:
-        """What the wheel turns when the motor does."""
+        """Rotation of the wheel, through the gap, when the motor turns."""
         backlash = self._settings.backlash_turns
         if not backlash:
             return turns
@@ -109,7 +109,7 @@ class Encoder:
         return (at - before) / (after - before), is_long, 1 if forward else -1
 
     def _place(self, edge: int) -> float:
-        """Of a mark, in periods."""
+        """Position of a mark, in periods."""
         return edge // 2 + (self._short if edge % 2 else 0.0) + self._off[edge % len(self._off)]
 
     def _level(self, periods: float) -> int:
@@ -121,7 +121,7 @@ class Encoder:
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """Of the manual's controller; feed_forward in percent per RPM, low_pass 0..1 for each step."""
+    """Gains of the manual's controller; feed_forward in percent per RPM, low_pass 0..1 per step."""
 
     kp: float
     tn: float

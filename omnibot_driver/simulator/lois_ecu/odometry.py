@@ -15,7 +15,7 @@ SLOW_COUNT_S = 7251 / 72e6
 
 
 class DocumentedOdometry:
-    """From signed ticks and measured speeds."""
+    """Odometry from signed ticks and measured speeds."""
 
     def __init__(self, steps: int, radius_m: float, track_m: float) -> None:
         self._tick_m = 2 * pi * radius_m / steps
@@ -24,12 +24,12 @@ class DocumentedOdometry:
         self.clear()
 
     def clear(self) -> None:
-        """To the origin."""
+        """Return to the origin."""
         self.pose = (0.0, 0.0, 0.0)
         self.velocity = (0.0, 0.0, 0.0)
 
     def move(self, left_ticks: int, right_ticks: int) -> None:
-        """By these."""
+        """Move by these increments."""
         way = (left_ticks + right_ticks) * self._tick_m / 2
         turn = (right_ticks - left_ticks) * self._tick_m / self._track_m
         x, y, yaw = self.pose
@@ -67,7 +67,7 @@ class FirmwareOdometry(DocumentedOdometry):
         self._count: int | None = None
 
     def tick(self, at_s: float, left_rpm: int, right_rpm: int) -> None:
-        """One edge of either wheel, served at this time."""
+        """Process one edge of either wheel at this time."""
         count = int(at_s / self._timer_s) % TIMER_COUNTS
         before, self._count = self._count, count
         if before is None:
@@ -90,7 +90,7 @@ class FirmwareOdometry(DocumentedOdometry):
 
 
 def odometry_of(settings: LoisSettings) -> DocumentedOdometry:
-    """What this board has."""
+    """The odometry of this board's firmware."""
     geometry = settings.steps, settings.wheel_radius_m, settings.track_m
     quirks = settings.quirks
     stands, divides = quirks.odometry_stands_at_equal_speeds, quirks.velocity_may_be_nan

@@ -23,7 +23,7 @@ class Recorder:
         self._wanted = 0
 
     def start(self, number: int, payload: int) -> None:
-        """As commanded; what was recorded is forgotten."""
+        """Start a record and forget the one before."""
         self.number = number
         if number == HEADINGS:
             self._headings, self._wanted = [], payload

@@ -14,7 +14,7 @@ from omnibot_driver.simulator.lois_ecu.vehicle import Vehicle
 
 
 class Sayings:
-    """Of one board from boot to boot."""
+    """Encodes the messages of one board from boot to boot."""
 
     def __init__(
         self,
@@ -49,7 +49,7 @@ class Sayings:
         return group + wire.sequence(code, numbers) if quirks.appends_odometry else group
 
     def fix(self, now_s: float) -> Fix:
-        """Of the GPS."""
+        """A message with the position of the GPS."""
         settings, truth = self._settings, self._vehicle.truth
         if settings.quirks.gps_is_ignored:
             return Fix(0.0, 0.0, (0, 0, 0), (0, 0, 0))

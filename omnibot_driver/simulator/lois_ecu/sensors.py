@@ -16,7 +16,7 @@ DAY_S = 86_400
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """Of the GPS: degrees, then UTC."""
+    """A position of the GPS: degrees, then UTC."""
 
     latitude_deg: float
     longitude_deg: float

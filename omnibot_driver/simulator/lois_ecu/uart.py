@@ -27,7 +27,7 @@ class Uart:
         self.boot()
 
     def boot(self) -> None:
-        """What was heard or was to be sent is forgotten; what is on the line still comes."""
+        """Forget the buffers; what is on the line still arrives."""
         self.input: deque[int] = deque()
         self._sending: deque[tuple[bytearray, bool]] = deque()
         self._out_credit = 0.0
@@ -45,12 +45,12 @@ class Uart:
         return bool(self._sending) and self._sending[0][1]
 
     def receive(self, data: bytes) -> None:
-        """They arrive one after the other from now on."""
+        """Let the bytes arrive one after the other from now on."""
         self.received += data
         self._inbound.extend(data)
 
     def say(self, data: bytes, *, deaf: bool) -> None:
-        """After what is to be sent already."""
+        """Queue these bytes behind those that wait."""
         self._sending.append((bytearray(data), deaf))
 
     def miss(self) -> None:
@@ -58,7 +58,7 @@ class Uart:
         self._misses = True
 
     def listen(self) -> int:
-        """One step; how many characters were heard."""
+        """Run one step; returns how many characters were received."""
         came = heard = 0
         self._in_credit = min(self._in_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
         while self._inbound and self._in_credit >= 1.0:
@@ -78,7 +78,7 @@ class Uart:
         return heard
 
     def send(self, sent: bytearray) -> bool:
-        """One step; whether interrupts are on again, so that ``hear_kept`` is to follow."""
+        """Run one step; returns whether interrupts are on again, so that ``hear_kept`` follows."""
         self._out_credit = min(self._out_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
         while self._sending and self._out_credit >= 1.0:
             burst, deaf = self._sending[0]

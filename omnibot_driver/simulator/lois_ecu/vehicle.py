@@ -15,7 +15,7 @@ from omnibot_driver.simulator.lois_ecu.settings import LoisSettings
 
 @dataclass(frozen=True, slots=True)
 class TrueState:
-    """Where the robot truly is and how it moves: m, rad (unwrapped), m/s, rad/s."""
+    """True pose and motion of the robot: m, rad (unwrapped), m/s, rad/s."""
 
     x_m: float
     y_m: float

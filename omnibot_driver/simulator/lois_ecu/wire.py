@@ -24,13 +24,13 @@ def _sum_of(characters: str) -> int:
 
 
 def line(command: int, payload: int) -> bytes:
-    """One line."""
+    """Encode one line."""
     body = f":{command & 0xFF:02x}{payload & 0xFFFFFFFF:08x}"
     return f"{body}{_sum_of(body):02x}\n".encode("ascii")
 
 
 def words(command: int, high: int, low: int) -> bytes:
-    """One line of two words."""
+    """Encode one line of two words."""
     return line(command, (high & 0xFFFF) * 0x10000 + (low & 0xFFFF))
 
 
@@ -86,7 +86,7 @@ class LineReader:
         return command, high * 0x10000 + low
 
     def take_all(self, data: bytes) -> Iterator[tuple[int, int]]:
-        """Of many characters."""
+        """Read many characters."""
         for character in data:
             found = self.take(character)
             if found is not None:

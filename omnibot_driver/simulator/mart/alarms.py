@@ -72,7 +72,7 @@ def sample(server: "MartServer", motion: Motion) -> None:
 
 
 def _miss(server: "MartServer", motion: Motion) -> None:
-    """There is no sample: only controlled moves notice."""
+    """Notice a missing sample, in controlled moves only."""
     if server.quirks.drives_trust_imu and motion.kind not in (*_TIMED, Kind.CONTROLLED_SPIN):
         return
     now, last = server.now_s, motion.sampled_s
@@ -143,7 +143,7 @@ def _end(server: "MartServer", motion: Motion) -> None:
 
 
 def _timed_distance_in(motion: Motion) -> float:
-    """What it must have driven, by its calibration alone; the ramps are taken in feet."""
+    """The distance by the calibration and the time alone; the ramps are in feet."""
     if motion.kind not in _TIMED:
         return 0.0
     ramps_s, top_inps = sum(motions.RAMPS_S[motion.word]), motions.TOP_SPEED_INPS[motion.word]
@@ -175,7 +175,7 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 
 
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
-    """By these, forward positive; as the server limits them."""
+    """Change the speeds, forward positive, within the server's limits."""
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:
         if new_right > 255:

@@ -44,7 +44,7 @@ class SimulatedMart:
 
     @property
     def facts(self) -> Mapping[str, object]:
-        """Of the robot and its controller."""
+        """Facts of the robot and its controller."""
         server, chassis = self.server, self.server.chassis
         motion = server.motion
         return {

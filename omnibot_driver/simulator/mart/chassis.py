@@ -40,7 +40,7 @@ class Chassis:
         self.power_cycle()
 
     def power_cycle(self) -> None:
-        """Of the motor board; the wheels stop."""
+        """Switch the motor board off and on; the wheels stop."""
         self.right = self.left = STOP
         self._applied_right = self._applied_left = 0.0
         self.right_mps = self.left_mps = 0.0
@@ -84,18 +84,18 @@ class Chassis:
             self.right, self.left = right & 0xFF, left & 0xFF
 
     def accelerate(self, units: int) -> None:
-        """How fast it obeys from now on."""
+        """Set the acceleration from now on."""
         if not self.silent:
             self.acceleration = units
 
     def reset_encoders(self) -> None:
-        """To zero."""
+        """Set the encoders to zero."""
         if not self.silent:
             self.counts = 0.0
 
     @property
     def encoder(self) -> int:
-        """What the board tells; 0 where its line is cut."""
+        """The count that the board reports; 0 if its line is cut."""
         return 0 if self.silent else int(self.counts)
 
     @property
@@ -115,18 +115,18 @@ class Chassis:
 
     @property
     def rests(self) -> bool:
-        """Nothing changes as time passes."""
+        """Whether nothing changes as time passes."""
         return not (self.powered or self.moving or self._applied_right or self._applied_left)
 
     @property
     def error_bits(self) -> int:
-        """What the board tells of its state."""
+        """The state bits that the board reports."""
         return self.motor_status | (64 if self.volts > 30 else 0) | (128 if self.volts < 16 else 0)
 
     def _turn(
         self, wanted: int, applied: float, speed_mps: float, gain: float
     ) -> tuple[float, float]:
-        """What is applied to a motor 10 ms later, and its speed."""
+        """Run 10 ms of a motor: its applied effort and its speed."""
         if applied != wanted:
             slew = self.acceleration * RAMPS_PER_S * STEP_S
             if applied < wanted:
@@ -164,7 +164,7 @@ class Chassis:
 
 
 def sight_m(chassis: Chassis, front_m: float, rear_m: float, *, backward: bool) -> float:
-    """How far a sonar sees: to a wall across x in front of it or behind it."""
+    """Range of a sonar to a wall across x, in front of it or behind it."""
     along = cos(chassis.yaw_rad + (pi if backward else 0.0))
     if along > 0.3:
         return (front_m - chassis.x_m) / along

@@ -77,7 +77,7 @@ def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
 
 
 def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -> None:
-    """One sample of the bias after the other; ``kind`` None: of SB."""
+    """Take one sample of the bias after the other; ``kind`` None: of SB."""
     if server.imu.living(server.now_s):
         left, missed = left - 1, 0
     else:
@@ -206,7 +206,7 @@ def controlled_done(server: "MartServer", kind: Kind) -> None:
 
 
 def last_distance_in(server: "MartServer") -> int:
-    """Of the last TF or TB."""
+    """The distance of the last TF or TB."""
     return round(server.motions[Kind.CONTROLLED_LINEAR].reported_in)
 
 

@@ -91,7 +91,7 @@ class MartServer(ServerState):
 
     @property
     def wake_at(self) -> float:
-        """When something happens next, if no datagram comes; infinite if nothing will."""
+        """The time of the next event without a datagram; infinite if there is none."""
         if self._out:
             return self.now_s
         return min(self._step_at_s, inf if self._later is None else self._later.at_s)
@@ -117,7 +117,7 @@ class MartServer(ServerState):
         self._boots_until_s = self.now_s + boot_s
 
     def power_cycle(self, boot_s: float = 1.0) -> None:
-        """Of controller and motor board; the robot stays where it is."""
+        """Switch controller and motor board off and on; the robot stays where it is."""
         self.chassis.power_cycle()
         self.restart(boot_s)
 

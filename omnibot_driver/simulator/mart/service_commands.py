@@ -37,22 +37,22 @@ def missing(server: "MartServer", what: str) -> str | None:
 
 
 def fine(server: "MartServer", text: str) -> str | None:
-    """Nothing of it is played."""
+    """Accept a sound, which is not played."""
     return "ok"
 
 
 def bare_fail(server: "MartServer", text: str) -> str | None:
-    """There are no calibration files."""
+    """Answer fail, as there are no calibration files."""
     return "fail"
 
 
 def hello(server: "MartServer", text: str) -> str | None:
-    """Who it is."""
+    """Answer with the server's name."""
     return "ok BBB"
 
 
 def volts(server: "MartServer", text: str) -> str | None:
-    """Of the battery."""
+    """Answer with the battery's voltage."""
     return f"ok {server.chassis.volts:.2f}"
 
 

@@ -96,7 +96,7 @@ class ServerState:
 
     @property
     def clock_s(self) -> float:
-        """Of the wall, in Unix time."""
+        """The wall clock, in Unix time."""
         return self.now_s + self.clock_offset_s
 
     @property
@@ -111,7 +111,7 @@ class ServerState:
 
     @property
     def driven_m(self) -> float:
-        """By the right wheel since the encoder was reset."""
+        """The distance of the right wheel since the encoder was reset."""
         return self.chassis.counts * self.settings.metres_per_count
 
     @property
@@ -127,14 +127,14 @@ class ServerState:
         self.last_files["TURN" if note.is_turn else "MOVE"] = note.name
 
     def sonar_in(self, *, backward: bool, ago_s: float = 0.0) -> int:
-        """What a sonar tells, or told, in inches; -1 where it sees nothing."""
+        """The present or last reading of a sonar, in inches; -1 if it sees nothing."""
         seen_m = sight_m(self.chassis, self.front_m, self.rear_m, backward=backward)
         way_m = self.chassis.speed_mps * ago_s
         inches = (seen_m - way_m if backward else seen_m + way_m) * INCHES_PER_M
         return int(inches) if 1.0 <= inches < FARTHEST_IN + 1 else -1
 
     def clearance_in(self, *, backward: bool) -> int:
-        """What the sonar that is sampled in a motion told last."""
+        """The last reading of the sonar that is sampled in a motion."""
         since_s = self.sampling_since_s
         if since_s < 0.0 or self.now_s - since_s < NEAR_READINGS_S:
             return -1

@@ -21,7 +21,7 @@ CONTROLLED = (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR, Kind.CONTROLLED_SPIN
 
 
 def obey(server: "MartServer", text: str) -> None:
-    """One stop."""
+    """Obey one stop command."""
     quirks = server.quirks
     if text == "SL":
         _stop_first(server, DRIVES)

@@ -15,12 +15,12 @@ _NUMBER = re.compile(r"\s*([+-]?\d+)")
 
 
 def text_of(datagram: bytes) -> str:
-    """What the server understands of a request: up to the first NUL of its buffer."""
+    """The part of a request that the server understands: up to the first NUL of its buffer."""
     return datagram[:LONGEST_REQUEST].partition(b"\0")[0].decode("latin-1")
 
 
 def reply(text: str) -> bytes:
-    """As a datagram."""
+    """Encode a reply as a datagram."""
     return text.encode("latin-1")
 
 
@@ -31,7 +31,7 @@ def integer(text: str) -> int:
 
 
 def fields(text: str) -> list[str]:
-    """What stands behind each blank, up to the end."""
+    """The text behind each blank, up to the end."""
     return [text[place + 1 :] for place, letter in enumerate(text) if letter == " "]
 
 

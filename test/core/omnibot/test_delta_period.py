@@ -129,7 +129,7 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_lost_delta_is_bridged_and_settled() -> None:
-    """The pose that comes with every second one tells what it held."""
+    """The pose after every second delta shows the lost motion."""
     on = Line(BoardSettings(running=True, delta_period_s=TEN_HZ_S))
     on.run(3.0)
     on.loses = lambda data, _now: data[:2] == DELTA
