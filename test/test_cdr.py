@@ -53,7 +53,7 @@ def message_name(message: object) -> str:
 
 @st.composite
 def settings(draw: st.DrawFn) -> MessageSettings:
-    """Frames of any length, so that every alignment occurs, and any noise."""
+    """Settings with frames of any length, so that every alignment occurs, and any noise."""
     values: dict[str, Any] = boards.check_all({})
     values |= {name: draw(frames) for name in ("odom_frame", "base_frame", "imu_frame")}
     values |= {name: draw(st.floats(1e-6, 10.0)) for name in values if name.endswith("stddev")}
@@ -80,7 +80,7 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
     wheels: Wheels,
     stamp_ns: int,
 ) -> None:
-    """Byte for byte but for padding, and every field after reading them again."""
+    """They agree byte for byte except padding, and in every field after reading them again."""
     serializer, messages = Serializer(chosen), Messages(chosen)
     for ours, message in (
         (serializer.imu(imu, stamp_ns), messages.imu(imu, stamp_ns)),

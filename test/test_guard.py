@@ -354,7 +354,7 @@ def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(line: Line) -> Non
 
 
 def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
-    """None of the driver's sockets and files; no module but a few of Python's own."""
+    """It has none of the driver's sockets and files, and few modules of Python."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     started(pid)
@@ -379,7 +379,7 @@ def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
 
 
 def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line: Line) -> None:
-    """Each hears its own words."""
+    """Each line gets its own last words."""
     other = Line()
     try:
         words = ((0, b"drive stands"), (1, b"front stands"))

@@ -23,7 +23,9 @@ def test_a_pseudo_terminal_counts_no_overruns() -> None:
 
 
 def test_overruns_of_the_chip_and_of_the_buffer_are_added(monkeypatch: pytest.MonkeyPatch) -> None:
-    """``serial_icounter_struct`` of linux/serial.h: the eighth number, and the eleventh."""
+    """They are the eighth and the eleventh number of ``serial_icounter_struct`` in
+    linux/serial.h.
+    """
 
     def ioctl(_descriptor: int, request: int, _data: bytes) -> bytes:
         assert request == TIOCGICOUNT

@@ -31,7 +31,7 @@ STAMP = messages.time_message(1_700_000_000_123_456_789)
 
 
 def test_a_stamp_is_seconds_and_nanoseconds() -> None:
-    """Exactly, without a detour over floating point."""
+    """The conversion is exact, without floating point."""
     assert (STAMP.sec, STAMP.nanosec) == (1_700_000_000, 123_456_789)
 
 
@@ -90,7 +90,7 @@ def test_a_goal_is_in_the_odometry_frame_or_in_none(frame: str) -> None:
 def test_a_goal_that_is_no_place_on_the_floor_is_refused_with_a_reason(
     wrong: PoseStamped, said: str
 ) -> None:
-    """Wrong frame, no number, no rotation, not upright."""
+    """The frame is wrong, a number or rotation is missing, or it is not upright."""
     with pytest.raises(CommandRefused, match=f"cmd_pose re(fus|ject)ed.*{said}"):
         messages.goal_pose(wrong, "odom")
 
@@ -122,7 +122,7 @@ def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
 
 
 def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
-    """Pose in odom, twist in base_link, covariances row-major over x, y, z, roll, pitch, yaw."""
+    """Pose is in odom, twist in base_link, covariances are row-major over x, y, z and angles."""
     estimate = OdometryEstimate(
         0.0,
         Pose(1.0, 2.0, math.pi / 2),

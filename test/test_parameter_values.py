@@ -231,7 +231,7 @@ def test_a_wrong_list_is_refused_with_what_it_may_be(
 
 
 def test_what_the_board_keeps_is_unset_until_it_is_given() -> None:
-    """The default tells the type alone; None is taken nowhere else."""
+    """The default gives the type only; None is refused for other parameters."""
     gain = Parameter("gain", 1.0, "1", "A gain.", low=0.0, high=9.0, unset=True)
     assert gain.initial is None
     assert gain.check(None) is None

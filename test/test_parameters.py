@@ -164,7 +164,7 @@ def test_axis_signs_that_no_mirror_makes_are_refused_for_position_control(
 
 
 def test_values_reach_the_core_under_their_meaning() -> None:
-    """Every one of them changed, none mistaken for another."""
+    """Each is changed, and none is mistaken for another."""
     values = check_all(
         {
             "linear_scale": 71, "angular_scale": 501, "wheel_radius": 0.03, "delta_frame": "body",
@@ -238,7 +238,7 @@ def test_the_file_of_parameters_is_the_table() -> None:
 
 @pytest.mark.parametrize("parameter", PARAMETERS.rows, ids=name_of)
 def test_the_file_tells_what_each_parameter_may_be(parameter: Parameter) -> None:
-    """Description, range or choices, and unit, in the comment above it."""
+    """The comment above each has description, range or choices, and unit."""
     text = CONFIG.read_text(encoding="utf-8")
     comment = text.split(f"\n    {parameter.name}:")[0].rsplit("\n\n", 1)[-1]
     words = " ".join(comment.replace("#", " ").split())

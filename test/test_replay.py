@@ -46,7 +46,7 @@ class Tape:
 
 
 class Heard(Listener):
-    """What a replay told, with the state after each event."""
+    """The events of a replay, with the state after each."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -111,7 +111,7 @@ def measured(events: Iterable[Event]) -> list[tuple[object, ...]]:
 
 
 def test_a_replay_tells_what_was_told_when_it_was_recorded() -> None:
-    """Every measurement, in the same order, with the same values."""
+    """Each measurement is the same, in the same order."""
     tape: Chunks = []
     listener, ours = Listener(), session()
     link = link_to(
@@ -131,7 +131,7 @@ def test_a_replay_tells_what_was_told_when_it_was_recorded() -> None:
 
 
 def test_every_replay_is_the_same() -> None:
-    """Measurements, stamps, states and warnings, also of a wire that lost and changed bytes."""
+    """Measurements, stamps, states and warnings agree, also on a damaged wire."""
     first, second = play(Tape(BAD_LINE)), play(Tape(BAD_LINE))
     assert len(measured(first.events)) > 1000
     assert any(isinstance(event, Notice) and event != ENDED for event in first.events)

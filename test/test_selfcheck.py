@@ -19,7 +19,7 @@ def adapter(root: Path, device: str, latency: str) -> Path:
 
 
 def test_an_adapter_that_keeps_bytes_is_told_of_with_the_remedy(tmp_path: Path) -> None:
-    """FTDI's default; for good, and for now."""
+    """FTDI's default is reported, with a permanent remedy and one for now."""
     text = selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", "16\n"))
     assert "16 ms" in text
     assert "udev/99-omnibot.rules" in text

@@ -17,7 +17,7 @@ def wall_ns(now: float) -> int:
 
 
 def resumed(length_s: float) -> StallDetector:
-    """Ran until 100, and again from ``length_s`` later on."""
+    """A detector that ran until 100, and again from ``length_s`` later on."""
     standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     standstill.begun(100.0 + length_s)
@@ -110,7 +110,7 @@ def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
 
 @pytest.mark.parametrize("skew_s", [-1e6, 1e6])
 def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(skew_s: float) -> None:
-    """It cannot lock itself out."""
+    """The driver still accepts its prompt commands after a moment."""
     standstill = resumed(5.0)
     assert not standstill.outlived_by(wall_ns(104.9 + skew_s), 105.0 + SETTLE_S / 2)
     standstill.passed(106.0, wall_ns(106.0))

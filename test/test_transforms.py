@@ -32,7 +32,7 @@ def test_without_tf2_there_is_one_warning_and_no_publisher(monkeypatch: pytest.M
 
 
 def test_with_tf2_its_broadcaster_gets_the_transforms(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One broadcaster, of this node, without a word."""
+    """There is one broadcaster for this node, and no warning."""
     sent: list[tuple[object, object]] = []
 
     class Broadcaster:

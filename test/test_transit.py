@@ -160,7 +160,7 @@ def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
 
 
 def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() -> None:
-    """Each after a silence, as by somebody who presses a key on a bad network."""
+    """Each follows a silence, like single key presses on a bad network."""
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.01)
     for number in range(20):

@@ -14,7 +14,7 @@ from omnibot_driver.diagnostics import _through_updater
 
 
 class Wrapper:
-    """What the library hands to each task."""
+    """The wrapper that the library gives to each task."""
 
     def __init__(self) -> None:
         self.values: dict[str, str] = {}
@@ -56,7 +56,7 @@ def test_without_the_updater_it_is_done_without(monkeypatch: pytest.MonkeyPatch)
 def test_with_the_updater_each_status_is_a_task_of_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Added once, filled anew in every report, at the library's pace and not in ROS time."""
+    """Each is added once, and filled in every report, at the library's pace."""
     made: list[Any] = []
 
     def make(node: object, period_s: float) -> Updater:

@@ -39,7 +39,7 @@ IMU, DELTA, POSE = 14, 14 + 9, 14 + 9 + 15
 
 
 def calls(work: Callable[[], object]) -> int:
-    """How many functions in Python this calls."""
+    """The number of Python functions that this calls."""
     count = 0
 
     def see(_frame: FrameType, event: str, _argument: object) -> None:

@@ -79,7 +79,7 @@ def stream(seconds: float, fault: str = "") -> bytes:
 
 
 def decoding(times: int) -> list[Figure]:
-    """Per frame, clean and faulty, in all chunkings."""
+    """Measure decoding per frame, clean and faulty, in all chunkings."""
     figures = []
     for name, fault in STREAMS:
         data = stream(SECONDS if not fault else SECONDS / 4, fault)

@@ -47,14 +47,14 @@ class Program:
         return self.process.stdout.readline()
 
     def result(self) -> Any:
-        """End its input; what it prints then."""
+        """Close its input; returns its output."""
         assert self.process.stdin is not None
         self.process.stdin.close()
         return json.loads(self.line())
 
     @property
     def busy_s(self) -> float:
-        """Processor time so far, of its threads and its children."""
+        """Processor time so far, with its threads and children."""
         return _busy_s(self.process.pid)
 
     @property

@@ -60,11 +60,11 @@ def alternate(
     times: int,
     goal: float | None = None,
 ) -> Figure:
-    """Measure one after the other, again and again."""
+    """Measure both in alternation."""
     pairs = [(ours(), floor()) for _ in range(times)]
     return Figure(name, unit, [pair[0] for pair in pairs], [pair[1] for pair in pairs], goal)
 
 
 def short(value: float) -> str:
-    """Three digits, or all of a large number."""
+    """The number with three digits, or all digits of a large one."""
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"

@@ -24,7 +24,7 @@ NOISE = 997
 
 
 def number_of(tick: int) -> int:
-    """What the IMU frame of this tick carries."""
+    """The number in the IMU frame of this tick."""
     return TURN - abs(TURN - tick % (2 * TURN))
 
 

@@ -59,7 +59,7 @@ class Relay:
         self._session.opened(time.monotonic())
 
     def publish(self, estimates: Estimates) -> None:
-        """Each under its topic, with its own stamp."""
+        """Publish each message on its topic, with its own stamp."""
         for estimate in estimates:
             stamp_ns = round(1e9 * estimate.stamp_s)
             if isinstance(estimate, ImuEstimate):

@@ -28,7 +28,7 @@ MPS2_PER_COUNT = 9.80665 / 16384
 
 
 def measurements(windows: int) -> tuple[list[Figure], str]:
-    """Wire to callback, processor time, and the driver's memory meanwhile."""
+    """Measure the way from wire to callback, processor time, and the driver's memory."""
     with Stage(2) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear("ours", "floor"))
         programs = [
@@ -73,7 +73,7 @@ def measurements(windows: int) -> tuple[list[Figure], str]:
 
 
 def steps(windows: int) -> list[str]:
-    """From the floor to the driver, one thing after another; rows of a table."""
+    """Rows of a table from the floor to the driver, one step after another."""
     names = ["floor", *STEPS, "ours"]
     with Stage(len(names)) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear(*names))
@@ -108,7 +108,7 @@ def steps(windows: int) -> list[str]:
 
 
 def commands(windows: int) -> Figure:
-    """cmd_vel published to bytes on the board's side."""
+    """Measure the time from a published cmd_vel to bytes on the board's side."""
     with Stage(2) as stage, ExitStack() as stack:
         stack.enter_context(driver(stage.paths[0], "ours"))
         stack.enter_context(floor("commands", stage.paths[1], "floor"))
@@ -136,7 +136,7 @@ def imports(times: int) -> Figure:
 
 
 def starts(times: int) -> Figure:
-    """Command to first Imu in another process."""
+    """Measure the time from the start command to the first Imu in another process."""
     taken: list[list[float]] = [[], []]
     for _ in range(times):
         for number, name in enumerate(("ours", "floor")):
@@ -151,7 +151,7 @@ def starts(times: int) -> Figure:
 
 
 def scale(counts: Sequence[int], seconds: float) -> list[str]:
-    """Many drivers, each with a board of its own; rows of a table."""
+    """Rows of a table for many drivers, each with its own board."""
     rows = [
         "| drivers | ms per robot and second | of one alone | IMU Hz, least | odom Hz, least |",
         "|---" * 5 + "|",

@@ -81,7 +81,7 @@ def singles(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
 
 
 def crumbs(line: list[Byte], rng: random.Random) -> Iterator[Read]:
-    """One to eight bytes at once."""
+    """Split the stream into pieces of one to eight bytes."""
     start = 0
     while start < len(line):
         piece = line[start : start + rng.randint(1, 8)]

@@ -27,7 +27,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
-    """P, 1.3 s, P: the robot rolls out meanwhile; with nothing of it heard, too."""
+    """P, 1.3 s, P: the robot rolls out meanwhile, heard or not."""
     on = line(seed)
     if hidden:
         on.loses = lambda _data, _now: True
@@ -100,7 +100,7 @@ def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
 
 
 def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
-    """It drove on for three seconds unheard."""
+    """It drove on for three seconds during the silence."""
     on = line(2)
     on.loses = lambda _data, _now: True
     on.run(3.0)
@@ -118,7 +118,7 @@ def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
 def test_an_hour_of_rounded_displacements_stays_within_2_mm_and_2_mrad(
     frame: str, count: int
 ) -> None:
-    """90,000 of them, each rounded by itself to 0.1 mm and 0.1 mrad, and a pose after every 5."""
+    """Each of 90,000 is rounded to 0.1 mm and 0.1 mrad, with a pose after every fifth."""
     odometry = attached()
     x = y = yaw = worst_m = worst_rad = 0.0
     for number in range(1, count + 1):

@@ -30,12 +30,12 @@ def cut(_data: bytes) -> bytes:
 
 
 def losing(rate: float, random: Random) -> Damage:
-    """Single bytes, each with the same probability."""
+    """Lose single bytes, each with the same probability."""
     return FaultyLine(LineFaults(lose=rate), random.getrandbits(32)).carry
 
 
 def losing_bursts(rate: float, random: Random) -> Damage:
-    """1 to 200 bytes in a row, over any number of ticks."""
+    """Lose 1 to 200 bytes in a row, over any number of ticks."""
     return FaultyLine(LineFaults(burst=rate), random.getrandbits(32)).carry
 
 

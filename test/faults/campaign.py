@@ -49,7 +49,7 @@ BUSY: Final = ("busy_computer", ())
 
 @dataclass(slots=True)
 class Row:
-    """One line of the table."""
+    """A row is one line of the table."""
 
     name: str
     tried: int = 0
@@ -100,7 +100,7 @@ class Outcome:
 
 
 class Campaign(Outcome):
-    """One piece of it, in this process."""
+    """Run one piece of the campaign in this process."""
 
     def __init__(self, kind: RigBoard) -> None:
         super().__init__()
@@ -116,7 +116,7 @@ class Campaign(Outcome):
         return kind(Path(tempfile.mkdtemp(dir=self._folder.name)), self._kind, before=before)
 
     def run(self, row: Row, case: Case[Any], rig: Rig, *, again: bool = True) -> None:
-        """One try."""
+        """Run one try."""
         try:
             case(rig)
             row.stood_s = max([row.stood_s, *rig.findings.stood_after_s])
@@ -288,7 +288,7 @@ def pieces() -> list[Piece]:
 
 
 def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
-    """One piece, in a process and a ROS domain of its own."""
+    """Run one piece in a process and a ROS domain of its own."""
     number, (method, arguments) = numbered
     os.environ["ROS_DOMAIN_ID"] = str(1 + (os.getppid() + number) % 101)
     rclpy.init()

@@ -79,7 +79,7 @@ class Ending:
 
 
 def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
-    """One after the other."""
+    """Send the signals one after the other."""
 
     def end(rig: Rig) -> None:
         for number in numbers:

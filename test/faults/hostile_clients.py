@@ -53,7 +53,7 @@ def other_type(rig: Rig) -> None:
 
 
 def flood_of_releases(rig: Rig) -> None:
-    """``false`` on the topic, a thousand times a second: only the service releases."""
+    """Publish ``false`` a thousand times a second: only the service releases."""
     publisher = rig.probe.publisher(Bool, "estop")
     rig.drive()
     rig.probe.call(SetBool, "estop", data=True)
@@ -135,7 +135,7 @@ def limit_lowered(rig: Rig) -> None:
 
 
 def flood_into_a_full_port(rig: Rig) -> None:
-    """1,000 commands a second; then the port accepts data again, without commands."""
+    """Send 1,000 commands a second; then the port accepts data again, without commands."""
     publisher = rig.probe.publisher(Twist, "cmd_vel")
     fast = Twist()
     fast.linear.x = 0.4

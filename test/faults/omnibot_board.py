@@ -46,7 +46,7 @@ def never_sent(
 
 
 def lossy(number: int) -> BoardSettings:
-    """Each meets another receiver."""
+    """Lossy lines, each to another receiver."""
     receiver = RECEIVERS[number % len(RECEIVERS)]
     return BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)
 

@@ -33,7 +33,7 @@ def sent_imu_key(frame: bytes) -> Key | None:
 
 
 def odom_key(message: Odometry) -> Key | None:
-    """Speed in 0.1 mm and yaw rate in 0.1 mrad per 40 ms: the heading changes neither."""
+    """Speed in 0.1 mm and yaw rate in 0.1 mrad per 40 ms, which do not depend on the heading."""
     v = message.twist.twist
     unknown = message.twist.covariance[0] >= UNMEASURED_VARIANCE
     return None if unknown else (math.hypot(v.linear.x, v.linear.y) * 400.0, v.angular.z * 400.0)

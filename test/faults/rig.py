@@ -173,7 +173,7 @@ class Rig:
             self.line.board.reboot()
 
     def wait_for_board(self, predicate: Any, patience_s: float = PATIENCE_S) -> bool:
-        """Asked after each of the board's ticks."""
+        """Wait for a condition that is checked after each of the board's ticks."""
         assert self._terminal is not None
         return self._terminal.wait_for(predicate, patience_s)
 

@@ -38,7 +38,7 @@ def test_the_robot_stands_still_however_the_driver_ends(
 def test_a_terminal_that_is_closed_ends_the_driver_in_order(
     tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """It cannot even print."""
+    """The driver cannot print any more."""
 
     def run(rig: Rig, end: Ending) -> None:
         end(rig)

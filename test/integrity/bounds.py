@@ -72,7 +72,7 @@ def chunkings(fault: str) -> dict[str, Chunker]:
 
 
 def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
-    """One stream, with every fault in every chunking."""
+    """Run one stream with every fault in every chunking."""
     truth = generate(SCENARIOS[scenario], seed, seconds)
     scores: Scores = {}
     for fault_name, fault in FAULTS.items():

@@ -112,7 +112,7 @@ def each_by_itself(received: Received, random: Random) -> Chunks:
 
 
 def mixed(received: Received, random: Random) -> Chunks:
-    """Pieces of every kind, taken whole or in parts, now so, now otherwise."""
+    """Read pieces of every kind, whole or in parts."""
     kinds = [*list(CHUNKERS.values())[:4], few_bytes_straddling]
     pieces: Chunks = []
     at, size = 0, len(received.data)
@@ -134,7 +134,7 @@ def mixed(received: Received, random: Random) -> Chunks:
 
 
 def hogged(received: Received, random: Random) -> Chunks:
-    """Busy loops beside an adapter that hands over 4 bytes at a time, and beside the reader."""
+    """Read beside busy loops, from an adapter that delivers 4 bytes at a time."""
     times, pieces, at = received.times_s, [], 0
     adapter, free_s = Turns(SLOW_S), 0.0
     while at < len(times):

@@ -22,7 +22,7 @@ def none(length: int, random: Random) -> Origins:
 
 
 def lost(rate: float) -> Fault:
-    """Single bytes, each with the same probability."""
+    """Lose single bytes, each with the same probability."""
 
     def fault(length: int, random: Random) -> Origins:
         return [at for at in range(length) if random.random() >= rate]
@@ -45,7 +45,7 @@ def added(rate: float) -> Fault:
 
 
 def bursts(rate: float) -> Fault:
-    """1 to 200 bytes in a row."""
+    """Lose 1 to 200 bytes in a row."""
 
     def fault(length: int, random: Random) -> Origins:
         origins: Origins = []

@@ -58,7 +58,7 @@ def row(
     time_s: Callable[[Bench], float],
     make: Callable[[float], Bench],
 ) -> None:
-    """Print one, over all phases."""
+    """Print one row, over all phases."""
     shown = []
     for period_s in PERIODS_S:
         times = []

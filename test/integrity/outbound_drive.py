@@ -108,7 +108,7 @@ class _Rehearsal:
         self._writes: list[Write] = []
 
     def run(self, changes: dict[int, Shown]) -> list[Write]:
-        """Events in the order of their times."""
+        """Run the events in the order of their times."""
         scene, session = self._scene, self._session
         wishes = iter(sorted(scene.wishes, key=lambda wish: wish.at_s))
         wish = next(wishes, None)

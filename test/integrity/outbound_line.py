@@ -35,7 +35,7 @@ Fault = Callable[[Random], Line]
 
 
 class SingleFaults:
-    """Something happens to each byte with the same probability."""
+    """A line on which each byte is damaged with the same probability."""
 
     def __init__(self, rate: float, change: Change, random: Random) -> None:
         self.whole = _gap(rate, random)
@@ -88,7 +88,7 @@ class Bursts:
 
 
 def _gap(rate: float, random: Random) -> int:
-    """How many bytes pass before the next fault."""
+    """The number of bytes before the next fault."""
     return int(math.log(1.0 - random.random()) / math.log(1.0 - rate))
 
 
@@ -97,7 +97,7 @@ def _lost(_data: bytes, _at: int, _random: Random) -> list[Arrival]:
 
 
 def _added(data: bytes, at: int, random: Random) -> list[Arrival]:
-    """Any byte, before this one or after it."""
+    """Add a byte, before this one or after it."""
     own, value = (data[at], at, at), random.randrange(256)
     if random.random() < 0.5:
         return [(value, at - 0.5, ADDED), own]

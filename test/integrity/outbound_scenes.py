@@ -51,7 +51,7 @@ def _rates(random: Random) -> tuple[float, float, float]:
 def driving(
     random: Random, begin_s: float, end_s: float, *, by_wheels: bool = False, rate_hz: float = 0.0
 ) -> list[Command]:
-    """Somebody commands at a rate of his own, the same thing or another now and then."""
+    """Commands at a random rate that change now and then."""
     rate_hz, changes = rate_hz or random.choice(RATES_HZ), random.choice((0.0, 0.1, 0.1, 1.0))
     wishes = []
     now = begin_s
@@ -92,7 +92,7 @@ def _estop(active: bool) -> Callable[[Session, float], object]:
 
 
 def _common(random: Random) -> dict[str, object]:
-    """Now and then an acceleration limit, another scale, another rate."""
+    """Settings that have an acceleration limit, another scale or another rate now and then."""
     return {
         "linear_scale": random.choice((70.0, 70.0, 233.0)),
         "rate_hz": random.choice((20.0, 20.0, 20.0, 10.0, 50.0)),

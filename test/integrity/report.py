@@ -32,7 +32,7 @@ Job = tuple[str, int, str]
 
 
 def one(seconds: float, job: Job) -> tuple[str, Scores]:
-    """One stream, in a process of the pool."""
+    """Score one stream in a process of the pool."""
     scenario, seed, parser = job
     return parser, run(scenario, seed, seconds, parser)
 

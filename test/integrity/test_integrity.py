@@ -20,7 +20,7 @@ SECONDS, SEEDS = 30.0, 2
 
 @pytest.fixture(scope="module")
 def scores() -> Scores:
-    """Every scenario, fault and chunking: some 45,000 frames for each bound."""
+    """Scores of every scenario, fault and chunking: some 45,000 frames for each bound."""
     jobs = [(scenario, seed, "driver") for seed in range(SEEDS) for scenario in SCENARIOS]
     total: Scores = {}
     with get_context("spawn").Pool(os.cpu_count()) as pool:
@@ -33,7 +33,7 @@ def scores() -> Scores:
     ("fault", "chunker"), [(fault, chunker) for fault in FAULTS for chunker in chunkings(fault)]
 )
 def test_the_bounds_of_the_integrity_report_hold(fault: str, chunker: str, scores: Scores) -> None:
-    """Wrong frames and frames delivered, over all scenarios."""
+    """They limit wrong frames and frames delivered, over all scenarios."""
     score = over_scenarios(scores, fault, chunker)
     assert BOUNDS[fault].holds(chunker, score), score
     assert score.out > 25_000

@@ -18,7 +18,7 @@ def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
 
 
 def test_the_rough_drive_would_notice() -> None:
-    """One whose wheels turn twice as fast as they should."""
+    """Its wheels turn twice as fast as they should."""
     drive = RoughDrive(0)
     drive.board.settings = drive.board.settings.__class__(linear_scale=30.0, running=True)
     assert drive.go(30.0).trips

@@ -96,7 +96,7 @@ def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None
 
 
 def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
-    """Two Stops without zeros, the first a byte short: wheel C at 255 LSB."""
+    """Two Stops without zeros, the first a byte short, give wheel C 255 LSB."""
     judge = Judge()
     judge.write(parse(STOP), 0.0)
     judge.write(parse(STOP), 0.05)

@@ -39,7 +39,7 @@ class Setpoint:
     pose: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def step(self) -> tuple[float, float]:
-        """One tick; the acceleration along the body's x and y, in m/s²."""
+        """Advance one tick; the acceleration is along the body's x and y, in m/s²."""
         if not self.driving:
             return 0.0, 0.0
         if self.random.random() < 0.02:

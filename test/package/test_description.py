@@ -77,7 +77,7 @@ def test_the_frames_are_those_of_the_driver() -> None:
 
 
 def test_the_default_geometry_is_the_drivers() -> None:
-    """One wheel radius and one base radius in description, parameters and manual."""
+    """Description, parameters and manual have the same radii."""
     for name, manual_m in GEOMETRY.items():
         assert PARAMETERS.by_name[name].default == manual_m
     for name in WHEELS:

@@ -32,7 +32,7 @@ def text_of(node: ast.AST) -> str:
 
 
 def templates() -> Iterator[str]:
-    """Every string in the driver but docstrings."""
+    """All strings of the driver except docstrings."""
     for file in (ROOT / "omnibot_driver").rglob("*.py"):
         nodes = list(ast.walk(ast.parse(file.read_text())))
         docstrings = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}

@@ -157,7 +157,7 @@ def test_the_driver_gets_the_defaults_and_nothing_else(launch: Callable[..., Sta
 
 @needs_launch
 def test_the_driver_gets_what_is_given(launch: Callable[..., Started]) -> None:
-    """Each argument as a parameter of its type, and the node in its namespace."""
+    """Each argument becomes a parameter of its type; the node is in its namespace."""
     started = launch(
         "driver.launch.py",
         *("port:=sim://", "publish_tf:=false", "frame_prefix:=robot1/", "namespace:=robot1"),

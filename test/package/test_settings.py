@@ -57,7 +57,7 @@ def driver_names() -> set[str]:
 
 
 def everything_under(key: str, tree: Any) -> Iterator[Any]:
-    """Every value of the key, however deep in the tree."""
+    """All values of the key, at any depth of the tree."""
     if isinstance(tree, dict):
         if key in tree:
             yield tree[key]

@@ -47,7 +47,7 @@ def pose(origin: Any) -> Array:
 
 @dataclass
 class Hits:
-    """Of rays with one solid: which met it, and where they enter and leave, with normals."""
+    """Where rays enter and leave a solid, with normals."""
 
     rays: NDArray[np.intp]
     near: Array
@@ -66,7 +66,7 @@ class Solid:
     rgba: Array
 
     def hits(self, origins: Array, directions: Array) -> Hits:
-        """Rays from outside it; ``origins`` (n, 3) and unit ``directions`` (n, 3)."""
+        """Intersect rays from outside; ``origins`` (n, 3) and unit ``directions`` (n, 3)."""
         rays = close(self.matrix[:3, 3], np.linalg.norm(self.half), origins, directions)
         start = (origins[rays] - self.matrix[:3, 3]) @ self.matrix[:3, :3]
         way = directions[rays] @ self.matrix[:3, :3]
@@ -90,7 +90,7 @@ class Solid:
         return Hits(rays[met], near[met], normals[0], far[met], normals[1])
 
     def _normals(self, start: Array, way: Array, at: Array, axis: Any, sign: float) -> Array:
-        """Of the face across this axis, turned against the ray where it enters."""
+        """Normals of the face across this axis, against the ray where it enters."""
         rows = np.arange(len(at))
         local = np.zeros((len(at), 3))
         local[rows, axis] = sign * np.sign(way[rows, axis])
@@ -153,7 +153,7 @@ def links() -> Iterator[Link]:
 
 
 def lit(robot: list[Link], points: Array, random: np.random.Generator) -> Array:
-    """How much of the lamp each point sees."""
+    """The amount of light at each point."""
     light = np.zeros(len(points))
     for _ in range(LAMPS):
         towards = unit(LIGHT + random.normal(0.0, LAMP_SIZE, points.shape))
@@ -165,7 +165,7 @@ def lit(robot: list[Link], points: Array, random: np.random.Generator) -> Array:
 
 
 def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array:
-    """Colours along these rays from the eye."""
+    """Render the colours along these rays from the eye."""
     eyes = np.broadcast_to(EYE_M, rays.shape)
     depth = np.where(rays[:, 2] < 0.0, -EYE_M[2] / np.minimum(rays[:, 2], -1e-9), np.inf)
     colour = np.ones(rays.shape)

@@ -88,7 +88,7 @@ def test_a_board_on_the_network_prints_its_address() -> None:
 def test_a_link_that_cannot_be_made_is_one_sentence_and_code_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """No traceback for a mistake in the arguments."""
+    """A mistake in the arguments gives no traceback."""
     taken = tmp_path / "taken"
     taken.write_text("data")
     handler = signal.getsignal(signal.SIGTERM)

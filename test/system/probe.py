@@ -113,7 +113,7 @@ class Probe:
         self.wait_for_future(self._executor.create_task(destroy, entity))
 
     def client(self, kind: type, service: str) -> Any:
-        """One for each service: the driver's middleware remembers every client for ever."""
+        """A client for each service, reused, as the middleware never forgets a client."""
         if service not in self._clients:
             self._clients[service] = self.node.create_client(kind, f"omnibot_driver/{service}")
             self._executor.wake()

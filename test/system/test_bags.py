@@ -65,7 +65,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Drive:
 def test_every_topic_comes_out_of_a_bag_as_it_went_in(
     drive: Drive, tmp_path: Path, plugin: StoragePlugin
 ) -> None:
-    """Bytes, times, types and qualities of service, in both kinds of storage."""
+    """Bytes, times, types and qualities of service are kept, in both kinds of storage."""
     recorder = drive.recorder
     recorder.write(tmp_path / "bag", plugin)
     messages, offered = read(tmp_path / "bag")
@@ -157,7 +157,7 @@ def by_stamp(messages: list[Message], kind: str) -> dict[tuple[int, int], bytes]
 
 
 def measured(data: bytes, kind: str) -> Any:
-    """What neither the time nor the place of the beginning changes."""
+    """The parts that neither the time nor the place of the beginning changes."""
     message = deserialize_message(data, message_class(kind))
     if kind == MEASURED["odom"]:
         return message.twist

@@ -161,7 +161,7 @@ def read_until_it_drives(process: subprocess.Popen[str]) -> None:
 
 
 def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
-    """Exit code 0, laps driven, rates as the board's, odometry within 10 mm of the truth."""
+    """The exit code is 0, rates are the board's, and odometry is within 10 mm of the truth."""
     with running_demo(DEMO_SECONDS="20") as (process, mark):
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0, output

@@ -47,7 +47,7 @@ def names(found: list[tuple[str, list[str]]], home: str) -> set[str]:
 def test_what_a_board_lacks_is_not_advertised(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """No IMU, no wheel command, no pause: no topic, service or parameter of theirs."""
+    """Without an IMU, wheel commands or pause there is no topic, service or parameter of them."""
     driver = start_plain(start_driver, start_board().path)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")

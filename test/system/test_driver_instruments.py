@@ -29,7 +29,7 @@ HAS_TF2 = importlib.util.find_spec("tf2_ros") is not None
 
 
 class Robot:
-    """One board and one driver for all tests of this module: they leave it standing."""
+    """One board and one driver for all tests of this module, which leave it standing."""
 
     def __init__(self, stack: ExitStack, folder: Path) -> None:
         self.file = folder / "calibration.yaml"
@@ -110,7 +110,7 @@ def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
 
 
 def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
-    """wheel_cmd in, joint_states out: the same order, signs and units, and angles that add up."""
+    """Order, signs and units of wheel_cmd and joint_states agree, and angles add up."""
     joints = robot.probe.listen(JointState, "joint_states")
     commands = robot.probe.publisher(Float32MultiArray, "wheel_cmd")
     wanted = [4.0, -2.0, 1.0]

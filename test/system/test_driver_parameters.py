@@ -177,7 +177,7 @@ def test_the_command_that_is_repeated_is_said_in_a_new_scale(
 def test_every_parameter_is_described(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Description, unit and range, for ``ros2 param describe`` and rqt."""
+    """Each has a description, unit and range for ``ros2 param describe`` and rqt."""
     probe: Probe = probe_of(start_driver(start_board().path))
     names = [parameter.name for parameter in PARAMETERS.rows]
     descriptors = probe.call(DescribeParameters, "describe_parameters", names=names).descriptors

@@ -205,7 +205,7 @@ def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
 def test_services_answer_with_a_reason_when_the_board_is_silent(
     start_driver: Start, probe_of: Start, silent_port: str, kind: type, service: str
 ) -> None:
-    """Success false, and what to look at."""
+    """The answer is success false, with what to check."""
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("connecting")

@@ -27,7 +27,7 @@ def stamp_s(message: Any) -> float:
 
 
 def test_every_imu_frame_is_published_once_and_in_order(probe: Probe, board: PtyBoard) -> None:
-    """Three hundred of them, with the values that the board sent."""
+    """Three hundred frames arrive with the values that the board sent."""
     received = probe.listen(Imu, "imu/data_raw")
     probe.wait_for(lambda: len(received) >= 300)
     with board.lock:
@@ -55,7 +55,7 @@ def test_every_imu_frame_is_published_once_and_in_order(probe: Probe, board: Pty
 
 
 def test_imu_messages_follow_rep_145(probe: Probe) -> None:
-    """No orientation, real covariances, the sensor's frame, and stamps that never go back."""
+    """They have no orientation, real covariances, the sensor's frame, and increasing stamps."""
     received = probe.listen(Imu, "imu/data_raw")
     probe.wait_for(lambda: len(received) >= 50)
     message = received[0]
@@ -113,7 +113,7 @@ def test_a_board_at_10_hz_needs_its_delta_period(
 
 
 def test_odometry_moves_with_the_robot(probe: Probe, board: PtyBoard) -> None:
-    """Half a metre to the left: pose in odom, twist in base_link, covariance alive."""
+    """Half a metre to the left shows in pose and twist, and the covariance grows."""
     odometry = probe.listen(Odometry, "odom")
     commands = probe.publisher(Twist, "cmd_vel")
     probe.wait_for(lambda: odometry)

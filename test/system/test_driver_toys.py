@@ -37,7 +37,7 @@ ROBOTS: Final = {"line_board": line_robot.LineRobot, "request_board": request_ro
 
 
 class Toy:
-    """One toy in real time, and the driver's arguments for it."""
+    """A toy in real time, and the driver's arguments for it."""
 
     def __init__(self, name: str, served: "ServedBoard[Any]") -> None:
         self.name, self.served = name, served
@@ -119,7 +119,7 @@ def test_the_estop_stops_a_toy_until_it_is_released(
 def test_whatever_ends_the_driver_stops_a_toy(
     start_driver: Start, probe_of: Start, toy: Toy, number: signal.Signals
 ) -> None:
-    """Its own exit, or the guard on all its lines."""
+    """The driver's own exit stops it, or the guard on all its lines."""
     driver = start_toy(start_driver, toy)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")

@@ -49,7 +49,7 @@ def steer(terminal: PseudoTerminal, board: PtyBoard, said: Sequence[object] = (T
 
 
 def wait_for_ticks(board: PtyBoard, ticks: int) -> None:
-    """Of the board's own time, 10 ms each."""
+    """Wait for this many ticks of the board's own time, 10 ms each."""
     until = board.board.tick + ticks
     assert board.wait_for(lambda b: b.tick >= until, 20.0)
 
@@ -146,7 +146,7 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
-    """Killed, or its window closed, in the middle of a motion; here with stamped commands."""
+    """It is killed, or its window is closed, during a motion; commands are stamped."""
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe_of(driver).wait_for_state("nominal")
 

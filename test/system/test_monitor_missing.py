@@ -151,7 +151,7 @@ def test_a_pipe_gets_a_snapshot(fake: Probe, capsys: pytest.CaptureFixture[str])
 def test_names_that_are_none_are_refused(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """In a sentence, not in a traceback."""
+    """The message is a sentence, not a traceback."""
     assert main(arguments) == 1
     assert said in capsys.readouterr().err
 

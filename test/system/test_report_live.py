@@ -40,7 +40,7 @@ def test_a_running_robot_is_listened_to(
 
 
 def test_without_a_driver_it_says_so(tmp_path: Path) -> None:
-    """One sentence, and no files."""
+    """It prints one sentence and writes no files."""
     done = report(tmp_path / "out", "--live", "3", "--namespace", "absent")
     assert done.returncode == 1
     assert done.stderr.startswith("report: no driver was heard")

@@ -108,7 +108,7 @@ def stamp(
     seconds: float,
     event: str = "none",
 ) -> Stamped:
-    """One stream from somewhere in its first second on."""
+    """Stamp one stream that starts somewhere in its first second."""
     random = Random(f"{line} {loss} {skew} {seed}")
     truth = generate(SCENARIOS[scenario], seed, seconds / 2 if event == RESTART else seconds)
     ticks = sum(key[0] == "imu" for key, _, _ in truth.frames)

@@ -33,7 +33,7 @@ Figures = tuple[float, float]
 
 
 def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
-    """One stream, in a process of the pool."""
+    """Measure one stream in a process of the pool."""
     (line, loss, mode, event), seed = job
     skew = SKEWS[seed % len(SKEWS)]
     stamped = stamp(line, SCENARIOS[mode], loss, skew, seed, seconds, event)
@@ -58,7 +58,7 @@ def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
 
 
 def measured(cells: list[Cell], seconds: float, seeds: int) -> dict[Cell, list[Figures]]:
-    """All streams of all cells, with all processors."""
+    """Measure all streams of all cells on all processors."""
     jobs = [(cell, seed) for cell in cells for seed in range(seeds)]
     found: dict[Cell, list[Figures]] = {cell: [] for cell in cells}
     with Pool(os.cpu_count()) as pool:

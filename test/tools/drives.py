@@ -103,7 +103,7 @@ class Drive:
         return Topic(stamp_s, values, 0.001 + random.exponential(3e-4, len(stamp_s)))
 
     def messages(self) -> list[tuple[str, str, int, Any]]:
-        """Topic, type, arrival in ns, message; in the order of arrival."""
+        """Messages by topic, type, arrival in ns and content, in the order of arrival."""
         name, found = self.namespace, []
 
         def add(topic: str, kind: str, arrived_s: float, *values: Any) -> None:

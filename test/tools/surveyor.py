@@ -10,7 +10,7 @@ from omnibot_driver.simulator.omnibot import SimulatedBoard
 
 
 class Surveyor:
-    """Marks the floor and measures from there, in whole millimetres and half degrees: the truth."""
+    """A surveyor who measures the truth in whole millimetres and half degrees."""
 
     def __init__(self, board: Callable[[], SimulatedBoard]) -> None:
         self._board = board

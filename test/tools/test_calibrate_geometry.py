@@ -75,7 +75,7 @@ unlike = st.floats(-0.01, 0.01)
 def test_any_geometry_is_found_within_what_is_claimed(
     wheels: float, base: float, a: float, b: float, seed: int
 ) -> None:
-    """Radius, base and the differences of the wheels, through the noise of tape and eye."""
+    """Radius, base and wheel differences are found through the noise of tape and eye."""
     factors = wheels * (1 + np.array([a, b, -a - b]))
     found = fit(readings(factors, base, np.random.default_rng(seed)), BASE_M, DRIFT)
     wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance))[:2]
@@ -111,7 +111,7 @@ def test_a_square_comes_back() -> None:
 
 
 def test_readings_with_a_wrong_sign_are_turned_away() -> None:
-    """Rather than making a monster of the robot."""
+    """They would lead to an impossible robot."""
     wrong = readings(PERFECT, 1.0, np.random.default_rng(0))
     for one in wrong[2:4]:
         one.end[:2] *= -1

@@ -108,7 +108,7 @@ def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
 
 
 def test_readings_that_say_nothing_are_turned_away() -> None:
-    """Too few, not finite, stuck, full of gaps: each with its sentence."""
+    """Too few, non-finite, stuck or interrupted readings each have a message."""
     with pytest.raises(ToolError, match="too few"):
         rest(sensor(0.5))
     imu = sensor(3.0)
@@ -135,7 +135,7 @@ def test_a_robot_that_moves_is_not_at_rest() -> None:
 def test_planted_errors_are_found_and_the_driver_loads_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Bias, noise, tilt and the length of gravity, through wire and driver, in four seconds."""
+    """Bias, noise, tilt and gravity are found through wire and driver, in four seconds."""
     planted = (1.2, -0.8, 0.4)
     sensor = {
         "gyro_bias_dps": planted,

@@ -79,7 +79,7 @@ def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, flo
 
 
 def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
-    """Too far, turned too much, too long, nowhere."""
+    """It went too far, turned too much, took too long, or has no position."""
     BOUNDS.require_within(9.0, Pose(0.6, 0.6, -1.9))
     for seconds, pose, sentence in (
         (1.0, Pose(0.8, 0.8, 0.0), "1.13 m"),
@@ -140,7 +140,7 @@ def test_a_question_is_repeated_until_the_answer_makes_sense() -> None:
 
 
 def test_a_table_in_a_pipe_is_plain_text() -> None:
-    """No colours, as many figures as the uncertainty deserves."""
+    """It has no colours, and as many digits as the uncertainty allows."""
     asks, shown = console()
     findings = [
         Finding(name="linear_scale", value=80.12345, sigma=0.0234, unit="LSB/(m/s)", before=70.0),

@@ -110,7 +110,7 @@ def test_what_cannot_be_measured_is_an_error() -> None:
 def test_planted_scales_are_found_and_applied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Through wire and driver, in twenty seconds, with stamped commands."""
+    """They pass through wire and driver in twenty seconds, with stamped commands."""
     stamped = {"enable_stamped_cmd_vel": True}
     with rig(tmp_path, stamped, linear_scale=80.0, angular_scale=430.0) as robot:
         words = ("--levels", "1", "--seconds", "0.7", "--speed", "0.2", "--turning", "0.4")

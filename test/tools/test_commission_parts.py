@@ -36,7 +36,7 @@ PATTERNS = list(product((1, 0, -1), repeat=3))
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Fixed-axis angles to a matrix, one axis after the other."""
+    """The matrix of fixed-axis angles, one axis after the other."""
     about_x = [[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]]
     about_y = [
         [math.cos(pitch), 0, math.sin(pitch)],
@@ -48,7 +48,7 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 
 
 def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.ndarray]:
-    """Straight up as a sensor sees it: level, nose up, left side up."""
+    """The directions of up as a sensor sees them: level, nose up, left side up."""
     bodies = (
         (0.0, 0.0, 1.0),
         (math.sin(nose_rad), 0.0, math.cos(nose_rad)),
@@ -61,7 +61,7 @@ def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.n
 
 
 def test_the_table_of_the_commissioning_guide_is_what_is_wanted() -> None:
-    """Its three rows of cmd_vel, copied by hand."""
+    """The three rows of cmd_vel are copied by hand."""
     assert [wanted(axis) for axis in range(3)] == [(-1, 1, 0), (-1, -1, 1), (-1, -1, -1)]
 
 

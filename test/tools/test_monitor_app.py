@@ -36,7 +36,7 @@ def on_screen(robot: FakeRobot, steps: Callable[[Pilot[Any], Monitor], Awaitable
 
 
 def screen(app: Monitor) -> list[str]:
-    """What a person sees, row by row."""
+    """The visible screen, row by row."""
     return [
         "".join(segment.text for segment in strip)
         for strip in app.screen._compositor.render_strips()
@@ -101,7 +101,7 @@ def test_a_latched_estop_is_red() -> None:
     [("space", "estop"), ("g", "start"), ("p", "pause"), ("z", "reset_odometry")],
 )
 def test_a_key_asks_for_what_the_last_line_says(key: str, asked: str) -> None:
-    """One press, one request."""
+    """Each press makes one request."""
     assert press(key).asked == [asked]
 
 

@@ -28,7 +28,7 @@ def commands(dead_man: DeadMan, since_s: float, ticks: int) -> list[BodyTwist | 
 
 @given(st.lists(st.tuples(keys, st.floats(0.0, ASLEEP_S - 0.01)), min_size=1, max_size=20))
 def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, float]]) -> None:
-    """After FIRST_S at the latest: zeros, as many as promised, and then nothing for ever."""
+    """After FIRST_S at the latest there are zeros, as many as promised, then nothing."""
     dead_man, now_s = DeadMan(), 0.0
     for key, wait_s in presses:
         now_s += wait_s
@@ -40,7 +40,7 @@ def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, f
 
 @given(keys, st.floats(0.02, FIRST_S - 0.01), st.floats(0.02, REPEAT_S - 0.01))
 def test_a_held_key_moves_without_a_break(key: str, delay_s: float, every_s: float) -> None:
-    """Through the delay before a keyboard repeats, and between its repetitions."""
+    """It moves through the delay before a keyboard repeats, and between repetitions."""
     dead_man = DeadMan()
     dead_man.press(key, 0.0)
     assert dead_man.command(delay_s - 0.001) not in (None, HALT)

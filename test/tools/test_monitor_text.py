@@ -51,7 +51,7 @@ def test_json_holds_the_values() -> None:
 
 
 def test_what_is_not_known_is_a_dash_and_null() -> None:
-    """Before the first message of a topic."""
+    """This holds before the first message of a topic."""
     shown = view(pose=None, measured=None, commanded=None, force_mps2=None, rate_radps=None)
     assert "–" in text.figures(shown)[3]
     told = json.loads(text.as_json(shown, []))

@@ -48,7 +48,7 @@ def test_a_loss_that_the_driver_counts_is_laid_to_the_line(drive: Drive) -> None
 
 
 def test_a_long_gap_is_worse(drive: Drive) -> None:
-    """More than half a second without odometry."""
+    """Odometry is missing for more than half a second."""
     drive.odom.drop(8.0, 9.0)
     assert said(drive, "Gaps", "odom", "1 gap").level is Level.BAD
 

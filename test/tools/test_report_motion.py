@@ -106,14 +106,14 @@ def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
 
 
 def test_the_lag_of_the_robot_is_found(drive: Drive) -> None:
-    """Within a step of the search, and half a step of the odometry."""
+    """The lag is right within a step of the search and half a step of the odometry."""
     text = said(drive, "Commands", "followed").text
     lag_s = float(text.split("followed ")[1].split(" ms")[0]) / 1e3
     assert lag_s == pytest.approx(DELAY_S, abs=0.041)
 
 
 def test_a_robot_that_is_too_slow_is_told_with_the_scale_to_set(drive: Drive) -> None:
-    """70 % in x and y, all of the yaw rate."""
+    """It reaches 70 % in x and y, and all of the yaw rate."""
     drive.odom.values[:, :2] *= 0.7
     drive.odom.values[:, 3:5] *= 0.7
     (slow,) = troubles(drive)
@@ -145,7 +145,7 @@ def test_commands_that_ceased_are_noted(drive: Drive) -> None:
 
 
 def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:
-    """No command for two seconds, and no rest."""
+    """There is no command for two seconds, and no rest."""
     drive.cmd_vel.drop(10.0, 14.0)
     assert said(drive, "Commands", "without a command").level is Level.WARN
 

@@ -116,7 +116,7 @@ def test_a_wheel_that_answers_differently_each_time_is_said() -> None:
     ],
 )
 def test_the_simulated_boards_motor_is_found(planted: MotorConstants) -> None:
-    """Through encoder, friction and the firmware's loop: within 1 %, its delay within 1 ms."""
+    """Through encoder, friction and firmware loop it is right within 1 %, the delay within 1 ms."""
     steps = steps_of(*steps_to_and_fro(planted), 0, LEVELS)
     motor = fit_wheel("A", steps, MANUAL).motor
     assert motor.pwm_per_count == pytest.approx(planted.pwm_per_count, rel=TOLERANCE)
@@ -144,7 +144,7 @@ def test_rise_and_overshoot_are_those_of_the_answer() -> None:
 
 
 def test_a_damped_swing_overshoots_as_the_books_say() -> None:
-    """exp(-pi zeta / sqrt(1 - zeta^2)) of a second order without a zero."""
+    """The overshoot of a second order without a zero is exp(-pi zeta / sqrt(1 - zeta^2))."""
     swinging = made_up(SECOND_ORDER, (1.0, 12.0, 0.5, 0.0, 0.01), 4)
     overshoot, sigma = fit(SECOND_ORDER, swinging).traits()["overshoot"]
     assert overshoot == pytest.approx(0.163, abs=5 * sigma + 0.003)

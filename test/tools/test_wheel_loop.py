@@ -57,7 +57,7 @@ def simulated_answer(motor: Motor, gains: Gains, ticks: int) -> list[float]:
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
 def test_the_loop_is_the_simulated_boards(delay: int) -> None:
-    """Two programs, written apart, answer a step alike."""
+    """Two independent programs answer a step alike."""
     motor = Motor(46.0, 6.0, float(delay))
     assert answer(motor, MANUAL, 100).speed == pytest.approx(
         simulated_answer(motor, MANUAL, 100), abs=1e-6
@@ -89,7 +89,7 @@ def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: floa
 @settings(max_examples=15)
 @given(st.floats(0.01, 0.3), st.floats(0.0, 0.08))
 def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: float) -> None:
-    """Against an integral by numbers of scipy's own step response."""
+    """They agree with a numerical integral of scipy's step response."""
     times_s = np.linspace(0.0, 0.6, 6001)
     _, response = signal.step(([1.0], [time_constant_s, 1.0]), T=times_s)
     _check(first_order, np.array([time_constant_s, delay_s]), times_s, response, delay_s)

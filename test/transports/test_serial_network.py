@@ -134,7 +134,7 @@ def test_a_board_behind_rfc2217_is_served_as_well() -> None:
 
 
 class Connection:
-    """What rfc2217's PortManager wants of a connection."""
+    """The parts of a connection that rfc2217's PortManager needs."""
 
     def __init__(self, client: socket.socket) -> None:
         self._client = client

@@ -108,7 +108,7 @@ def test_a_host_that_is_away_is_silent_and_hears_the_first_datagram_when_it_is_b
 
 
 def test_the_channels_take_turns(host: Host, transport: UdpPorts) -> None:
-    """One that never ceases starves no other."""
+    """A busy channel does not block the other."""
     transport.write(((0, b"hello"), (1, b"hello")))
     drivers = [port.recvfrom(99)[1] for port in host.ports]
     for _ in range(9):

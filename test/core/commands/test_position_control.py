@@ -64,7 +64,7 @@ def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench
 def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
     heading: float, signs: tuple[int, int, int]
 ) -> None:
-    """Attached in the middle of its life, turned, with mirrored axes."""
+    """The driver attaches late, to a turned robot with mirrored axes."""
     bench = at_position_control(BoardPose(5000.0, -3000.0, heading), axis_signs=signs)
     bench.go_to(0.8, 0.4, 0.9)
     bench.run(8.0)

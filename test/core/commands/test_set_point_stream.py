@@ -213,7 +213,7 @@ def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
 
 
 def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream) -> None:
-    """Stop at once, and what is commanded now one control tick later."""
+    """Stop is sent at once, the new command one control tick later."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)

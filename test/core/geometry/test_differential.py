@@ -32,7 +32,9 @@ def test_a_left_turn_on_the_spot_rolls_left_back_and_right_forward() -> None:
 
 
 def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() -> None:
-    """0.5 rad/s: left on 0.8 m at 0.4 m/s, right on 1.2 m at 0.6 m/s, the middle at 0.5 m/s."""
+    """At 0.5 rad/s left runs on 0.8 m at 0.4 m/s, right on 1.2 m at 0.6 m/s, the middle at 0.5
+    m/s.
+    """
     assert triple(ROBOT.body_twist((4.0, 6.0))) == pytest.approx((0.5, 0.0, 0.5))
 
 

@@ -66,7 +66,7 @@ def test_body_and_back_is_the_same_wheels(
 
 
 def test_forward_turns_a_back_and_b_forth_and_leaves_c_alone() -> None:
-    """1 m/s ahead: ∓cos 30° at the rims."""
+    """At 1 m/s ahead the rims of A and B run at ∓cos 30°."""
     a, b, c = MANUAL.wheel_rates(BodyTwist(1.0, 0.0, 0.0))
     assert (a, b, c) == close((-SQRT3 / 2 / R, SQRT3 / 2 / R, 0.0))
 

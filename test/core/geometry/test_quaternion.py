@@ -19,7 +19,7 @@ def test_a_turn_about_z_is_its_yaw(yaw_rad: float, sign: float) -> None:
 
 
 def test_a_tilt_does_not_matter() -> None:
-    """First turned by 90 degrees about z, then tilted about the robot's own x."""
+    """The goal is turned by 90 degrees about z, then tilted about the robot's own x."""
     half = math.radians(45.0)
     tilt = math.radians(10.0)
     x, w = math.cos(half) * math.sin(tilt), math.cos(half) * math.cos(tilt)

@@ -30,6 +30,6 @@ def test_unroll_and_roll_are_inverse(displacement: Pose) -> None:
 
 @pytest.mark.parametrize("turn", [0.0, 5e-324, 1e-300, -1e-300, 1e-9, -1e-9])
 def test_a_turn_of_almost_nothing_is_no_trouble(turn: float) -> None:
-    """No division by zero, no loss of digits."""
+    """There is no division by zero and no loss of digits."""
     assert xyyaw(roll(Pose(0.1, 0.2, turn))) == close((0.1, 0.2, turn), 1e-9)
     assert xyyaw(log_of(Pose(0.1, 0.2, turn))) == close((0.1, 0.2, turn), 1e-9)

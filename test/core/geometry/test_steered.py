@@ -51,7 +51,7 @@ def test_what_the_steered_wheel_does_to_the_body() -> None:
 
 
 def test_the_driven_wheels_run_on_circles_about_the_same_centre() -> None:
-    """0.5 m to the left at 1 rad/s: left on 0.3 m, right on 0.7 m."""
+    """The centre is 0.5 m to the left at 1 rad/s: left on 0.3 m, right on 0.7 m."""
     assert ROBOT.wheel_rates(BodyTwist(0.5, 0.0, 1.0)) == pytest.approx((3.0, 7.0))
 
 

@@ -63,7 +63,7 @@ def answer(calibration: GyroCalibration) -> RequestDone:
 
 @given(st.lists(vectors, min_size=1, max_size=30))
 def test_moments_are_those_of_the_textbook(values: list[Vector3]) -> None:
-    """Mean and standard deviation of all values, axis by axis."""
+    """The mean and standard deviation of all values agree, axis by axis."""
     for axis in range(3):
         column = [value[axis] for value in values]
         middle = sum(column) / len(column)
@@ -166,7 +166,7 @@ def test_a_measurement_that_is_given_up_says_why_once() -> None:
 @pytest.mark.slow
 @given(biases)
 def test_standstills_refine_the_bias_little_by_little(bias: Vector3) -> None:
-    """Towards what is seen, by a twentieth of the way a second, and there in the end."""
+    """The bias moves by a twentieth of the difference each second."""
     calibration = GyroCalibration(NONE, refine=True)
     rates = noisy(bias, NOISE_RADPS)
     stand(calibration, rates, 1.05)

@@ -17,7 +17,7 @@ Triple = tuple[int, int, int]
 
 @pytest.mark.parametrize(("range_g", "counts"), [(2, 16384), (4, 8192), (8, 4096), (16, 2048)])
 def test_one_g_is_the_datasheets_counts(range_g: int, counts: int) -> None:
-    """Sensitivity scale factors of section 6.2, at standard gravity."""
+    """The scale is that of the datasheet's section 6.2, at standard gravity."""
     scale = ImuScale(accel_range_g=range_g)
     assert scale.specific_force((counts, -counts, 0)) == pytest.approx((9.80665, -9.80665, 0.0))
 

@@ -50,7 +50,7 @@ def trembling(random: Random) -> list[float]:
 
 
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
-    """Noise about 1 g upwards, and at some readings some words off by this much."""
+    """Rows of noise about 1 g upwards, with some words off by this much at some readings."""
     random, found = Random(seed), list[Reading]()
     for number in range(count):
         words = trembling(random)
@@ -90,7 +90,7 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """Words of another frame in place of the gyro's."""
+    """The gyro's words are replaced by those of another frame."""
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()
     came = admitted(readings, through)
@@ -136,7 +136,7 @@ def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) ->
 @pytest.mark.slow
 @pytest.mark.parametrize("g_rms", [0.003, 0.02, 0.1, 0.5])
 def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
-    """Ten minutes of it, without any order from one reading to the next."""
+    """It shakes at random for ten minutes."""
     random, through = Random(1), gate()
     for number in range(60_000):
         force = [random.gauss(0.0, g_rms * G) for _ in range(3)]

@@ -89,7 +89,7 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """What it seemed to lose in that one explained up to 0.46 s of driving back."""
+    """Its loss in the long displacement explained up to 0.46 s of driving back."""
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
         bench.drive(speed_mps)
@@ -136,7 +136,7 @@ def test_wheel_commands_are_watched_as_well(board: dict[str, object]) -> None:
 
 
 def test_wheel_commands_that_are_obeyed_are_not_noticed() -> None:
-    """Each wheel by itself, and all together."""
+    """Each wheel turns alone, then all together."""
     bench = started(BoardSettings(running=True))
     for rates in ((10.0, 0.0, 0.0), (0.0, -10.0, 0.0), (0.0, 0.0, 5.0), (17.0, 17.0, -17.0)):
         for _ in range(10):

@@ -30,7 +30,7 @@ def plain(twist: BodyTwist) -> tuple[float, float, float]:
 def test_what_lies_between_rest_and_the_set_points_is_inside(
     setpoints: list[tuple[BodyTwist, float]],
 ) -> None:
-    """Any mean of them, and of standing still."""
+    """Any mean of them and of standstill is inside."""
     weight = max(1.0, sum(part for _, part in setpoints))
     motion = BodyTwist(
         sum(part * each.vx_mps for each, part in setpoints) / weight,
@@ -77,7 +77,7 @@ def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> No
 
 
 def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
-    """All of its velocity at first, nothing after a second."""
+    """It counts in full at first, and not at all after a second."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -91,7 +91,7 @@ def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
 
 
 def test_a_set_point_that_was_short_counts_as_well() -> None:
-    """One of a single tick, between two displacements."""
+    """It lasts a single tick between two displacements."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)

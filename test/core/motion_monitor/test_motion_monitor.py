@@ -276,7 +276,7 @@ orders = st.lists(
 def test_a_robot_that_obeys_late_and_with_slip_never_trips(
     given_orders: list[tuple[Triple, int]], late_ticks: int, constant_s: float, scale: Triple
 ) -> None:
-    """Any commands for any number of ticks of 10 ms; up to 0.1 s late, a time constant of 0.2 s."""
+    """The commands are random, the robot is up to 0.1 s late with a time constant of 0.2 s."""
     drive, tick_s = Drive(), 0.01
     x = y = yaw = 0.0
     way = [0.0, 0.0, 0.0]

@@ -41,7 +41,7 @@ def minors(c: Covariance) -> Triple:
 
 @given(st.lists(displacements("body"), max_size=60))
 def test_the_covariance_is_positive_definite_and_grows(readings: list[DisplacementReading]) -> None:
-    """Its volume and the variance of the yaw never shrink: nothing corrects slip."""
+    """Neither its volume nor the variance of yaw shrinks, as nothing corrects slip."""
     odometry = Odometry(OdometrySettings(noise=OdometryNoise(wheel_scale=0.0, wheel_slip=0.0)))
     before = Covariance()
     for reading in readings:
@@ -88,7 +88,7 @@ def test_the_covariance_is_a_random_walk_over_the_way() -> None:
 
 
 def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
-    """Sampled: 2000 robots whose wheels go wrong at random, through the manual's matrix."""
+    """The sample is 2000 robots with random wheel errors, through the manual's matrix."""
     random, deviation, n, steps = Random(1), 0.003, 2000, 25
     noise = OdometryNoise(wheel_drift=deviation, wheel_scale=0.0, wheel_slip=0.0)
     odometry = Odometry(OdometrySettings(noise=noise))
@@ -119,7 +119,7 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """Ten metres: ten times the deviation of one, and none of it where it began."""
+    """After 10 m it is ten times that after 1 m, and zero back at the start."""
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
     odometry = Odometry(OdometrySettings(noise=noise))
@@ -184,7 +184,7 @@ def test_settling_removes_nothing_but_the_gap() -> None:
 
 
 def test_the_twist_is_as_good_as_its_default_covariance_says() -> None:
-    """Against the true velocity of robots that slip, speed up and brake: 0.02 m/s, 0.025 rad/s."""
+    """The errors are 0.02 m/s and 0.025 rad/s for robots that slip, speed up and brake."""
     linear, angular, n = 0.0, 0.0, 0
     for seed in range(8):
         random = Random(seed)

@@ -41,7 +41,7 @@ def test_straight_ahead_is_x() -> None:
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_quarter_circle_to_the_left_ends_at_its_radius(frame: str) -> None:
-    """Radius 1 m in 50 steps, exactly."""
+    """The radius is 1 m in 50 steps, exactly."""
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)
     step = math.pi / 2 / 50

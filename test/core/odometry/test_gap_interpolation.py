@@ -16,7 +16,7 @@ def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> Displa
 
 
 def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing() -> None:
-    """Four of them, from 0.5 to 1 m/s."""
+    """Four displacements are missing, from 0.5 to 1 m/s."""
     bridge = GapInterpolation()
     assert bridge.tangents(body(0.02, 0.0), None) == (Pose(), Pose(0.02))
     lost, own = bridge.tangents(after(4, 0.04), None)

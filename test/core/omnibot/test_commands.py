@@ -47,7 +47,7 @@ def test_a_velocity_is_70_lsb_for_a_metre_and_500_for_a_radian(
 
 
 def test_the_scales_are_those_of_the_settings() -> None:
-    """100 LSB per m/s, 200 per rad/s."""
+    """The scales are 100 LSB per m/s and 200 per rad/s."""
     commands = encoder(linear_scale=100.0, angular_scale=200.0)
     typed = bytes.fromhex("FF FE 01 00 64 FF 38 00 C8")
     assert bare(commands.velocity(BodyTwist(1.0, -2.0, 1.0))) == typed
@@ -90,7 +90,7 @@ def test_almost_nothing_is_the_stop_frame(tiny: float) -> None:
 def test_a_command_too_large_for_the_wire_keeps_its_direction(
     values: tuple[float, float, float],
 ) -> None:
-    """Scaled down as a whole; never an exception, never a word that wraps round."""
+    """The whole command is scaled down, without an exception or a wrapped word."""
     command = bare(encoder().velocity(BodyTwist(*values)))
     counts = (70 * values[0], 70 * values[1], 500 * values[2])
     largest = max(1.0, max(map(abs, counts)) / 32767)

@@ -42,7 +42,7 @@ from omnibot_driver.core.omnibot.frames import Frame
 
 @pytest.mark.parametrize("name", STREAMS)
 def test_an_undamaged_stream_is_decoded_whole_by_ticks_and_byte_by_byte(name: str) -> None:
-    """Every frame that the simulated board sent, in order, and nothing else."""
+    """All frames of the simulated board come out in order, and no others."""
     ticks = ticks_of(name)
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
     assert decoded([b"".join(ticks)]) == sent
@@ -128,7 +128,7 @@ def test_a_knock_right_before_a_silence_is_delivered() -> None:
 
 
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
-    """One byte of waiting, not one frame."""
+    """It waits for one byte, not for one frame."""
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)

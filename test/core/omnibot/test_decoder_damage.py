@@ -79,7 +79,7 @@ def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("extra", [0x00, 0x50, 0x7E, 0xFA, 0xFB, 0xFC, 0xFF])
 def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: int) -> None:
-    """One byte inserted anywhere; in step again, and truly so, within two frames."""
+    """The byte is inserted anywhere; the decoder is in step again within two frames."""
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]

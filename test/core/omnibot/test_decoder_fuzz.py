@@ -125,7 +125,7 @@ ADVERSARIES = {
 def work(
     monkeypatch: pytest.MonkeyPatch, stream: bytes, chunk_length: int, pause_s: float = 0.0
 ) -> tuple[int, int]:
-    """Looks at a byte, edges and gaps of the trellis; and the most bytes held between calls."""
+    """Counters of work: looks at a byte, edges of the trellis, and the most bytes held."""
     done, measure, forward = 0, decoder.measure, trellis._Search._forward
 
     def measuring(data: bytes | bytearray, at: int) -> int:

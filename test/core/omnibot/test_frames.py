@@ -106,7 +106,7 @@ def test_the_pose_may_be_little_endian() -> None:
 
 @pytest.mark.parametrize("count", [0, 7, 42, 255])
 def test_the_paused_text_is_the_one_of_the_manual(count: int) -> None:
-    """«Paused: i» with a space before the line feed, i being a uint8."""
+    """The text is «Paused: i» with a space before the line feed; i is a uint8."""
     typed = {
         0: "50 61 75 73 65 64 3A 20 30 20 0A",
         7: "50 61 75 73 65 64 3A 20 37 20 0A",
@@ -278,7 +278,7 @@ def test_what_no_frame_begins_with_is_never_waited_for(data: bytes) -> None:
 
 
 def test_struct_sizes_are_the_lengths_of_the_manual() -> None:
-    """14, 9 and 15 bytes from the board, 9 to it."""
+    """The sizes are 14, 9 and 15 bytes from the board, and 9 to it."""
     zeros = (0, 0, 0)
     assert len(encode(ImuFrame(zeros, zeros))) == 14
     assert len(encode(DeltaFrame(0, 0, 0, 0))) == 9

@@ -30,7 +30,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 10, 25, 60, 100, 250, 300, 600])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
-    """Through curves, over the wrap of SEQ too, seen from where the driver attached."""
+    """The drive has curves and wraps of SEQ; the pose is relative to where the driver attached."""
     for seed in range(5):
         on = line(seed, frame=frame)
         lose(on, lost * PERIOD_S)
@@ -60,7 +60,7 @@ def test_lost_poses_alone_cost_nothing_but_rounding() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.01, 0.1, 0.3])
 def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float) -> None:
-    """Half a minute of losses, then a second without."""
+    """Half a minute has losses, then a second has none."""
     for seed in range(3):
         random, on = Random(seed), line(seed)
         on.loses = lambda _data, _now, random=random: random.random() < rate

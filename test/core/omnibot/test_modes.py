@@ -90,7 +90,7 @@ def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
 
 
 def test_the_rhythm_of_a_nominal_board_is_never_imu_only() -> None:
-    """Four IMU frames to a delta, also with five deltas lost in a row."""
+    """There are four IMU frames to a delta, and up to five deltas are lost in a row."""
     made = ModeTracker()
     for tick in range(1, 400):
         made.hear(IMU)

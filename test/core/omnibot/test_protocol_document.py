@@ -95,7 +95,7 @@ SENT_AS_IT_IS = {
 
 
 class Example(NamedTuple):
-    """One line of the document."""
+    """An example is one line of the document."""
 
     data: bytes
     word: str
@@ -109,7 +109,7 @@ def code_lines(text: str) -> list[str]:
 
 
 def examples(text: str) -> list[Example]:
-    """Every example in a text, in its order."""
+    """The examples of a text in order."""
     found = filter(None, map(EXAMPLE.fullmatch, code_lines(text)))
     return [
         Example(
@@ -132,7 +132,7 @@ EXAMPLES = examples(DOCUMENT)
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda e: f"{e.word} {e.data.hex()}")
 def test_each_example_means_what_the_document_says(example: Example) -> None:
-    """Bytes decode to the stated numbers, and the stated numbers encode to the bytes."""
+    """The bytes decode to the stated numbers, and these encode to the bytes."""
     if example.word in SENT_AS_IT_IS:
         assert example.data == SENT_AS_IT_IS[example.word]
     else:

@@ -52,7 +52,7 @@ def heard(board: Board, chunker: Chunker, seed: int) -> list[Read]:
 @pytest.mark.parametrize("loss", [0.0, 0.01])
 @pytest.mark.parametrize("chunker", [ftdi(latency_s=0.001), bursts, singles, crumbs])
 def test_lines_are_stamped_alike(chunker: Chunker, loss: float) -> None:
-    """Well or badly, by whatever brings them."""
+    """This holds for good and bad lines alike."""
     reads = heard(Board(seconds=12, skew=1e-4, loss=loss), chunker, 1)
     assert stamped(reads, quick=True) == stamped(reads, quick=False)
 

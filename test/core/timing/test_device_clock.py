@@ -29,7 +29,7 @@ COUNTS = 16384 / STANDARD_GRAVITY
 
 @dataclass(slots=True)
 class Stamped:
-    """What a clock said of one stream: (tick, stamp, arrival), of samples and of displacements."""
+    """The stamps of one stream: (tick, stamp, arrival) of samples and of displacements."""
 
     board: Board
     samples: list[tuple[int, float, float]] = field(default_factory=list)
@@ -44,7 +44,7 @@ class Stamped:
         ]
 
     def unevenness(self, since_s: float = SETTLED_S) -> float:
-        """Standard deviation, from 10 ms, of the differences between successive samples' stamps."""
+        """Standard deviation of the stamps' differences from 10 ms."""
         return math.sqrt(
             fmean(
                 (after[1] - before[1] - 0.01) ** 2
@@ -214,7 +214,7 @@ def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
 
 @pytest.mark.parametrize("skew", SKEWS)
 def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
-    """Another phase and another SEQ; the stamps go on forward and to the same constant."""
+    """Phase and SEQ are new; the stamps increase and keep the same constant."""
     clock = DeviceClock(0.01)
     adapter = ftdi(restarted_by_data=True)
     before = run(Board(seconds=10, skew=skew), adapter, 1, clock=clock)
@@ -245,7 +245,7 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
 
 
 def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
-    """Framing made it up, two ticks after a true one and two before the next."""
+    """The false count lies two ticks after a true one, and two before the next."""
     clock = DeviceClock(0.01)
     true = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
     made_up = DisplacementReading(0.0, 0.0, 0.0, "earth", None, 0, restarted=True)

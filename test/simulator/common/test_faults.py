@@ -39,7 +39,7 @@ def test_the_fate_of_a_byte_does_not_depend_on_how_the_stream_is_cut(
 
 
 def test_single_bytes_are_lost_at_the_given_rate() -> None:
-    """One in a hundred, and none changed."""
+    """One byte in a hundred is lost, and none is changed."""
     line = FaultyLine(LineFaults(lose=0.01))
     assert len(line.carry(SENT)) == len(SENT) - line.lost
     assert line.lost == pytest.approx(len(SENT) / 100, rel=0.2)
@@ -54,7 +54,7 @@ def test_bursts_of_1_to_200_bytes_are_lost() -> None:
 
 
 def test_a_flip_changes_one_bit_and_no_length() -> None:
-    """One byte in a hundred."""
+    """One byte in a hundred is flipped."""
     line = FaultyLine(LineFaults(flip=0.01))
     arrived = line.carry(SENT)
     changes = [bits(was ^ now) for was, now in zip(SENT, arrived, strict=True)]

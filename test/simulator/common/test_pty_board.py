@@ -35,7 +35,7 @@ class Ticker:
         return [(0, said)]
 
     def reboot(self) -> None:
-        """It never boots."""
+        """A board that never boots."""
 
     @property
     def facts(self) -> dict[str, object]:

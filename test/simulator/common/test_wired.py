@@ -75,7 +75,7 @@ def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
 
 
 def test_lines_that_do_not_match_the_channels_are_a_defect() -> None:
-    """Too few, or of the wrong kind."""
+    """There are too few, or lines of the wrong kind."""
     for lines in ([FaultyLine()], [FaultyLine(), FaultyNetwork()]):
         with pytest.raises(ValueError, match="do not match"):
             WiredBoard(ToyLines(), lines)

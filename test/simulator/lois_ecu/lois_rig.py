@@ -40,7 +40,7 @@ class Rig:
         return found
 
     def say(self, *commands: Command) -> None:
-        """Until the board has obeyed: it may not hear at once."""
+        """Repeat the line until the board has obeyed, as it may miss one."""
         for command in commands:
             data = encode_command(command, with_sum=self.board._reader.checks)
             for _ in range(50):

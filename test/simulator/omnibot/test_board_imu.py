@@ -22,7 +22,7 @@ from omnibot_driver.simulator.omnibot import (
 
 
 def readings(board: SimulatedBoard, seconds: float) -> list[tuple[float, ...]]:
-    """IMU readings in g and degrees per second, taken while the time passes."""
+    """IMU readings in g and degrees per second over this time."""
     board.sent.clear()
     run(board, seconds)
     raw = [struct.unpack(">6h", frame[2:]) for frame in sent(board, IMU)]
@@ -82,7 +82,7 @@ def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
 def test_a_curve_is_felt_as_centripetal_acceleration(
     x: int, y: int, felt_mps2: tuple[float, float]
 ) -> None:
-    """Turning left at 1 rad/s presses 0.5 m/s² to the left of the motion, y reversed."""
+    """A left turn at 1 rad/s presses 0.5 m/s² to the left of the motion, y reversed."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(x, y, 500))
     run(board, 2.0)

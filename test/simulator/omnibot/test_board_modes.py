@@ -183,7 +183,7 @@ def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() ->
 
 
 def test_what_was_received_and_obeyed_is_on_record() -> None:
-    """Bytes in full, commands with tick, kind and values."""
+    """The record has all bytes, and commands with tick, kind and values."""
     board = SimulatedBoard(RUNNING)
     run(board, 0.05)
     data = velocity(1, -2, 3) + b"x" + STOP

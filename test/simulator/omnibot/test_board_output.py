@@ -119,7 +119,7 @@ def test_the_rhythm_of_deltas_and_poses_goes_on_through_a_pause() -> None:
 
 
 def drive_square(board: SimulatedBoard) -> None:
-    """Four sides of a metre, two of them sideways, turned by 90 degrees half way."""
+    """Drive four sides of a metre, two of them sideways, and turn by 90 degrees half way."""
     legs = [velocity(35, 0, 0), velocity(0, 35, 0)] * 2
     for leg, command in enumerate(legs):
         board.receive(command)
@@ -176,7 +176,7 @@ def test_earth_frame_deltas_add_up_to_the_pose() -> None:
 def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
     frame: str, expected: tuple[int, int, int]
 ) -> None:
-    """CommandPipeline forward at 0.5 m/s, headed along the earth's y: 20 mm, along y or along x."""
+    """The robot drives at 0.5 m/s along the earth's y: 20 mm, along y or along x."""
     board = SimulatedBoard(
         BoardSettings(
             running=True,

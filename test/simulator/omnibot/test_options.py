@@ -25,7 +25,7 @@ def board_from_url(url: str) -> tuple[SimulatedBoard, Line]:
 
 
 def test_every_option_reaches_the_board_and_its_line() -> None:
-    """Each by its name, the seed twice."""
+    """Each option arrives by its name, the seed twice."""
     board, line = board_from_url(
         "sim://?seed=7&imu_only&frame=body&delta_period=0.1&control=position&latching_estop&running"
         "&receiver=idle_gap&letters=anywhere&wakes_while_booting&ignore_estop"

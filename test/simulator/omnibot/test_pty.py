@@ -30,7 +30,7 @@ def is_in(mode: BoardMode) -> Callable[[SimulatedBoard], bool]:
 
 
 def test_a_program_can_wake_start_and_stop_the_board_through_the_terminal() -> None:
-    """Bytes pass both ways unchanged, FF and line feeds included."""
+    """Bytes pass both ways unchanged, including FF and line feeds."""
     with PtyBoard(SimulatedBoard()) as pty:
         port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
         try:

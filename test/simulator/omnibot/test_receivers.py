@@ -57,7 +57,7 @@ def understood(
 def test_every_receiver_understands_each_command_of_the_appendix(
     typed: str, mode: int, values: tuple[int, int, int], kind: ReceiverKind
 ) -> None:
-    """Undamaged, with zero bytes before it or without."""
+    """Frames are undamaged, with zero bytes before them or without."""
     assert understood(typed, kind=kind) == [ControlFrame(mode, values)]
     assert understood("00 00 00" + typed, kind=kind) == [ControlFrame(mode, values)]
 
@@ -77,7 +77,7 @@ def test_frames_back_to_back_are_all_understood(typed: list[str], kind: Receiver
 def test_no_bytes_disturb_a_receiver_for_longer_than_a_frame(
     noise: bytes, awake: bool, control_frames: bool, kind: ReceiverKind
 ) -> None:
-    """After any bytes, eight zeros bring every receiver back to listening for letters."""
+    """Eight zeros bring every receiver back to listening for letters, after any bytes."""
     data = (noise + bytes(8)).hex() + "53"
     commands = understood(data, kind=kind, awake=awake, control_frames=control_frames)
     assert commands[-1] is START

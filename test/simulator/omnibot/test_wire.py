@@ -42,18 +42,18 @@ def test_commands_reach_the_whole_range_of_a_short() -> None:
 
 
 def test_the_imu_frame_is_laid_out_as_in_the_manual() -> None:
-    """FF FA, then accelerometer and gyro, most significant byte first."""
+    """The layout is FF FA, then accelerometer and gyro, most significant byte first."""
     sent = imu_frame((1, -2, 0x1234), (-6, -5, -4))
     assert sent == bytes.fromhex("FF FA 00 01 FF FE 12 34 FF FA FF FB FF FC")
 
 
 def test_the_delta_frame_is_laid_out_as_in_the_manual() -> None:
-    """FF FB, X_DIF, Y_DIF, TH_DIF, then SEQ in the ninth byte."""
+    """The layout is FF FB, X_DIF, Y_DIF, TH_DIF, then SEQ in the ninth byte."""
     assert delta_frame((200, -200, 32767), 255) == bytes.fromhex("FF FB 00 C8 FF 38 7F FF FF")
 
 
 def test_the_pose_frame_is_laid_out_as_in_the_manual() -> None:
-    """FF FC, three floats with the most significant byte first, SEQ as the fifteenth byte."""
+    """The layout is FF FC, three floats with the most significant byte first, then SEQ."""
     sent = pose_frame(1000.0, -2.5, 1.0, 7)
     assert sent == bytes.fromhex("FF FC 44 7A 00 00 C0 20 00 00 3F 80 00 00 07")
 

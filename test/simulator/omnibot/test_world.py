@@ -20,14 +20,14 @@ L = 0.143
 def test_the_odometry_matrix_inverts_the_velocity_equations(
     vx: float, vy: float, yaw_rate: float
 ) -> None:
-    """Body to rims and back changes nothing."""
+    """A conversion from body to rims and back changes nothing."""
     assert body_from_rims(rims_from_body(vx, vy, yaw_rate, L), L) == pytest.approx(
         (vx, vy, yaw_rate), abs=1e-12
     )
 
 
 def test_the_velocity_equations_are_those_of_the_manual() -> None:
-    """CommandPipeline along x, along y and turning, each wheel by the manual's signs."""
+    """The robot moves along x, along y and turns; each wheel has the manual's sign."""
     c30 = cos(pi / 6)
     assert rims_from_body(1, 0, 0, L) == pytest.approx((-c30, c30, 0))
     assert rims_from_body(0, 1, 0, L) == pytest.approx((-0.5, -0.5, 1))
