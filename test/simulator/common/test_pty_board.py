@@ -35,7 +35,7 @@ class Ticker:
         return [(0, said)]
 
     def reboot(self) -> None:
-        """A board that never boots."""
+        """Do nothing: this board never boots."""
 
     @property
     def facts(self) -> dict[str, object]:
