@@ -243,7 +243,7 @@ def age(stamp: Time, now_ns: int) -> float:
 
 
 def is_stamped(stamped: TwistStamped | PoseStamped) -> bool:
-    """A stamp of zero is none."""
+    """Whether the message has a stamp; zero means none."""
     stamp = stamped.header.stamp
     return bool(stamp.sec or stamp.nanosec)
 

@@ -23,7 +23,7 @@ RAW_NAME: Final = "/raw_rx"
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Of one bag, a folder or a single .mcap or .db3 file: a topic for each channel.
+    """A recording from one bag, a folder or a single file: a topic for each channel.
 
     ``speed``: factor of the playback speed, infinity for as fast as can be; ``delay_s``: until it
     begins.

@@ -264,7 +264,7 @@ class Session:
             self._commands.halt(now)
 
     def calibrate_gyro(self, token: object, now: float) -> None:
-        """Find the gyro's bias; answered by a RequestDone. Raises RequestRefused at once."""
+        """Measure the gyro's bias; a RequestDone answers later. Raises RequestRefused at once."""
         if reason := self._interlocks.why_not_calibrate():
             raise RequestRefused(reason)
         self._calibration.measure(token, now)

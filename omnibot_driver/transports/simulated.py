@@ -70,7 +70,7 @@ class SimulatedTransport:
             self._board.write(packet)
 
     def write_if_room(self, packets: Iterable[Packet]) -> int:
-        """The same: there is always room."""
+        """Write all packets, as there is always room."""
         packets = tuple(packets)
         self.write(packets)
         return sum(len(data) for _, data in packets)

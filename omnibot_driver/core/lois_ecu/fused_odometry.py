@@ -15,7 +15,7 @@ Source = Literal["standing", "ticks", "ticks and heading", "commands and heading
 
 @dataclass(frozen=True, slots=True)
 class FusedOdometry:
-    """At ``stamp_s``: pose and covariance in the odometry frame, twist in the body's.
+    """The odometry at ``stamp_s``: pose and covariance in its frame, twist in the body's.
 
     ``displacement``: since the estimate before, in the robot's own axes. ``wheel_ways_m``: of
     nominal wheels, the board's left and right, since then. ``predicted``: nothing was heard of this

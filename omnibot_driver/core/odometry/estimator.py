@@ -53,7 +53,7 @@ class OdometrySettings:
 
 @value(frozen=True, slots=True)
 class OdometryEstimate:
-    """At ``stamp_s``: pose and covariance in the odometry frame, twist in the body's.
+    """The odometry at ``stamp_s``: pose and covariance in its frame, twist in the body's.
 
     ``twist`` is None where the time that the displacement took is not known. ``rolled`` is what
     the wheels have made of the robot since the driver began, as one tangent in the board's own

@@ -28,7 +28,7 @@ class GapInterpolation:
     def tangents(
         self, reading: DisplacementReading, heading_rad: float | None
     ) -> tuple[Pose, Pose]:
-        """In the board's body axes: of the lost displacements before this one, and of this one.
+        """Tangents in the board's body axes: of the lost displacements, and of this one.
 
         ``heading_rad``: the board's before all of them; displacements of a board that never told
         are taken for the body's.

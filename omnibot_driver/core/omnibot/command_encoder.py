@@ -102,7 +102,7 @@ class CommandEncoder:
         return BodyTwist(0.0, 0.0, 0.0)
 
     def drive_to(self, pose: Pose) -> bytes:
-        """Base vector control with the switch on position; the origin is a pose like any other."""
+        """Encode a goal for positional control; the origin is a pose like any other."""
         position, heading = self._settings.position_scale, self._settings.heading_scale
         counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)
         if not all(abs(count) < MAX_WORD + 0.5 for count in counts):

@@ -25,7 +25,7 @@ To restart takes longer."""
 
 @value(frozen=True, slots=True)
 class Step:
-    """From one delta to the next: ``lost`` between them that no pose has told of.
+    """The step between two deltas: ``lost`` between them that no pose has reported.
 
     ``duration_s`` is None where the time is not known; ``restarted``: the counter seems to begin
     anew, which only the board's pose can prove.

@@ -94,7 +94,7 @@ QUIRKS: dict[Firmware, Quirks] = {"documented": DOCUMENTED, "firmware": FIRMWARE
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorSettings:
-    """Of first order with dry friction.
+    """A motor of first order with dry friction.
 
     rpm_per_percent: beyond the dead zone; friction_rpm_per_s: how fast it slows down without power,
     besides the time constant. second_time_constant_s, dead_time_s: of the power stage, before the

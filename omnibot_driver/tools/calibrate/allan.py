@@ -32,7 +32,7 @@ class Allan:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Of readings with unit U: ``density`` in U/√Hz (random walk of the integral), with its
+    """Noise of readings with unit U: ``density`` in U/√Hz (random walk of the integral), with its
     ``sigma``; ``instability`` in U, the flicker floor; ``walk`` in U/√s, of the bias itself.
     """
 

@@ -52,7 +52,7 @@ class Mounting:
         return rpy(self.rotation)
 
     def snapped(self) -> "Mounting | None":
-        """The one at right angles; None where it is not near."""
+        """The nearest right-angled mounting; None if none is near."""
         nearest = max(_right_angles(), key=lambda one: float(np.trace(one.T @ self.rotation)))
         cosine = (float(np.trace(nearest.T @ self.rotation)) - 1.0) / 2.0
         if math.acos(max(-1.0, min(1.0, cosine))) > SNAP_RAD:

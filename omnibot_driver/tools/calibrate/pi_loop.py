@@ -111,7 +111,7 @@ def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
 
 
 def phase_margin_deg(plant: Plant, gains: PiGains, loop: Loop, rpm: float) -> Array:
-    """Of the open loop: how far from -180 degrees where its gain is 1, at this speed.
+    """Phase margin of the open loop: distance from -180 degrees where its gain is 1.
 
     Half a control period passes until an order counts, and half a tick until a speed is seen.
     """

@@ -67,8 +67,8 @@ def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tup
 
 
 def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
-    """Of every command in the log that was held for a while. ``up``: which way that is for the
-    sensor; ``bias``: of its gyro. Raises ToolError where there is none.
+    """Speeds of every command in the log that was held for a while. ``up``: which way that is for
+    the sensor; ``bias``: of its gyro. Raises ToolError where there is none.
     """
     odometry, imu = log.odometry, log.imu
     found = []
@@ -114,7 +114,7 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
 
 
 def _held(log: Log) -> list[tuple[float, float, Column]]:
-    """From when to when the robot had settled in one command other than zero.
+    """Spans in which the robot had settled in one command other than zero.
 
     A command that was not repeated in time may have been forgotten by the driver: it begins anew.
     """

@@ -58,7 +58,7 @@ class Levels:
 
 
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
-    """Of a wheel that turns freely at a constant duty, with both corrections at 1.
+    """Levels of a wheel that turns freely at a constant duty, with both corrections at 1.
 
     Levels come in turn, and it shows which is the shorter. Where an edge was missed the turn begins
     anew. Raises ToolError where nothing is regular.

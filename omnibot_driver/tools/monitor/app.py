@@ -130,7 +130,7 @@ class Monitor(App[None]):
         self.refresh_view()
 
     def _come_back(self) -> None:
-        """To the screen, which SIGSTOP has not left: else keys would have two readers from now on,
+        """Return to the screen after SIGSTOP; otherwise keys would have two readers,
         of which each runs until its own end.
         """
         with self.suspend():

@@ -81,7 +81,7 @@ def figures(view: View) -> list[str]:
 
 
 def verdicts(view: View) -> list[tuple[Level, str]]:
-    """Each status that is not OK in its own words, all that are in one line, and the counts."""
+    """The text of each status that is not OK, one line for all others, and the counts."""
     if not view.statuses:
         return [(Level.STALE, "no diagnostics received")]
     worst = sorted((s for s in view.statuses if s.level), key=_urgency, reverse=True)

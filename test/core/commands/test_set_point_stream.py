@@ -113,7 +113,7 @@ def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> 
 
 
 def test_within_the_pace_only_the_newest_command_goes_out(stream: Stream) -> None:
-    """More frames a second would only be more of them to be damaged."""
+    """More frames would only be more targets for damage."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, b"older", 1.002)
