@@ -185,7 +185,7 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
 
 
 def _write_whole(descriptor: int, data: bytes) -> None:
-    """Unlike pyserial's, it sleeps while there is no room, and late is not failed."""
+    """Write all bytes. Unlike pyserial's, it sleeps while there is no room."""
     until = time.monotonic() + WRITE_TIMEOUT_S
     while True:
         try:

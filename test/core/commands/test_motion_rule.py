@@ -154,7 +154,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(ben
 
 
 def test_stop_is_sent_also_to_a_board_that_is_not_heard(bench: Bench) -> None:
-    """It may hear us."""
+    """The board may still receive, although it is silent."""
     bench.speaks = False
     bench.run(1.45)
     start = len(bench.written)
