@@ -157,7 +157,7 @@ def test_work_is_linear_and_memory_bounded(
     monkeypatch: pytest.MonkeyPatch, pattern: bytes, chunk_length: int, pause_s: float
 ) -> None:
     """The last third of the bytes is no more work than the second."""
-    stream = pattern * (600 // len(pattern))
+    stream = pattern * (300 // len(pattern))
     once, _ = work(monkeypatch, stream, chunk_length, pause_s)
     twice, _ = work(monkeypatch, stream * 2, chunk_length, pause_s)
     thrice, most = work(monkeypatch, stream * 3, chunk_length, pause_s)
