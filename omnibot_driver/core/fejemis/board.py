@@ -326,7 +326,7 @@ class FejemisBoard(Board):
 
     def pause(self) -> Packets:
         """Stop, ``stop``, and what else turns."""
-        self._obedience.pause_said = True
+        self._obedience.pause()
         self._upkeep.machine.off()
         return self.stop() + self.emergency_stop()
 

@@ -47,6 +47,12 @@ class Obedience:
         if not self.estopped:
             self._resume = running
         self.estopped = True
+        self.start_at = math.inf
+
+    def pause(self) -> None:
+        """A pause is asked for, which a ``start`` for a released e-stop must not follow."""
+        self.pause_said = True
+        self.start_at = math.inf
 
     def release(self, now: float) -> None:
         """The end of our e-stop; a board that did not obey before is left as it is."""

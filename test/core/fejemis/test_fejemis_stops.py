@@ -207,3 +207,23 @@ def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
         assert bench.robot.standing, words
         assert not bench.robot.vehicle.brush, words
         assert bench.robot.vehicle.lift.volts == 0.0
+
+
+@pytest.mark.parametrize("again", ["e-stop", "pause"])
+def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> None:
+    """After a release ``start`` is repeated for a second."""
+    bench = nominal()
+    bench.estop(True)
+    bench.run(0.5)
+    bench.estop(False)
+    bench.run(0.05)
+    assert "start" in bench.lines(DRIVE)
+    mark = bench.now
+    if again == "e-stop":
+        bench.estop(True)
+    else:
+        bench.session.request(Request.PAUSE, object(), bench.now)
+        bench.settle()
+    bench.run(1.5)
+    assert "start" not in bench.lines(DRIVE, mark)
+    assert bench.robot.drive.source == -1
