@@ -137,6 +137,9 @@ class Board(Protocol):
     def silence(self) -> None:
         """Forget the mode, as the board has been silent for too long."""
 
+    def stalled(self) -> None:
+        """This process did not run for a while: the guard may have switched off what turned."""
+
     @property
     def wake_at(self) -> float:
         """The time at which ``due`` must be called again; infinity if the board needs no calls."""

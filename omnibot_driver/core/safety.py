@@ -145,6 +145,7 @@ class SafetyStops:
         """This process stalled for ``seconds``: end what was under way and stop the robot."""
         self._liveness.stalled(now)
         self._task.give_up("the driver stalled meanwhile; call again")
+        self._board.stalled()
         self._policy.halt(now)
         self._reporter.notify(
             [f"driver stalled for {seconds:.1f} s; robot stopped until the next command"]

@@ -182,6 +182,11 @@ class FejemisBoard(Board):
             half.subscribe_again()
         self._upkeep.machine.off()
 
+    def stalled(self) -> None:
+        """The guard has switched brush and lift off; neither comes back by itself."""
+        if self._upkeep.machine.active:
+            self._upkeep.machine.off()
+
     def elapse(self, now: float) -> list[Reading]:
         """What becomes known as nothing comes."""
         self._open(now)
@@ -260,8 +265,14 @@ class FejemisBoard(Board):
         self._told.halt(f"the {role} board has restarted; robot stopped", now)
 
     def _look(self, now: float) -> None:
+        machine = self._upkeep.machine
         if self._watch.look(now, driving=self.driving):
-            self._upkeep.machine.off()
+            machine.off()
+        elif machine.active and now >= self._watch.front_unheard_at:
+            machine.off()
+            self._told.tell(
+                "no data from the front board for 0.25 s; brush and lift switched off", now
+            )
         if not self._ports.ready:
             self._mode = Mode.UNKNOWN
         else:
@@ -344,6 +355,8 @@ class FejemisBoard(Board):
         if self._relay is not None or self._told.notices or self._upkeep.jobs.done:
             return -math.inf
         wake_at = min(self._upkeep.wake_at, self._obedience.start_at)
+        if self._upkeep.machine.active:
+            wake_at = min(wake_at, self._watch.front_unheard_at)
         return min(wake_at, self._watch.wake_at) if self._mode is Mode.NOMINAL else wake_at
 
     def due(self, now: float) -> Packets:

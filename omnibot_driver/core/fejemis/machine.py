@@ -83,7 +83,7 @@ class Machine:
         """What ends all that was switched on, lights included."""
         self.off()
         lights = [b"ledon 1", b"leds"] if self.colour else []
-        return [*OFF, *lights]
+        return [*TIMES * OFF, *lights]
 
     def due(self, now: float) -> list[bytes]:
         """Lines to write now."""

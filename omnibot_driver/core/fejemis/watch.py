@@ -15,6 +15,8 @@ from omnibot_driver.core.fejemis.told import Told
 
 NO_POSE_S: Final = 0.25
 """A robot whose pose is older is driven no further."""
+NO_ANGLE_S: Final = 0.25
+"""A front board that is silent for longer may have restarted: brush and lift are switched off."""
 FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
 """A board that is silent for this time after the port was opened is reported."""
@@ -53,6 +55,12 @@ class Watch:
         if not self.unposed and drive is not None:
             times.append(drive.came_at("pose") + NO_POSE_S + SLACK_S)
         return min(times)
+
+    @property
+    def front_unheard_at(self) -> float:
+        """When the front board has been silent for too long for what turns there."""
+        front = self._ports.half("front")
+        return -math.inf if front is None else front.came_at("fwl") + NO_ANGLE_S + SLACK_S
 
     def _look_at(self, channel: int, now: float) -> bool:
         half, parameter = self._ports.halves[channel], PARAMETERS[channel]

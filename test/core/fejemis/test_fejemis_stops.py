@@ -227,3 +227,41 @@ def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> N
     bench.run(1.5)
     assert "start" not in bench.lines(DRIVE, mark)
     assert bench.robot.drive.source == -1
+
+
+def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
+    """The driver was stalled meanwhile, and a brush that turns is said again each second."""
+    bench = nominal()
+    bench.board.set_brush(True, bench.now)
+    bench.settle()
+    bench.run(0.5)
+    for channel, data in bench.board.last_words()[0]:
+        bench.robot.receive(data, bench.now, channel)
+    bench.session.stood_still(0.8, bench.now)
+    bench.settle()
+    mark = bench.now
+    bench.run(2.5)
+    assert "brush 1" not in bench.lines(FRONT, mark)
+    assert not bench.robot.vehicle.brush
+
+
+def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
+    """It may have restarted, which shows with its second heartbeat."""
+    bench = nominal()
+    bench.board.set_brush(True, bench.now)
+    bench.settle()
+    bench.run(0.65)
+    bench.speaks = {DRIVE}
+    mark = bench.now
+    bench.run(2.0)
+    assert "brush 1" not in bench.lines(FRONT, mark)
+    assert "brush 0" in bench.lines(FRONT, mark)
+    assert any("brush and lift switched off" in text for text in bench.notices)
+
+
+def test_what_turns_is_switched_off_thrice_at_the_exit() -> None:
+    """A line may be lost, and nothing follows."""
+    bench = nominal()
+    front = [data for channel, data in bench.board.farewell() if channel == FRONT]
+    assert b"".join(front).count(b"brush 0") == 3
+    assert b"".join(front).count(b"motv 0 0") == 3
