@@ -64,6 +64,7 @@ class Half:
         """The line is new. Which board it is, is believed until a heartbeat says otherwise."""
         self.decoder = FejemisDecoder(line_sums)
         self.decoder.statistics = self.statistics
+        self.unknown_words.clear()
         self.heartbeat: Heartbeat | None = None
         self.heard_at = -math.inf
         self.restarted = False
@@ -167,11 +168,12 @@ class Half:
         return True
 
     def _identify(self, identity: int) -> None:
-        """At once where nothing is known yet; otherwise two heartbeats must agree."""
+        """At once with the first heartbeat of a line; after it two must agree."""
         told, self._told = self._told, identity
-        if self.identity is None or identity == told:
+        if self.heartbeat is None or identity == told:
             if identity != self.identity:
                 self._next_at = -math.inf
+                self.unknown_words.clear()
             self.identity, self.role = identity, ROLES.get(identity)
         if self.heartbeat is None:
             self._next_at = -math.inf
@@ -187,7 +189,7 @@ class Half:
                 del self.unknown_words[next(iter(self.unknown_words))]
 
     def _restart(self) -> None:
-        self.restarted = self.heartbeat is not None
+        self.restarted = self.heartbeat is not None or self.clock.known
         self.clock.begin()
         self.subscribe_again()
 

@@ -85,7 +85,8 @@ class Ports:
                     " and 91 (front): connect the right board, or set its id"
                 )
         first, second = self.halves
-        if first.role is not None and first.role == second.role:
+        heard = first.heartbeat is not None and second.heartbeat is not None
+        if heard and first.role is not None and first.role == second.role:
             return (
                 f"both ports lead to a {first.role} board: connect the other one, and check"
                 " `port` and `front_port`"

@@ -7,7 +7,7 @@ from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
-from omnibot_driver.simulator.fejemis import Firmware
+from omnibot_driver.simulator.fejemis import Firmware, SimulatedFejemis
 
 HALVES = {"drive": DRIVE, "front": FRONT}
 
@@ -244,3 +244,28 @@ def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
     with pytest.raises(CommandRefused, match="angle"):
         bench.drive()
     assert not [text for text in bench.lines(DRIVE, mark) if text.startswith("rc 2 .")]
+
+
+def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() -> None:
+    """What the other board did not know there is asked of this one again."""
+    bench = nominal()
+    for swapped in (True, False, True):
+        bench.close()
+        bench.robot = SimulatedFejemis(Simulated(swapped=swapped))
+        bench.open()
+        bench.run_until(lambda: bench.session.state == "nominal")
+        bench.run(0.4)
+        assert bench.board.advice is None
+        bench.drive_on()
+        assert not bench.robot.standing
+    assert not any("both ports" in text for text in bench.notices)
+
+
+def test_a_board_that_says_that_it_starts_when_the_port_opens_has_restarted() -> None:
+    """Before its first heartbeat, too: its pose is another one."""
+    bench = nominal()
+    bench.close()
+    bench.session.opened(bench.now)
+    bench.session.receive(b"# Starting main loop\n", bench.now, DRIVE)
+    bench.run(3.0)
+    assert any("drive board has restarted" in text for text in bench.notices)
