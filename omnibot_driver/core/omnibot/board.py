@@ -167,6 +167,9 @@ class OmniBot:
         """Forget the mode, as the board has been silent for too long."""
         self._translation.apply(Happening.HEARD_NOTHING)
 
+    def stalled(self) -> None:
+        """Nothing to do: only the wheels turn, and they are stopped."""
+
     def due(self, now: float) -> Packets:
         """No packets: the board sends without polling."""
         return NO_PACKETS
