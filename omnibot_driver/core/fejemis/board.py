@@ -8,6 +8,7 @@ whether it obeys in ``obedience.py``, and what keeps both boards talking in ``up
 """
 
 import math
+from typing import Final
 
 from omnibot_driver.core.board import Board, BoardFigures, Mode
 from omnibot_driver.core.commands.stop_proof import StopProof
@@ -32,6 +33,9 @@ from omnibot_driver.core.fejemis.watch import Watch
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import PausedReading, Reading
 from omnibot_driver.core.traits import Traits
+
+STOPS_WITHIN_S: Final = 0.5
+"""How long after Stop a configuration is loaded."""
 
 
 class FejemisBoard(Board):
@@ -105,6 +109,8 @@ class FejemisBoard(Board):
         """Why the robot is not to be driven."""
         if self._upkeep.jobs.powering_off:
             return "power is about to be cut"
+        if job := self._upkeep.jobs.at_rest:
+            return job
         return self._watch.refusal
 
     @property
@@ -303,6 +309,7 @@ class FejemisBoard(Board):
         elif not self._obedience.estopped:
             self._upkeep.machine.off()
             self._obedience.latch(running=self._mode is Mode.NOMINAL)
+            self._upkeep.jobs.interrupt("the e-stop was latched meanwhile; release it, call again")
 
     def motion(self, drive: bytes, front: bytes) -> Packets:
         """These lines to the two boards."""
@@ -338,6 +345,7 @@ class FejemisBoard(Board):
     def pause(self) -> Packets:
         """Stop, ``stop``, and what else turns."""
         self._obedience.pause()
+        self._upkeep.jobs.interrupt("the robot was paused meanwhile; call again")
         self._upkeep.machine.off()
         return self.stop() + self.emergency_stop()
 
@@ -401,8 +409,15 @@ class FejemisBoard(Board):
             )
         if self._translation.odometry.moving and job is not Job.LOAD:
             raise RequestRefused(f"{job.value} refused: the robot moves; wait until it stands")
-        self._upkeep.jobs.ask(job, token, now, delay_s=self._settings.power_off_delay_s)
-        if self.driving:
+        moves = self.driving or self._translation.odometry.moving
+        self._upkeep.jobs.ask(
+            job,
+            token,
+            now,
+            delay_s=self._settings.power_off_delay_s,
+            wait_s=STOPS_WITHIN_S if moves else 0.0,
+        )
+        if moves:
             self._told.halt("the configuration is being loaded; robot stopped", now)
         if job in (Job.LOAD, Job.POWER_OFF):
             self._upkeep.machine.off()

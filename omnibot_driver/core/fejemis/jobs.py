@@ -59,12 +59,22 @@ class Jobs:
         """When ``due`` has something."""
         return min(self._next_at, self._until)
 
-    def ask(self, job: Job, token: object, now: float, *, delay_s: float = 0.0) -> None:
-        """Begin. Raises RequestRefused."""
+    @property
+    def at_rest(self) -> str:
+        """Why the robot has to stand now, in words; empty if it need not."""
+        if self.job in OFFSETS or self.job is Job.LOAD:
+            return f"a {self.job.value} is under way; wait for its answer"
+        return ""
+
+    def ask(
+        self, job: Job, token: object, now: float, *, delay_s: float = 0.0, wait_s: float = 0.0
+    ) -> None:
+        """Begin, in ``wait_s``. Raises RequestRefused."""
         if self.job is not None:
             raise RequestRefused(f"a {self.job.value} is under way; wait for its answer")
         self.job, self._token = job, token
-        self._begun_at, self._next_at, self._until = now, -math.inf, now + WITHIN_S
+        self._begun_at = self._next_at = now + wait_s
+        self._until = self._begun_at + WITHIN_S
         if job is Job.POWER_OFF:
             self._text = b"off %d" % max(1, round(delay_s))
             self.powering_off = True
@@ -73,6 +83,15 @@ class Jobs:
         """Something else has ended it."""
         if self.job is not None:
             self._finish(False, f"{self.job.value} failed: {why}")
+
+    def interrupt(self, why: str) -> None:
+        """The robot was stopped: what needs it at rest for a while has failed."""
+        if self.at_rest:
+            self.cancel(why)
+
+    def drive_restarted(self) -> None:
+        """The board that would cut the power has forgotten it."""
+        self.powering_off = False
 
     def keep_power(self) -> list[bytes]:
         """What calls a power off back; nothing where none is due."""

@@ -48,6 +48,8 @@ class Upkeep:
         self._begin(role)
         self.machine.begin()
         self.jobs.cancel(f"the {role} board has restarted")
+        if role == "drive":
+            self.jobs.drive_restarted()
 
     def _begin(self, role: Role) -> None:
         self.configurations[role].begin()

@@ -5,7 +5,7 @@
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
-from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.fejemis.codec import parse
 from omnibot_driver.core.fejemis.configuration import Configuration
 from omnibot_driver.core.fejemis.readings import (
@@ -19,6 +19,7 @@ from omnibot_driver.core.fejemis.readings import (
 )
 from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
 from omnibot_driver.core.fejemis.steering import Geometry
+from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 
 
@@ -243,3 +244,62 @@ def test_a_low_battery_is_told_once_a_minute() -> None:
     bench.run(4.0)
     assert bench.extras(BatteryReading)[-1].low
     assert sum("battery is low" in text for text in bench.notices) == 1
+
+
+@pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.CALIBRATE_ACCELEROMETER, Job.LOAD])
+def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
+    """An offset that is measured under way would be false."""
+    bench = nominal()
+    bench.board.ask(job, None, bench.now)
+    bench.settle()
+    bench.run(0.2)
+    with pytest.raises(CommandRefused, match="under way"):
+        bench.drive()
+    bench.run_until(lambda: bool(bench.extras(JobDone)))
+    bench.drive_on()
+    assert not bench.robot.standing
+
+
+@pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.LOAD])
+@pytest.mark.parametrize("stop", ["e-stop", "pause"])
+def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: str) -> None:
+    """It is answered at once."""
+    bench = nominal()
+    bench.board.ask(job, None, bench.now)
+    bench.settle()
+    bench.run(0.2)
+    if stop == "e-stop":
+        bench.estop(True)
+    else:
+        bench.session.request(Request.PAUSE, object(), bench.now)
+        bench.settle()
+    bench.run(0.1)
+    (done,) = bench.extras(JobDone)
+    assert not done.success
+    assert "meanwhile" in done.message
+
+
+def test_loading_stops_the_robot_before_it_loads() -> None:
+    """By the order of the lines."""
+    bench = nominal()
+    bench.drive_on()
+    mark = bench.now
+    bench.board.ask(Job.LOAD, None, bench.now)
+    bench.settle()
+    bench.run(1.0)
+    lines = bench.lines(DRIVE, mark)
+    assert lines.index("rc 2 0 0") < lines.index("eer")
+    begun = [at for at, _, data in bench.written if at >= mark and data.startswith(b";20eer")]
+    assert begun[0] - mark > 0.4
+
+
+def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
+    """The robot may be driven again."""
+    bench = nominal(settings=FejemisSettings(power_off_delay_s=100.0))
+    assert ask(bench, Job.POWER_OFF).success
+    with pytest.raises(CommandRefused, match="power"):
+        bench.drive()
+    bench.robot.drive.reboot()
+    bench.run(4.0)
+    bench.drive_on()
+    assert not bench.robot.standing
