@@ -121,7 +121,8 @@ class Encoder:
         geometry = pair.geometry
         if twist.vy_mps:
             pair.remark(SIDEWAYS)
-        wanted = BodyTwist(twist.vx_mps, 0.0, twist.yaw_rate_radps)
+        speed_mps = twist.vx_mps if abs(twist.vx_mps) >= LEAST_MPS else 0.0
+        wanted = BodyTwist(speed_mps, 0.0, twist.yaw_rate_radps)
         if wanted.vx_mps < 0.0 and not self.settings.allow_reverse:
             pair.remark(REVERSE)
             return pair.stop()

@@ -150,7 +150,7 @@ class Follower:
     def begin(self) -> None:
         """Nothing is commanded."""
         self._angle_rad: float | None = None
-        self._since = self._least_rad = math.inf
+        self._since, self._from_rad = math.inf, math.nan
         self.fault = False
 
     def aim(self, angle_rad: float) -> None:
@@ -161,12 +161,13 @@ class Follower:
         """It stands there. Whether this shows, for the first time, that it does not follow."""
         if self._angle_rad is None:
             return False
-        off_rad = abs(angle_rad - self._angle_rad)
-        if off_rad <= FOLLOWS_RAD:
-            self._since, self._least_rad, self.fault = now, math.inf, False
+        off_rad = self._angle_rad - angle_rad
+        if abs(off_rad) <= FOLLOWS_RAD:
+            self._since, self._from_rad, self.fault = now, angle_rad, False
             return False
-        if off_rad < self._least_rad - NEARER_RAD:
-            self._since, self._least_rad = now, off_rad
+        nearer_rad = math.copysign(1.0, off_rad) * (angle_rad - self._from_rad)
+        if math.isnan(nearer_rad) or nearer_rad > NEARER_RAD:
+            self._since, self._from_rad = now, angle_rad
         late = now - self._since > FOLLOWS_WITHIN_S
         first, self.fault = late and not self.fault, late
         return first

@@ -219,3 +219,30 @@ def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
     assert follower.fault
     follower.look(1.45, 3.1)
     assert not follower.fault
+
+
+def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
+    """It had come near to its angle, and is far from the new one."""
+    follower = Follower()
+    follower.aim(1.5)
+    assert not any(follower.look(0.02 * n, 0.015 * n) for n in range(60))
+    follower.aim(-1.5)
+    assert not any(follower.look(1.2 - 0.02 * n, 0.9 + 0.015 * n) for n in range(130))
+
+
+def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_time() -> None:
+    """From one side to the other."""
+    follower = Follower()
+    seen = 0
+    for n in range(200):
+        follower.aim(1.5 if n % 3 else 0.9)
+        seen += follower.look(0.0, 0.015 * n)
+    assert seen == 1
+
+
+def test_a_speed_of_nothing_that_is_negative_is_none() -> None:
+    """A controller's rounding does not keep the robot from turning."""
+    bench = nominal()
+    bench.drive_on(-1e-9, 0.5, 3.0)
+    assert bench.robot.truth.yaw_rate_radps == pytest.approx(0.5, abs=0.02)
+    assert not bench.notices
