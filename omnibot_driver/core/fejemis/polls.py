@@ -20,6 +20,8 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
     ),
 }  # fmt: skip
 """In this order, round and round."""
+WITH_SUMS: Final = (b"svpi", b"svjti")
+"""Without its last character each is a command, which sets the servo."""
 EVERY_S: Final = 0.5
 SONAR_EVERY_S: Final = 0.1
 
@@ -47,8 +49,8 @@ class Polls:
         """What the firmware does not know is asked no more."""
         self._unknown = {text for text in ASKED[self._role] if text.decode("ascii") in words}
 
-    def due(self, now: float) -> list[bytes]:
-        """Lines to write now."""
+    def due(self, now: float, *, sums: bool) -> list[bytes]:
+        """Lines to write now. ``sums``: whether the board sees that one is damaged."""
         texts = []
         if self._role == "drive" and now >= self._sonar_at:
             self._sonar_at = now + SONAR_EVERY_S
@@ -57,7 +59,7 @@ class Polls:
             self._next_at = now + EVERY_S
             text = ASKED[self._role][self._turn % len(ASKED[self._role])]
             self._turn += 1
-            if text not in self._unknown:
+            if text not in self._unknown and (sums or text not in WITH_SUMS):
                 texts.append(text)
         return texts
 

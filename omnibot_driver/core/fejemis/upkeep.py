@@ -98,7 +98,7 @@ class Upkeep:
             polls = self.polls[half.role]
             polls.unknown(half.unknown_words)
             texts += self.configurations[half.role].due(now, stands=stands)
-            texts += polls.due(now)
+            texts += polls.due(now, sums=half.sums)
         return texts
 
     @property

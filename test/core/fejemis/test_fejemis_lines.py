@@ -30,6 +30,7 @@ from omnibot_driver.core.fejemis.messages import (
     WheelSpeeds,
     Words,
 )
+from omnibot_driver.core.fejemis.polls import Polls
 from omnibot_driver.core.fejemis.sums import sum_of, with_sum, without_sum
 
 GOLDEN_SUMS = [
@@ -280,3 +281,13 @@ def test_a_sum_lets_one_damaged_line_in_99_through() -> None:
         passed += without_sum(bytes(damaged))[1] is True
     assert 100 < passed < 320
     assert sum_of(b"") == 1
+
+
+def test_what_is_a_command_without_its_last_character_is_asked_with_a_sum_alone() -> None:
+    """``svpi`` that loses its ``i`` sets the servo."""
+    for sums in (True, False):
+        polls = Polls("front")
+        texts = [text for n in range(40) for text in polls.due(float(n), sums=sums)]
+        assert (b"svpi" in texts) is sums
+        assert (b"svjti" in texts) is sums
+        assert b"cvsteeri" in texts
