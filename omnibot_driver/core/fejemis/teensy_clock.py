@@ -34,7 +34,7 @@ class TeensyClock:
         """Nothing is known of it."""
         self._fit: ClockFit | None = None
         self._odd: tuple[float, float] | None = None
-        self._odds = 0
+        """The first of these times, and when it came."""
         self._last_s = 0.0
         self._low_s = 0.0
 
@@ -69,7 +69,7 @@ class TeensyClock:
                 return False
         else:
             self._begin_at(board_s, now)
-        self._odds = 0
+        self._odd = None
         self._last_s = board_s
         tick = int(board_s / TICK_S)
         assert self._fit is not None
@@ -78,10 +78,10 @@ class TeensyClock:
 
     def _is_new_time(self, board_s: float, now: float) -> bool:
         """Whether it goes on from times that were as odd."""
-        before, self._odd = self._odd, (board_s, now)
-        agrees = before is not None and abs((board_s - before[0]) - (now - before[1])) < 0.1
-        self._odds = self._odds + 1 if agrees else 1
-        if self._odds < AGAIN:
+        if self._odd is None or abs((board_s - self._odd[0]) - (now - self._odd[1])) >= AGREE_S:
+            self._odd = board_s, now
+            return False
+        if now - self._odd[1] < AGAIN_AFTER_S:
             return False
         self.restarted = True
         self._begin_at(board_s, now)

@@ -359,3 +359,20 @@ def test_the_logarithm_leads_to_the_pose() -> None:
     """The tangents that the odometry tells are those of the plane."""
     way = Pose(0.3, 0.1, 0.7)
     assert roll(log_of(way)).way_to(way).way_m < 1e-12
+
+
+def test_what_waited_while_the_host_was_stalled_is_no_restart() -> None:
+    """Late lines of the same board come all at once; those of one that has restarted do not."""
+    clock = TeensyClock()
+    for n in range(100):
+        assert clock.see(5.0 + 0.02 * n, 100.0 + 0.02 * n)
+    waited = [clock.see(7.0 + 0.02 * n, 104.0 + 1e-4 * n) for n in range(100)]
+    assert not waited[0]
+    assert waited[-1]
+    assert not clock.restarted
+    assert clock.host_s(9.0) == pytest.approx(104.0, abs=0.01)
+    for n in range(10):
+        clock.see(0.5 + 0.02 * n, 105.0 + 0.02 * n)
+        if clock.restarted:
+            break
+    assert 2 <= n <= 4
