@@ -139,6 +139,7 @@ class Board(Protocol):
 
     def stalled(self) -> None:
         """This process did not run for a while: the guard may have switched off what turned."""
+        return
 
     @property
     def wake_at(self) -> float:

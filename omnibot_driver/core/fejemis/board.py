@@ -111,7 +111,7 @@ class FejemisBoard(Board):
             return "power is about to be cut"
         if job := self._upkeep.jobs.at_rest:
             return job
-        return self._watch.refusal
+        return self._ports.trouble or self._upkeep.pending or self._watch.refusal
 
     @property
     def advice(self) -> str | None:

@@ -54,13 +54,14 @@ class Configuration:
         self.told.clear()
         self._next_at = -math.inf
         self._tries = 0
+        self._new = True
         self.failed: list[Written] = []
         """What could not be read back."""
 
     def configure(self, written: Mapping[Written, tuple[float, ...]]) -> None:
         """Other values, from now on."""
         if written != self.written:
-            self.written = written
+            self.written, self._new = written, False
             self._next_at, self._tries, self.failed = -math.inf, 0, []
 
     @property
@@ -72,6 +73,13 @@ class Configuration:
     def known(self) -> bool:
         """Whether all was read, and what was written is there."""
         return not self._missing() and not self._unwritten()
+
+    @property
+    def pending(self) -> bool:
+        """Whether a new board may still lack what the user has set: it is not to be driven."""
+        if self._new and (self._next_at == math.inf or not self._unwritten()):
+            self._new = False
+        return self._new
 
     def due(self, now: float, *, stands: bool) -> list[bytes]:
         """Lines to write now: while the robot moves, nothing is written."""

@@ -62,8 +62,9 @@ class Jobs:
     @property
     def at_rest(self) -> str:
         """Why the robot has to stand now, in words; empty if it need not."""
-        if self.job in OFFSETS or self.job is Job.LOAD:
-            return f"a {self.job.value} is under way; wait for its answer"
+        job = self.job
+        if job is not None and (job in OFFSETS or job is Job.LOAD):
+            return f"a {job.value} is under way; wait for its answer"
         return ""
 
     def ask(

@@ -102,6 +102,17 @@ class Upkeep:
         return texts
 
     @property
+    def pending(self) -> str:
+        """Why a new board is not to be driven yet, in words; empty if it has what the user set."""
+        for configuration in self.configurations.values():
+            if configuration.pending:
+                return (
+                    f"the configuration of the {configuration.role} board is being written; it"
+                    " takes 3 s at most"
+                )
+        return ""
+
+    @property
     def advice(self) -> str | None:
         """What a user should set or update; None while all is well."""
         for configuration in self.configurations.values():

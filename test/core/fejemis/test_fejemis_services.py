@@ -303,3 +303,19 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
     bench.run(4.0)
     bench.drive_on()
     assert not bench.robot.standing
+
+
+def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
+    """The line that writes it may be lost, and while the robot is driven nothing is written."""
+    settings = FejemisSettings(written={Written.STEERING: (0.35, 0.45)})
+    bench = Bench(settings=settings)
+    bench.open()
+    bench.hears = set()
+    bench.board._configurations["front"].told["confs"] = 0.5, 0.4
+    assert "being written" in bench.board.refusal
+    bench.hears = {DRIVE, FRONT}
+    bench.run_until(lambda: not bench.board._configurations["front"].pending)
+    bench.run(0.5)
+    bench.drive_on()
+    assert not bench.robot.standing
+    assert bench.board._configurations["front"].known
