@@ -19,7 +19,10 @@ EARLY_S: Final = 0.005
 LATE_S: Final = 1.0
 """One that is behind by more is another time, even where the host was busy."""
 AGAIN: Final = 3
-"""Such times in a row that agree with each other are those of a board that has restarted."""
+AGAIN_AFTER_S: Final = 0.05
+AGREE_S: Final = 0.1
+"""Three such times in a row that agree with each other, over at least this time, are those of a
+board that has restarted. Lines that waited while the host was stalled arrive at once."""
 SMALLEST_STEP_S: Final = 1e-6
 
 
@@ -34,6 +37,7 @@ class TeensyClock:
         """Nothing is known of it."""
         self._fit: ClockFit | None = None
         self._odd: tuple[float, float] | None = None
+        self._odds = 0
         """The first of these times, and when it came."""
         self._last_s = 0.0
         self._low_s = 0.0
@@ -79,9 +83,10 @@ class TeensyClock:
     def _is_new_time(self, board_s: float, now: float) -> bool:
         """Whether it goes on from times that were as odd."""
         if self._odd is None or abs((board_s - self._odd[0]) - (now - self._odd[1])) >= AGREE_S:
-            self._odd = board_s, now
+            self._odd, self._odds = (board_s, now), 1
             return False
-        if now - self._odd[1] < AGAIN_AFTER_S:
+        self._odds += 1
+        if self._odds < AGAIN or now - self._odd[1] < AGAIN_AFTER_S:
             return False
         self.restarted = True
         self._begin_at(board_s, now)

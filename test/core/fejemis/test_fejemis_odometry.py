@@ -303,7 +303,8 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
     assert clock.see(101.02, 6.02)
     assert not clock.see(0.1, 6.1)
     assert not clock.see(0.12, 6.12)
-    assert clock.see(0.14, 6.14)
+    assert not clock.see(0.14, 6.14)
+    assert clock.see(0.16, 6.16)
     assert clock.restarted
 
 

@@ -311,11 +311,11 @@ def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     bench = Bench(settings=settings)
     bench.open()
     bench.hears = set()
-    bench.board._configurations["front"].told["confs"] = 0.5, 0.4
+    bench.board._upkeep.configurations["front"].told["confs"] = 0.5, 0.4
     assert "being written" in bench.board.refusal
     bench.hears = {DRIVE, FRONT}
-    bench.run_until(lambda: not bench.board._configurations["front"].pending)
+    bench.run_until(lambda: not bench.board._upkeep.configurations["front"].pending)
     bench.run(0.5)
     bench.drive_on()
     assert not bench.robot.standing
-    assert bench.board._configurations["front"].known
+    assert bench.board._upkeep.configurations["front"].known
