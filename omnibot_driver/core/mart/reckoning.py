@@ -30,6 +30,8 @@ BEGIN_RADPS: Final = 0.03
 """Turn rate of unequal motors that begin alike, before the first heading."""
 BLIND_MPS: Final = 0.3
 """A robot of which nothing is heard is anywhere within this speed."""
+UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
+"""What a motion may have done of which the end was not heard."""
 ANY_RAD: Final = 1.8
 """Any heading, as a standard deviation."""
 NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
@@ -79,6 +81,8 @@ class Reckoning:
         self.wheel.connect()
         if self.motion is Motion.NONE:
             self.heading.forget()
+        else:
+            self.doubt.add(UNHEARD_M**2, UNHEARD_RAD**2)
         self.forget_speeds()
 
     def begin(self, motion: Motion, now: float) -> None:
