@@ -5,6 +5,7 @@
 Knows how a displacement moves a pose; not why one waits, nor what comes of it.
 """
 
+import math
 from dataclasses import replace
 
 from omnibot_driver.core.geometry.se2 import Pose, roll
@@ -48,7 +49,7 @@ class PendingDisplacements:
     @property
     def duration_s(self) -> float:
         """Board time that they stand for, as far as it is known."""
-        return sum(reading.duration_s or 0.0 for reading, _ in self._waiting)
+        return math.fsum(reading.duration_s or 0.0 for reading, _ in self._waiting)
 
     def unheard_s(self, last_stamp_s: float | None) -> float:
         """Time between the last stamp and the first displacement, without a report."""
@@ -71,7 +72,9 @@ class PendingDisplacements:
 
     def before(self, board: Pose) -> Pose:
         """The pose at which they began if they end at this pose."""
-        start = Pose(yaw_rad=board.yaw_rad - sum(reading.dyaw_rad for reading, _ in self._waiting))
+        start = Pose(
+            yaw_rad=board.yaw_rad - math.fsum(reading.dyaw_rad for reading, _ in self._waiting)
+        )
         end = start
         for reading, _ in self._waiting:
             end = advanced(end, reading)
