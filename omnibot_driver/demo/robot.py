@@ -49,7 +49,6 @@ class Robot:
             args=["--ros-args", "--disable-external-lib-logs"],
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        self.close = rclpy.try_shutdown
         self._node = node = rclpy.create_node("demo", namespace=namespace)
         self._cmd_vel = node.create_publisher(Twist, "cmd_vel", 1)
         if imu:
@@ -60,6 +59,11 @@ class Robot:
         node.create_subscription(Bool, "omnibot_driver/estop_active", self._on_estop, latched)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
+
+    def close(self) -> None:
+        """Leave ROS; an executor that outlives its context complains when Python ends."""
+        self._executor.shutdown(timeout_sec=0.0)
+        rclpy.try_shutdown()
 
     def spin_once(self) -> None:
         """Take the next message, if one comes soon."""

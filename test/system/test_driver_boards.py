@@ -123,7 +123,10 @@ def test_the_monitor_shows_what_the_board_has(
             {"delta_frame": "earth"},
             "'delta_frame' belongs to board omnibot, not to plain; remove it",
         ),
-        ({"gyro_bias": "[0.0,0.0,0.0]"}, "'gyro_bias' belongs to board omnibot, not to plain"),
+        (
+            {"gyro_bias": "[0.0,0.0,0.0]"},
+            "'gyro_bias' belongs to board omnibot and fejemis, not to plain",
+        ),
         ({"track_widt": 0.3}, "no parameter 'track_widt'; the nearest is 'track_width'"),
         ({"gain": 10.0}, "'gain' must be 0 to 9 1, not 10.0"),
         ({"on_exit": "pause"}, "'on_exit' must be one of stop, not 'pause'"),

@@ -327,7 +327,7 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
     set_parameter(probe, "terminal_mode", "gps")
     probe.wait_for(lambda: lines and lines[-1].data.startswith("$HCHDT"))
     set_parameter(probe, "terminal_mode", "host")
-    probe.wait_for(lambda: any("button was pressed or released" in line.msg for line in log))
+    probe.wait_for(lambda: any("presses and releases" in line.msg for line in log))
     set_parameter(probe, "drive_mode", "duty")
     publisher = probe.publisher(Float32MultiArray, "duty_cmd")
     timer = probe.node.create_timer(
