@@ -54,7 +54,7 @@ def at_rest(terminal: Terminal) -> tuple[Link, Session]:
     return link, ours
 
 
-def test_a_port_that_takes_no_farewell_is_left_to_the_guard(terminal: Terminal) -> None:
+def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> None:
     """Closing does not hang; the robot is stopped as soon as the board listens again."""
     link, _ours = at_rest(terminal)
     terminal.fill()
@@ -78,18 +78,18 @@ def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: 
     """The driver's own final Stop finds no room; the guard has to send it."""
     link, ours = at_rest(terminal)
     terminal.fill()
-    closed, farewell_over = ours.closed, threading.Event()
+    closed, session_closed = ours.closed, threading.Event()
 
     def defective(data: bytes, now: float) -> list[ImuEstimate]:
         raise RuntimeError("a defect")
 
     def tell_and_close(now: float) -> None:
-        farewell_over.set()
+        session_closed.set()
         closed(now)
 
     ours.hear, ours.closed = defective, tell_and_close  # type: ignore[method-assign]
     os.write(terminal.far, b"x")
-    assert farewell_over.wait(PATIENCE_S)
+    assert session_closed.wait(PATIENCE_S)
     terminal.read_until(5 * joined(LAST_WORDS[0]))
     link.close("stop")
     wait_for_the_end_of("omnibot-reader", "omnibot-pacer")

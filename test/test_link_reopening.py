@@ -91,7 +91,7 @@ def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
     assert "lost" in str(listener.reports[1])
 
 
-def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_farewell_too() -> None:
+def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too() -> None:
     """The robot may still follow a command from before the port was lost."""
     listener, started = Listener(), threading.Event()
     closer = threading.Thread(target=lambda: link.close("stop"))

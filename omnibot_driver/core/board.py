@@ -194,7 +194,7 @@ class Board(Protocol):
         """The board's own emergency stop, and nothing else."""
         return NO_PACKETS
 
-    def farewell(self) -> Packets:
+    def switch_off(self) -> Packets:
         """What else to switch off when the driver ends, behind Stop and what ``on_exit`` says."""
         return NO_PACKETS
 

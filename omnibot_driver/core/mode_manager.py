@@ -194,7 +194,7 @@ class ModeManager:
     def shutdown_sequence(self, on_exit: OnExit, *, proved: bool) -> Packets:
         """The last packets to the board, which stops it unless it is ``proved`` to stand."""
         stops = 0 if proved else LAST_STOPS
-        return stops * self._board.stop() + self._last_request(on_exit) + self._board.farewell()
+        return stops * self._board.stop() + self._last_request(on_exit) + self._board.switch_off()
 
     def _last_request(self, on_exit: OnExit) -> Packets:
         settled = self.phase is Phase.SETTLED

@@ -327,9 +327,9 @@ class FejemisBoard(Board):
         """Lift and brush."""
         return self._ports.line("front", *OFF)
 
-    def farewell(self) -> Packets:
+    def switch_off(self) -> Packets:
         """Lift and brush off, lights as they were."""
-        return self._ports.line("front", *self._upkeep.machine.farewell())
+        return self._ports.line("front", *self._upkeep.machine.switch_off())
 
     def wake(self) -> Packets:
         """Stop, and what else may turn."""

@@ -79,7 +79,7 @@ class Machine:
         self._off_left, self._brush_left = TIMES, 0
         self._next_at = -math.inf
 
-    def farewell(self) -> list[bytes]:
+    def switch_off(self) -> list[bytes]:
         """What ends all that was switched on, lights included."""
         self.off()
         lights = [b"ledon 1", b"leds"] if self.colour else []

@@ -217,7 +217,7 @@ class OmniBot:
         """The manual's E-stop."""
         return self._encoder.emergency_stop()
 
-    def farewell(self) -> Packets:
+    def switch_off(self) -> Packets:
         """Nothing."""
         return NO_PACKETS
 

@@ -18,20 +18,20 @@ def bench() -> Bench:
 @pytest.mark.parametrize(
     ("on_exit", "expected"), [("stop", b""), ("pause", STOP + PAUSE), ("reset", STOP + RESET)]
 )
-def test_the_farewell_stops_the_robot_whatever_else_it_does(
+def test_the_shutdown_sequence_stops_the_robot_whatever_else_it_does(
     bench: Bench, on_exit: OnExit, expected: bytes
 ) -> None:
     """Stop comes first."""
     assert bench.last_words(on_exit) == 3 * STOP + expected
 
 
-def test_a_farewell_to_a_paused_board_does_not_unpause_it() -> None:
+def test_a_shutdown_of_a_paused_board_does_not_unpause_it() -> None:
     """The letter P is a toggle, so it is not sent."""
     bench = paused()
     assert bench.last_words("pause") == 3 * STOP
 
 
-def test_a_farewell_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
+def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
     """P has been said and not yet shown: a second one alone would undo it."""
     bench.session.request(Request.PAUSE, object(), bench.now)
     bench.settle()
@@ -46,7 +46,7 @@ def test_a_farewell_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
     assert bench.board.mode is BoardMode.PAUSED
 
 
-def test_a_farewell_while_a_start_is_in_flight_ends_paused() -> None:
+def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
     """The notice is still believed, but S is on its way."""
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)
@@ -57,7 +57,7 @@ def test_a_farewell_while_a_start_is_in_flight_ends_paused() -> None:
     assert bench.board.mode is BoardMode.PAUSED
 
 
-def test_a_farewell_under_estop_repeats_the_estop(bench: Bench) -> None:
+def test_a_shutdown_under_estop_repeats_the_estop(bench: Bench) -> None:
     """The last thing the board hears is that it must not move."""
     bench.session.estop(True, bench.now)
     assert bench.last_words("stop") == 3 * STOP + EMERGENCY_STOP

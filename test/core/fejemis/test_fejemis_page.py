@@ -180,7 +180,7 @@ def said_by_the_driver() -> set[str]:
         bench.run(6.0 if job is not Job.POWER_OFF else 0.5)
     bench.estop(True)
     bench.estop(False)
-    for packets in (bench.board.start(), bench.board.farewell()):
+    for packets in (bench.board.start(), bench.board.switch_off()):
         bench.written += [(bench.now, channel, data) for channel, data in packets]
     said = {text for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
     said |= {relay_text(math.radians(10.4)).decode(), lift_line(6.0, 0.5)[0].decode()}

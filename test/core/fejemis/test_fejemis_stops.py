@@ -182,12 +182,12 @@ def test_a_command_that_expires_leaves_the_brush_on() -> None:
 def test_the_lights_are_given_back_at_the_end() -> None:
     """Where they were changed."""
     bench = nominal()
-    assert not any(b"leds" in data for _, data in bench.board.farewell())
+    assert not any(b"leds" in data for _, data in bench.board.switch_off())
     bench.board.set_led(300, 128, -5, bench.now)
     bench.settle()
     bench.run(0.5)
     assert bench.robot.front.leds == [(255, 128, 0)] * 12
-    assert any(b"leds" in data for _, data in bench.board.farewell())
+    assert any(b"leds" in data for _, data in bench.board.switch_off())
 
 
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
@@ -262,6 +262,6 @@ def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
 def test_what_turns_is_switched_off_thrice_at_the_exit() -> None:
     """A line may be lost, and nothing follows."""
     bench = nominal()
-    front = [data for channel, data in bench.board.farewell() if channel == FRONT]
+    front = [data for channel, data in bench.board.switch_off() if channel == FRONT]
     assert b"".join(front).count(b"brush 0") == 3
     assert b"".join(front).count(b"motv 0 0") == 3
