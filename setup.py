@@ -96,7 +96,7 @@ def remove_compiled(folder: str) -> None:
 
 
 def compiling() -> dict[str, object]:
-    """What setuptools is told of it; ``CompileCore`` finds out what there is to compile."""
+    """Arguments for setuptools; ``CompileCore`` finds the modules to compile."""
     commands = {"build_ext": CompileCore, "install_lib": InstallAnew}
     if os.environ.get("OMNIBOT_DRIVER_COMPILE", "0") in ("", "0"):
         return {"cmdclass": commands}

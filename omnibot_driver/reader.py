@@ -3,7 +3,7 @@
 """The reader's work: open the port, wait for bytes, hand them to the session, deliver at once.
 
 No timer and no other thread stand between the wire and the listener. A port that is lost is opened
-again, with a guard beside it; whatever ends the reading, the robot is told to stand.
+again, with a guard beside it; whatever ends the reading, a stop is sent to the robot.
 """
 
 import math

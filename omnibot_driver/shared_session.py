@@ -29,7 +29,7 @@ T = TypeVar("T")
 
 
 class SharedSession:
-    """All but ``call``, ``command`` and ``blocked`` is for whoever holds ``lock``.
+    """Hold ``lock`` to use anything but ``call``, ``command`` and ``blocked``.
 
     ``changed`` is its condition.
 

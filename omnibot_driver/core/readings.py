@@ -109,7 +109,7 @@ class ResetReading:
 class NoticeReading:
     """A notice for the user; ``halt``: the robot is to be driven no further.
 
-    An empty text: the user has been told before.
+    An empty text: the user already has this notice.
     """
 
     text: str

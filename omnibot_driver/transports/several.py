@@ -61,8 +61,8 @@ class Several:
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """Of all lines; None in the place of one that is missing, be it open still: whoever shared
-        it would keep it from being opened again."""
+        """Of all lines; None in the place of one that is missing, even if it is still open: a
+        copy of its descriptor in another process would keep it from being opened again."""
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
     @property

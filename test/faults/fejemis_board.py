@@ -66,7 +66,7 @@ def _befall(rig: Rig, half: str, what: str) -> None:
 
 
 def half_restarts(half: str) -> Any:
-    """Alone; nobody drives on, as it obeys again at once."""
+    """Without further commands, as the half obeys again at once."""
 
     def case(rig: Rig) -> None:
         rig.drive()

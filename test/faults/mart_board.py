@@ -124,7 +124,7 @@ def on_a_network(faults: NetworkFaults, allowed_s: float, rig: Rig) -> None:
 
 
 def replies_are_cut(rig: Rig) -> None:
-    """Nothing comes from the controller; it hears the stop."""
+    """No reply of the controller arrives; it receives the stop."""
     rig.drive()
     rig.line.from_board = cut
     rig.expect_still(rig.line.tick, "no replies come", BLIND_S)
@@ -240,7 +240,7 @@ def serve(line: Any, url: str) -> ServedBoard[Any]:
 
 
 def url(_folder: Path) -> str:
-    """Two ports in a row that nobody has."""
+    """Two ports in a row that are free."""
     for _ in range(100):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first:
             first.bind(("127.0.0.1", 0))

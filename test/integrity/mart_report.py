@@ -123,7 +123,7 @@ def _watch(bench: MartBench, score: Score) -> None:
 
 
 def _is_true(sonar: SonarReading, x_m: float, yaw_rad: float) -> bool:
-    """One wall, across x, in front of where the robot began; of 254 inches and more -1 is told."""
+    """One wall, across x, in front of where the robot began; from 254 inches on it reports -1."""
     ahead = math.cos(yaw_rad) if sonar.side == "front" else -math.cos(yaw_rad)
     sees_m = (FRONT_M - x_m) / ahead if ahead > 0.3 else math.inf
     if math.isinf(sonar.distance_m):

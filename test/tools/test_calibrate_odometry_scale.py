@@ -93,7 +93,7 @@ def test_both_scales_are_found_by_tape(subcommand: Any, before: float) -> None:
 
 
 class Encoder(TwoWheels):
-    """A robot whose driver has a way for each count; its heading is told by a gyro."""
+    """A robot whose driver has a way for each count; its heading is that of a gyro."""
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)

@@ -289,7 +289,7 @@ class FejemisBoard(Board):
         return self._ports.ready and self._obedience.stopped(now, was_paused=paused)
 
     def remark(self, text: str) -> None:
-        """Something a user is told once."""
+        """Queue a notice that the user gets only once."""
         self._told.remark(text)
 
     def reset_odometry(self) -> None:

@@ -58,7 +58,7 @@ class Pair(Protocol):
         """Whether lines to both have sums."""
 
     def remark(self, text: str) -> None:
-        """Something a user should be told."""
+        """Queue a notice that the user gets only once."""
 
 
 class Encoder:

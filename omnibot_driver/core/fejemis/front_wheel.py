@@ -23,7 +23,7 @@ FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
 """No servo turns the wheel further between two lines."""
 ROUNDED_DEG: Final = 0.25
-"""By so much an angle may be off that is sent in digits whose loss is seen."""
+"""Largest error of an angle that is rounded to digits whose loss can be detected."""
 BITS: Final = (
     (10, False, "broken Hall element"),
     (9, True, "gain control not settled"),
@@ -41,7 +41,7 @@ BITS: Final = (
 
 
 class FrontWheel:
-    """``angle_rad``: as it was told last; NaN before. ``heard_at``: when that was."""
+    """``angle_rad``: the last accepted angle, NaN before the first. ``heard_at``: its time."""
 
     def __init__(self) -> None:
         self.refused = 0
@@ -74,7 +74,7 @@ class FrontWheel:
         return not self.fault and now - self.heard_at <= OLDEST_S
 
     def hear(self, told: FrontAngle, now: float) -> bool:
-        """An angle was told. Whether it is worth relaying."""
+        """Take an angle from the front board. Returns whether it may be relayed."""
         words = complaints(told)
         self._sick = self._sick + 1 if words else 0
         if words:
@@ -89,7 +89,7 @@ class FrontWheel:
         return True
 
     def _reachable(self, angle_deg: float, now: float) -> bool:
-        """Or confirmed by the one before."""
+        """Whether the wheel can have this angle, or the refused angle before it confirms it."""
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)
         if math.isnan(self.angle_rad) or (

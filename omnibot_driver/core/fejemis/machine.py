@@ -52,7 +52,7 @@ class Machine:
         self._next_at = -math.inf
 
     def lift(self, volts: float, now: float, longest_s: float) -> None:
-        """Positive lifts the wheel; 0 stops. Raises CommandRefused for what is no voltage."""
+        """Positive lifts the wheel; 0 stops. Raises CommandRefused for NaN and infinity."""
         if not math.isfinite(volts):
             raise CommandRefused("lift_cmd rejected: contains NaN or infinity; fix the sender")
         volts = max(-MOST_VOLTS, min(MOST_VOLTS, volts))

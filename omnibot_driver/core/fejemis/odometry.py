@@ -5,7 +5,7 @@
 A pose tells where the robot is, with few digits: a millimetre in 20 ms is 0.05 m/s. The speeds of
 the wheels tell how it moves. So a displacement is what the speeds make of the time between two
 poses, drawn to where the pose is; and the whole way to the pose where both differ by more than
-rounding: lines were lost, or a wheel was turned quickly. What was told adds up to the pose.
+rounding: lines were lost, or a wheel was turned quickly. The displacements add up to the pose.
 
 A pose that no robot of such speeds can have reached waits for the next one. If that agrees with it,
 either the pose before both was false, or the board's frame is another one (``enc0``).
@@ -151,7 +151,7 @@ class PoseOdometry:
         if not _possible(way, seconds):
             return False
         rolled = self._rolled(seconds, now)
-        if rolled is None:  # behind a gap the next pose must confirm what is no small step
+        if rolled is None:  # after a gap the next pose must confirm a large step
             return seconds <= FRESH_S or (way.way_m <= SLACK_M and abs(way.yaw_rad) <= SLACK_RAD)
         off = way - rolled
         slack_m = SLACK_M + SPEED_UP_MPS2 * seconds * seconds

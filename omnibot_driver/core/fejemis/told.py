@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a user is told of this robot: each sentence at most once in a while.
+"""Notices for the user of this robot: each sentence at most once in a while.
 
 Knows sentences and times. A stop is never left out, only its sentence.
 """
@@ -31,7 +31,7 @@ class Told:
             self.notices.append(NoticeReading(text, halt=False))
 
     def remark(self, text: str) -> None:
-        """Something that is told once."""
+        """Add a notice that the user gets only once."""
         if text not in self._told_at:
             self._told_at[text] = math.inf
             self.notices.append(NoticeReading(f"{text} (said once)", halt=False))

@@ -39,7 +39,7 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """How often a low battery is reported."""
 PERIOD_S: Final = 0.03
-"""The orientation is of a sample of the IMU that is no older."""
+"""An orientation gets the stamp of the last IMU sample, unless that sample is older than this."""
 
 
 class Translation:

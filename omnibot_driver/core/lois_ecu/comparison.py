@@ -60,7 +60,7 @@ swing the board tells too few of them."""
 SWERVED_M: Final = 0.025
 """After 1 m at such speeds: what is not known of the place although the ways are."""
 COASTED_TICKS: Final = 1.0
-"""A wheel that comes to rest has rolled so much less since its last tick than at that speed."""
+"""Ticks by which a wheel that comes to rest has rolled less than at its last speed."""
 EQUAL_RPM: Final = 3.0
 """Standard deviation of the true difference of two speeds of which the board tells the same."""
 SWINGS_RPM: Final = 4.0
@@ -82,7 +82,7 @@ class Comparison:
         self._jumped = [False, False]
         self._resting = RestingWheel(), RestingWheel()
         self._changed_at_m = [0.0, 0.0]
-        """Way of each wheel when the speed that is told changed last."""
+        """Way of each wheel when its reported speed changed last."""
 
     # Ticks
 

@@ -159,7 +159,7 @@ class MotionFilter:
                 self.filter.forget(wheel.base + state, 0.0, 0.0)
 
     def shift(self, index: int, way_m: float, stddev_m: float) -> None:
-        """This wheel rolled so much further than believed."""
+        """Move this wheel by ``way_m`` further than estimated."""
         terms = self._way_terms(index)
         for state, factor in terms:
             self.filter.mean[state] += factor * way_m

@@ -38,7 +38,7 @@ LATE_S: Final = 0.012
 """Standard deviation of an arrival, where nothing better is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""After so long without a word the pose is not predicted any further: the board may be off."""
+"""The prediction of the pose ends after this silence: the board may be switched off."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 

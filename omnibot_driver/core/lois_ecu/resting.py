@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether a wheel stands of which the same speed is told again and again.
+"""Whether a wheel stands when the board keeps reporting the same speed for it.
 
 The public firmware keeps the speed of the last tick of a wheel that stands. A wheel that comes to
 rest slows down before, and its last tick tells 5 to 17 RPM: then that number stays. A wheel that
-rolls on steadily repeats a number too, but not one that it has just fallen to. Knows speeds as they
-are told, one for each group, and how long ago; no filter.
+rolls on steadily repeats a number too, but not one that it has just fallen to. Knows speeds as
+the board reports them, one for each group, and how long ago; no filter.
 """
 
 from collections import deque
@@ -20,13 +20,13 @@ FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 HIDDEN_PART: Final = 0.3
-"""While no speeds are told, time passes as if it went so much slower."""
+"""The clock runs at this part of its speed while no speeds are reported."""
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Chance that it stands after so many repetitions, if it fell far, if it fell far from a speed that
-was told once, or not so far. Counted on the public firmware with the gains that it boots with, and
-with better ones, with which no wheel falls like this."""
+"""Chance that it stands, by the number of repetitions: after a far fall, after a far fall from a
+speed that was reported once, and after a shorter fall. Counted on the public firmware with the
+gains that it boots with, and with better ones, with which no wheel falls like this."""
 
 
 class RestingWheel:
@@ -36,7 +36,7 @@ class RestingWheel:
         self.forget()
 
     def forget(self) -> None:
-        """What is told next is the first."""
+        """Begin anew: the next speed is the first."""
         self._lately: deque[tuple[float, float]] = deque(maxlen=64)
         self._told_rpm = 0.0
         self._fell_at_s = -SWINGS_S
@@ -48,11 +48,11 @@ class RestingWheel:
 
     @property
     def swings(self) -> bool:
-        """Whether it has slowed down much without being told to rest, lately."""
+        """Whether the reported speed fell far in the last ``SWINGS_S``."""
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """A speed that was not told, but is about this. What was told stays of interest."""
+        """Take an estimated speed where none was reported. The last reported speed is kept."""
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 

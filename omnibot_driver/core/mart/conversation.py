@@ -37,7 +37,7 @@ LOSS, LOSS_S = 1.5, 0.02
 """A query that was not answered may have been given up too soon: the next is waited for longer."""
 SLOW_S, DISTURBED_S = 0.06, 5.0
 """A network on which an exchange takes longer, or a datagram is lost or comes twice, may do so
-again: for so long no reply is taken to belong to the last question for certain."""
+again: for this time no reply is certain to belong to the last question."""
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Asked at once, whatever reply may still come."""
 

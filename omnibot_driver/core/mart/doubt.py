@@ -2,8 +2,8 @@
 
 """How far the odometry of a MART robot may be off, and what makes it so.
 
-A wheel that slips or has another size, a gyro that drifts, motors that differ where no heading is
-told, the ends of motions, and replies whose time is known within the network's delay only. Knows
+A wheel that slips or has another size, a gyro that drifts, motors that differ where the heading is
+unknown, the ends of motions, and replies whose time is known within the network's delay only. Knows
 metres, rad and seconds; not where they come from.
 """
 
@@ -63,7 +63,7 @@ class Doubt:
         aside_m: float,
     ) -> None:
         """The body moved so far. ``bend``: standard deviation of left over right, where they alone
-        tell of a turn; ``aside_m``: of the way, by a heading that was told at another time.
+        tell of a turn; ``aside_m``: of the way, by a heading of another time.
         """
         middle_rad = heading_rad + turn_rad / 2
         cos, sin = math.cos(middle_rad), math.sin(middle_rad)

@@ -40,7 +40,7 @@ ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
 """V and inches: two readings that are so near are alike."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
-"""So many alike in a row are believed, on a network where each may be another's."""
+"""Number of similar readings in a row that are believed, where a reply may be to another query."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 REFERENCE_FAILS: Final = 2
@@ -77,7 +77,7 @@ class Health:
         self, word: Word, reply: Ok, now: float, *, uncertain: bool = False
     ) -> list[Reading]:
         """A reply to one of the slower queries. ``uncertain``: it may be that to another question,
-        so it is told when it has come again.
+        so it is reported when it has come again.
         """
         if word is VOLTS:
             self._voltages.append(reply.number)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""When something that was told was so, as far as the network lets it be known. Values only."""
+"""The time at which a reply was true, as far as the network lets it be known. Values only."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -11,7 +11,7 @@ UNCERTAIN_S: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """``at_s``: probably; ``from_s``, ``until_s``: between these. ``doubtful``: what was told may
+    """``at_s``: probably; ``from_s``, ``until_s``: between these. ``doubtful``: the reply may
     be the answer to another question.
     """
 

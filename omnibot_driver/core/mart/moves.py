@@ -35,7 +35,7 @@ class Moves(Asking):
             self._move = Move(order.place)
         request = next_move(self._move, self.odometry.pose, self._settings, self._surplus)
         if request is None:
-            self._move.given_up = True  # it is over: whoever pushes the robot away keeps it there
+            self._move.given_up = True  # it is over: a robot that is pushed away stays there
             return None
         if request.word in NEEDS_IMU and not self.imu.fresh(now):
             return request

@@ -21,7 +21,7 @@ SLOWING_S: Final = 0.12
 ACCELERATION_MPS2, ACCELERATION_RADPS2 = 1.0, 3.0
 """Of a robot that is not heard."""
 FASTER_MPS, FASTER_RADPS = 0.1, 0.2
-"""A robot may be so much faster than its last counts tell."""
+"""A robot may be faster than its last counts tell by this."""
 BLIND_RADPS: Final = 1.5
 """A robot of which nothing is heard turns no faster."""
 SPEED_STDDEV_MPS, SPEED_STDDEV_RADPS = 0.02, 0.03

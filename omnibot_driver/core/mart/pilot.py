@@ -33,7 +33,7 @@ STOPS_S: Final = 1.0
 COPY_S: Final = 0.25
 """After a controlled move the encoder is answered by then, unless a copy of the move runs."""
 BLIND_PART: Final = 0.15
-"""By so much the sides may have changed against each other while no heading is told."""
+"""A larger change of the motors without an answer or a heading stops the robot."""
 STRAY_COUNTS: Final = 3
 """A robot that stands and is counted so far since the last count moves."""
 STRAY_AGAIN_S: Final = 3.0

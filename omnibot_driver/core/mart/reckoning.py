@@ -2,9 +2,9 @@
 
 """Where the robot was when it was counted, by the way of its right wheel and the relative heading.
 
-The heading is told while RM drives; of a turn on the spot the wheel tells it until the reply to SM
-does; of a controlled move nothing is known before its end. Knows counts, degrees and metres; no
-words. Time is an argument.
+The server reports the heading while RM drives; of a turn on the spot the wheel gives it until the
+reply to SM does; of a controlled move nothing is known before its end. Knows counts, degrees and
+metres; no words. Time is an argument.
 """
 
 import math
@@ -22,10 +22,10 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import DisplacementReading
 
 WINDOW_S, SPREADS = 0.35, 4
-"""Speeds are those of this time, and of so many times the uncertainty of a reply."""
+"""Speeds are averages over this time, or over this multiple of a reply's uncertainty if longer."""
 LEAST_S: Final = 0.05
 TOLD_RAD, TOLD_PART = 0.05, 0.3
-"""What is told is that near to what the wheel tells of a turn on the spot, or it is another's."""
+"""A reported turn that is further from the wheel's turn is the answer to another question."""
 BEGIN_RADPS: Final = 0.03
 """Turn rate of unequal motors that begin alike, before the first heading."""
 BLIND_MPS: Final = 0.3
@@ -39,7 +39,7 @@ NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, me
 
 class Reckoning:
     """``pose``: at the last count. ``stands``: it was stopped. ``left_over_right``: of the wheels'
-    speeds, where no heading is told and the commanded ones have to do; ``bend``: its standard
+    speeds, where the heading is unknown and the commanded speeds have to do; ``bend``: its standard
     deviation.
     """
 
@@ -103,7 +103,7 @@ class Reckoning:
         self.heading.changed_s = now
 
     def stopping(self, now: float) -> None:
-        """The robot is told to stop."""
+        """A stop was sent to the robot."""
         if self.slowing_since_s is None:
             self.slowing_since_s = now
 
@@ -180,7 +180,7 @@ class Reckoning:
         told_rad = turned_rad - self._motion_rad
         if self.motion is Motion.NONE and not wheel_m:
             self._motion_rad = turned_rad
-            return 0.0  # some servers let the heading drift while the robot stands
+            return 0.0  # some servers let the heading of a standing robot drift
         ratio = self.left_over_right
         if not self.on_the_spot:
             if ratio is None:
@@ -192,11 +192,11 @@ class Reckoning:
         if self.motion is Motion.TURN and told:
             turn_rad = told_rad
         self.spun_rad += turn_rad
-        return turn_rad if self.told_rad is None else 0.0  # what was told has it
+        return turn_rad if self.told_rad is None else 0.0  # the reported turn includes it
 
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
-        """What was guessed of the turn of this motion, and is told from now on, is put right at
-        once: it is no motion. By how much.
+        """Correct the guessed part of this motion's turn when the first heading is reported. The
+        correction is not a motion of the robot. Returns it in rad.
         """
         if not self._guessed:
             return 0.0
@@ -218,7 +218,7 @@ class Reckoning:
         self._yaw_rad += wrong_rad
 
     def _finish_turn(self) -> None:
-        """A turn on the spot is over, and counted. What was told may be another number."""
+        """A turn on the spot is over, and counted. The reported angle may be another number."""
         told_rad = self.told_rad
         wrong_rad = 0.0 if told_rad is None else self.spun_rad - told_rad
         if abs(wrong_rad) > TOLD_RAD + TOLD_PART * abs(self.spun_rad):

@@ -23,12 +23,12 @@ AHEAD_S: Final = 0.3
 ODD_TIMES: Final = 3
 """What has come so often is so."""
 SPREADS: Final = 4
-"""The turn rate is that of so many times the uncertainty of a reply."""
+"""The turn rate is an average over this multiple of a reply's uncertainty."""
 
 
 class RelativeHeading:
-    """``told_s``: when it was told last; ``from_s``: at the earliest, where it is no answer to
-    another question; ``changed_s``: when it has changed; ``rate_radps``: of the turn, as told.
+    """``told_s``: time of the last reply; ``from_s``: the earliest time it can have, unless it
+    answers another question; ``changed_s``: time of the last change; ``rate_radps``: of the turn.
     """
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class RelativeHeading:
 
     @property
     def is_known(self) -> bool:
-        """So that turns can be told from now on."""
+        """Whether turns can be measured from now on."""
         return self._angle_rad is not None
 
     def forget(self) -> None:

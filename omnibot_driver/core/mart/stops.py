@@ -35,7 +35,7 @@ more, comes of no living IMU.
 NO_START_S: Final = 1.5
 """A wheel that is driven turns by then."""
 SPIN_RATIO: Final = 0.35
-"""A turn on the spot keeps its speed; one that is commanded so much otherwise starts anew."""
+"""A turn on the spot keeps its speed; a command that differs by this part starts it anew."""
 SPIN_RAD, SPIN_PART = 0.15, 0.4
 """What a stop tells of a turn on the spot is that near to what was counted and commanded."""
 LOST_REPEAT_S: Final = 1.0
@@ -193,8 +193,8 @@ class Stops(Ground):
         self._rest(now)
 
     def _may_be_count(self, reply: Reply, now: float) -> bool:
-        """Whether a number that comes while a turn on the spot is stopped is no answer to the stop:
-        it is not the angle that the robot can have turned, so the encoder has told it before.
+        """Whether a number that comes while a turn on the spot is stopped is a late encoder count
+        and not the answer to the stop: the robot cannot have turned by this angle.
         """
         stopping = self._stopping
         assert stopping is not None

@@ -36,7 +36,7 @@ class Step:
 
 class WheelCount:
     """``last``: None where nothing was counted; ``told_s``: when, ``from_s``: at the earliest;
-    ``certain``: it is no answer to another question.
+    ``certain``: it cannot be the answer to another question.
     """
 
     def __init__(self) -> None:

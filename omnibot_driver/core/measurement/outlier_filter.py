@@ -51,7 +51,7 @@ class MotionLimits:
 
     ``force_step_mps2``: the least change of specific force, from one reading to the next, that is
     looked at twice; ``full_scale_mps2``: of the accelerometer;
-    infinite where its readings are no words of bits.
+    infinite where its readings are not integers.
     """
 
     fastest_mps: float = 2.0

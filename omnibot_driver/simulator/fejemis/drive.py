@@ -299,5 +299,5 @@ class DriveTeensy(Teensy[DriveConfig]):
 
 
 def _padded(rest: str, count: int) -> list[float]:
-    """So many numbers; what is missing is zero, as with ``strtof``."""
+    """``count`` numbers; what is missing is zero, as with ``strtof``."""
     return (wire.numbers(rest) + [0.0] * count)[:count]

@@ -253,7 +253,7 @@ class FrontTeensy(Teensy[FrontConfig]):
 
 
 def _padded(rest: str, count: int) -> list[float]:
-    """So many numbers; what is missing is zero, as with ``strtof``."""
+    """``count`` numbers; what is missing is zero, as with ``strtof``."""
     return (wire.numbers(rest) + [0.0] * count)[:count]
 
 

@@ -80,7 +80,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="SECONDS:HALF:WHAT",
-        help="what befalls the drive or the front half, so long after the start; may be repeated."
+        help="fault of the drive or the front half, SECONDS after the start; may be repeated."
         f" Of either: {', '.join(FAULTS)}; of front: {', '.join(SENSOR_FAULTS)}",
     )
 
@@ -131,5 +131,7 @@ def _chance(text: str) -> float:
     except ValueError:
         chance = -1.0
     if not 0.0 <= chance <= 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is no probability: give a number from 0 to 1")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a probability: give a number from 0 to 1"
+        )
     return chance

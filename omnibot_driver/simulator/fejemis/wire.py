@@ -48,7 +48,7 @@ def checked(text: str) -> tuple[Check, str, int]:
 
 
 def numbers(text: str) -> list[float]:
-    """All that ``strtof`` finds, one after the other, up to what is no number."""
+    """All that ``strtof`` finds, one after the other, up to the first text that is not a number."""
     found, at = [], 0
     while match := _NUMBER.match(text, at):
         found.append(float(match[1]))

@@ -153,7 +153,7 @@ def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
 
 
 def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
-    """66 times a second, with what was told."""
+    """66 times a second, with the angle that the front board sent."""
     bench = nominal()
     mark = bench.now
     bench.drive_on(0.2, 0.4, 1.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The way of the robot from poses and wheel speeds, and the times of all that is told."""
+"""The way of the robot from poses and wheel speeds, and the stamps of all readings."""
 
 import contextlib
 import itertools

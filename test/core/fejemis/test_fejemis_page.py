@@ -189,7 +189,7 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """And ``setid`` is not among them."""
+    """``setid`` is not among them."""
     said = said_by_the_driver()
     assert STOP.decode() == SAID["rc"].golden
     words = {text.split()[0] for text in said}

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What each board is told, and what the body does of it by the manual's equations."""
+"""The set-points of each board, and the body's motion from them by the manual's equations."""
 
 import math
 
@@ -83,7 +83,7 @@ def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
 def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
     v: float, w: float, angle_rad: float
 ) -> None:
-    """But for what an angle that is off by 5° gives."""
+    """The tolerance is what an angle that is off by 5° gives."""
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
     told = steer(wanted, ROBOT, angle_rad, turning=False).twist
@@ -141,7 +141,7 @@ def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
 
 
 def test_the_digits_cost_less_than_one_per_cent() -> None:
-    """What is told, by the manual, against what is commanded."""
+    """The motion of the written lines, by the manual, against what is commanded."""
     for v in (0.05, 0.1, 0.15, 0.25, 0.5, 1.0):
         for w in (-1.5, -0.3, 0.0, 0.1, 0.12, 0.8):
             factor = scale(BodyTwist(v, 0.0, w), 0.4)
@@ -165,7 +165,7 @@ def test_a_turn_on_the_spot_begins_without_rolling() -> None:
 
 
 def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> None:
-    """The servo takes more than a second for 180°, and that is no fault."""
+    """The servo takes more than a second for 180°, which is not a fault."""
     bench = nominal()
     bench.drive_on(0.0, 1.0, 2.0)
     before_m = bench.robot.truth.x_m

@@ -29,8 +29,8 @@ def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
     assert told(19, 20, *[20] * 50).chance == 0.0
 
 
-def test_one_tick_that_came_late_is_no_fall() -> None:
-    """The tick after it seems to be early, and is told as a high speed, once."""
+def test_one_tick_that_came_late_is_not_a_fall() -> None:
+    """The tick after it seems to be early, and the board reports a high speed once."""
     assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
 
 

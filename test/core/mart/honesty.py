@@ -2,7 +2,7 @@
 
 """How far odometry is off, measured by its own covariance (NEES), on networks of all kinds.
 
-``PYTHONPATH=.:test:test/core python test/core/mart/honesty.py 50``: so many drives for each
+``PYTHONPATH=.:test:test/core python test/core/mart/honesty.py 50``: 50 drives for each
 network; docs/boards/mart.md has the figures. Of an honest covariance the mean is 3, and 0.1 % is
 beyond 16.3; less than 3 is more careful than need be.
 """

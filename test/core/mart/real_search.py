@@ -34,13 +34,13 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "e-stop": lambda bench: (bench.estop(True), bench.run(0.4), bench.estop(False)),
 }
 MOST_DATAGRAMS: Final = 14
-"""Of those that are no polls, each way, from the first wish on."""
+"""Each way, from the first wish on, without the polls."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
 """What a driver may meet that begins."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
-"""A network comes back after so long."""
+"""Times after which the network comes back."""
 BACK_S: Final = (0.2, 0.7, 30.0)
-"""And is away again after so long, for a second."""
+"""Times after which it is away again, for a second."""
 ENDS_S: Final = 16.0
 
 

@@ -210,7 +210,7 @@ def at(at_s: float, spread_s: float = 0.01) -> Moment:
 
 
 def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
-    """And the way goes on from the one before."""
+    """The way goes on from the count before."""
     odometry = MartOdometry(MartSettings())
     odometry.begin(Motion.REFERENCE, 0.0)
     for count, at_s in ((0, 0.1), (50, 0.2), (4_000_000, 0.3), (100, 0.4), (150, 0.5)):

@@ -56,7 +56,7 @@ def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
     ],
 )
 def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: str) -> None:
-    """Or not at all: the rest would have to be guessed."""
+    """A part alone is refused: the rest would have to be guessed."""
     with pytest.raises(ParameterError, match=f"parameter '{missing}' must be set too"):
         check(**given)
 

@@ -57,7 +57,7 @@ class Rig:
             self.say(DRIVE, f"fwl {text.split()[1]}")
 
     def ask(self, port: int, text: str) -> list[str]:
-        """What this port says within 10 ms of it, besides a heartbeat that nobody asked for."""
+        """Answers of this port within 10 ms, without heartbeats that were not asked for."""
         self.say(port, text)
         said = [answer for number, answer in self.run(0.01) if number == port]
         return said if text == "hbti" else [answer for answer in said if not BEAT.match(answer)]

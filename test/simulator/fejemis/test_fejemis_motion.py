@@ -63,7 +63,7 @@ def test_the_wheel_can_be_aligned_while_the_robot_stands() -> None:
 
 
 def test_without_the_angle_drive_goes_straight() -> None:
-    """It knows of the wheel what it is told."""
+    """It knows the angle of the wheel only from the relayed lines."""
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.5 30")
     rig.run(1.0)

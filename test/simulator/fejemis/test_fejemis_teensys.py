@@ -73,7 +73,7 @@ def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
 
 
 def test_front_that_restarts_switches_brush_and_lift_off() -> None:
-    """And no longer sends the angle; drive goes on by the last one that it was told."""
+    """It no longer sends the angle; drive goes on with the last one that it has."""
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 4")
     rig.drive("rc 2 0.3 20", 1.0)
@@ -293,7 +293,7 @@ def test_the_accelerometer_is_calibrated_as_level() -> None:
 
 
 def test_the_yaw_of_the_imu_follows_the_robot() -> None:
-    """But for the bias that was not calibrated away."""
+    """A gyro without bias; a bias that is not calibrated away would add to it."""
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 0.0)).booted()
     rig.drive("rc 2 0.3 20", 4.0)
     yaw = float(rig.ask(DRIVE, "imuposei")[0].split()[3])
@@ -329,7 +329,7 @@ def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
 
 
 def test_id_zero_erases_the_configuration() -> None:
-    """And nothing is saved until there is an id again."""
+    """Nothing is saved until the board has an id again."""
     rig = Rig().booted()
     rig.say(DRIVE, "setname cart", "confw 0.08 0.08 20 64 0.41", "eew", "setid 0")
     rig.run(0.01)

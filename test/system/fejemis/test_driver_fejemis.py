@@ -169,7 +169,7 @@ def test_the_estop_stops_it_until_it_is_released(robot: TwoPorts, probe: Probe) 
 
 
 def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None:
-    """And ends with ``~/pause`` false; a command of before does not count."""
+    """It ends with ``~/pause`` false; an earlier command has no effect."""
     with driven(probe, robot):
         assert probe.call(SetBool, "pause", data=True).success
         robot.stands_for_good()
@@ -224,7 +224,7 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, name: str, what: str
 ) -> None:
-    """And it is driven again once it is well."""
+    """The robot obeys again once both halves work."""
     with driven(probe, robot):
         robot.do(lambda board: board.befall(name, what))
         if what != "restart":

@@ -59,7 +59,7 @@ class TwoPorts(RunningBoard[SimulatedFejemis]):
             self._terminals[channel] = Terminal(self.ports[channel])
 
     def unplug(self, channel: int) -> None:
-        """The terminal goes away; the Teensy does what it was told last."""
+        """The terminal goes away; the Teensy goes on with its last command."""
         with self._plugging:
             terminal, self._terminals[channel] = self._terminals[channel], None
             if terminal is not None:
