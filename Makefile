@@ -42,7 +42,7 @@ demo: $(VENV)/.runtime  ## drive a square on a simulated BOARD, until ctrl-C or 
 	@$(PY) -m omnibot_driver.demo --board $(BOARD)
 
 test: lint $(VENV)/.docs  ## run every check and test
-	$(PY) -m pytest -n 2 --dist loadfile  # two files at a time: most tests wait for real time
+	$(PY) -m pytest -n 4 --dist loadfile  # four files at a time: most tests wait for real time
 
 check: lint  ## check formatting, style and types, and run the quick tests (a minute)
 	$(PY) -m pytest -n 2 -q -m "not slow" $(QUICK)
