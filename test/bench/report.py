@@ -23,7 +23,7 @@ from ratios import Figure, table
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "performance.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
-OTHERS = {"lois_ecu": "lois_ecu_bench", "mart": "mart_bench"}
+OTHERS = {"lois_ecu": "lois_ecu_bench", "mart": "mart_bench", "fejemis": "fejemis_bench"}
 """By the name of the board: the module that measures it."""
 SCALES = (1, 2, 4, 8, 16)
 
@@ -75,7 +75,7 @@ def main() -> int:
         f"{os.cpu_count()} processors, load {os.getloadavg()[2]:.1f} over the last 15 minutes,"
         f" Linux, Python {platform.python_version()}:"
     )
-    text = "\n".join([machine, "", *table(figures), *sections])
+    text = "\n".join([machine, "", *(table(figures) if figures else []), *sections])
     print(text)
     if not chosen.quick:
         document = DOCUMENT.read_text()

@@ -1,20 +1,17 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How long the front angle of a Fejemis takes from one board to the other, through the driver.
+"""The Fejemis's part of ``make bench``: how long the front angle is on its way to the drive board.
 
-``python test/bench/fejemis_relay.py [--seconds 20] [--busy 0]``: a simulated pair on two
-pseudo-terminals in a process of its own, the driver's link without ROS in this one. ``--busy``:
-processes that compute all the time beside both.
+A simulated pair on two pseudo-terminals in a process of its own, the driver's link without ROS in
+this one, and processes that compute all the time beside both.
 """
 
-import argparse
 import contextlib
 import itertools
 import multiprocessing
 import os
 import re
 import select
-import statistics
 import time
 import tty
 from collections import deque
@@ -22,6 +19,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from multiprocessing.connection import Connection
 from typing import Final
+
+from ratios import Figure
 
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
@@ -37,6 +36,8 @@ from omnibot_driver.simulator.fejemis import SimulatedFejemis
 from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
 
+BESIDE: Final = (0, 2, 4)
+"""Busy processes."""
 SETTLES_S: Final = 3.0
 TOLD: Final = re.compile(rb"fwl (-?[0-9.]+) 0x")
 RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
@@ -110,34 +111,38 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
     link.close("stop")
 
 
-def main() -> None:
-    """Measure, and print a line."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=20.0)
-    parser.add_argument("--busy", type=int, default=0, help="processes that compute beside it")
-    arguments = parser.parse_args()
+def relayed_ms(seconds: float, busy: int) -> list[float]:
+    """How long each angle took, in order of length."""
     pairs = [os.openpty() for _ in range(2)]
     for _, near in pairs:
         tty.setraw(near)
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
     masters = [master for master, _ in pairs]
-    others = [context.Process(target=compute, daemon=True) for _ in range(arguments.busy)]
-    both = context.Process(target=boards, args=(masters, arguments.seconds, theirs), daemon=True)
+    others = [context.Process(target=compute, daemon=True) for _ in range(busy)]
+    both = context.Process(target=boards, args=(masters, seconds, theirs), daemon=True)
     for process in (*others, both):
         process.start()
-    drive_for(arguments.seconds - 1.0, [os.ttyname(near) for _, near in pairs])
+    drive_for(seconds - 1.0, [os.ttyname(near) for _, near in pairs])
     took = ours.recv()
     for process in (*others, both):
         process.kill()
-    took_ms = sorted(1e3 * each for each in took)
-    tell = {part: took_ms[int(part / 100 * (len(took_ms) - 1))] for part in (50, 90, 99, 100)}
-    print(
-        f"{len(took_ms)} angles, {arguments.busy} busy processes: mean"
-        f" {statistics.mean(took_ms):.2f} ms; "
-        + ", ".join(f"{part} %: {value:.2f} ms" for part, value in tell.items())
-    )
+    for descriptor in itertools.chain(*pairs):
+        os.close(descriptor)
+    return sorted(1e3 * each for each in took)
 
 
-if __name__ == "__main__":
-    main()
+def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
+    """No figures with a floor; a table of the relayed angle, alone and beside busy processes."""
+    rows = [
+        "How long the angle of the front wheel takes from one board to the other, in ms:",
+        "",
+        "| beside | angles | median | 90 % | 99 % (goal 5) | longest |",
+        "|---|---|---|---|---|---|",
+    ]
+    for busy in BESIDE:
+        took_ms = relayed_ms(8.0 if quick else 60.0, busy)
+        told = (took_ms[int(part * (len(took_ms) - 1))] for part in (0.5, 0.9, 0.99, 1.0))
+        cells = " | ".join(f"{value:.2f}" for value in told)
+        rows.append(f"| {busy} busy processes | {len(took_ms):,} | {cells} |")
+    return [], rows
