@@ -16,6 +16,8 @@ from omnibot_driver.core.fejemis.half import Role
 from omnibot_driver.core.fejemis.messages import Heartbeat, Message, Status, WheelConfiguration
 from omnibot_driver.core.fejemis.readings import Job, JobDone
 
+UNSEEN: Final = ({"0", "3"}, {"1", "2"})
+"""Digits whose codes together are 99, so that a sum does not see their loss."""
 WITHIN_S: Final = 8.0
 CALIBRATION_S: Final = 1.2
 """A calibration averages for about a second."""
@@ -31,6 +33,14 @@ OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {
     Job.CALIBRATE_ACCELEROMETER: (b"acccal2", b"accoi", "acco"),
 }
 """What begins it, what asks for the result, and the keyword of the answer."""
+
+
+def whole_seconds(delay_s: float) -> int:
+    """The next number of seconds that cannot lose two digits unseen (`numerals.py`)."""
+    seconds = max(1, round(delay_s))
+    while any(pair <= {*str(seconds)} for pair in UNSEEN):
+        seconds += 1
+    return seconds
 
 
 class Jobs:
@@ -77,7 +87,7 @@ class Jobs:
         self._begun_at = self._next_at = now + wait_s
         self._until = self._begun_at + WITHIN_S
         if job is Job.POWER_OFF:
-            self._text = b"off %d" % max(1, round(delay_s))
+            self._text = b"off %d" % whole_seconds(delay_s)
             self.powering_off = True
 
     def cancel(self, why: str) -> None:

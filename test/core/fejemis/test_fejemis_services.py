@@ -8,6 +8,7 @@ from fejemis_bench import DRIVE, FRONT, Bench, nominal
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.fejemis.codec import parse
 from omnibot_driver.core.fejemis.configuration import Configuration
+from omnibot_driver.core.fejemis.jobs import whole_seconds
 from omnibot_driver.core.fejemis.readings import (
     BatteryReading,
     Job,
@@ -319,3 +320,13 @@ def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     bench.drive_on()
     assert not bench.robot.standing
     assert bench.board._upkeep.configurations["front"].known
+
+
+@pytest.mark.parametrize(
+    ("wanted_s", "seconds"), [(10.0, 10), (0.2, 1), (300.0, 311), (12.0, 13), (120.0, 133)]
+)
+def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
+    wanted_s: float, seconds: int
+) -> None:
+    """Of `off 300` without its 3 and a 0 the sum is right, and the power off at once."""
+    assert whole_seconds(wanted_s) == seconds
