@@ -40,7 +40,7 @@ def test_without_the_folders_of_one_board_the_tests_of_the_rest_are_green(
     for place in ("core", "simulator", "boards"):
         assert not list((tmp_path / "omnibot_driver" / place).glob(f"{board}*"))
     run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *REMAINS],
+        [sys.executable, "-m", "pytest", "-qx", "-m", "not slow", *REMAINS],
         cwd=tmp_path,
         capture_output=True,
         text=True,
