@@ -87,7 +87,10 @@ def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float 
         driver = stack.enter_context(Driver(port=port.path))
         probe = stack.enter_context(Probe(driver.namespace))
         imu, odom = probe.listen(Imu, "imu/data_raw"), probe.listen(Odometry, "odom")
-        probe.wait_for_state("nominal")
+        try:
+            probe.wait_for_state("nominal")
+        except AssertionError as error:
+            raise AssertionError(f"the board does not run:\n{driver.output}") from error
         cmd_vel = probe.publisher(Twist, "cmd_vel")
         random = Random("drive")
         phases = [random.uniform(0.0, math.tau) for _ in range(3)]
