@@ -88,7 +88,7 @@ class TeensyClock:
         self._odds += 1
         if self._odds < AGAIN or now - self._odd[1] < AGAIN_AFTER_S:
             return False
-        self.restarted = True
+        self.restarted = board_s < self._last_s  # lines that had waited before are in the past
         self._begin_at(board_s, now)
         return True
 

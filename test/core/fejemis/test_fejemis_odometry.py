@@ -362,6 +362,20 @@ def test_the_logarithm_leads_to_the_pose() -> None:
     assert roll(log_of(way)).way_to(way).way_m < 1e-12
 
 
+def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
+    """The clock of a board that restarts goes back; theirs is left behind."""
+    clock = TeensyClock()
+    for n in range(20):
+        clock.see(5.0 + 0.02 * n, 100.0 + 1e-4 * n)
+    followed, restarts = [], 0
+    for n in range(10):
+        followed.append(clock.see(10.0 + 0.02 * n, 100.02 + 0.02 * n))
+        restarts += clock.restarted
+    assert followed[-1]
+    assert not restarts
+    assert clock.host_s(10.18) == pytest.approx(100.2, abs=0.01)
+
+
 def test_what_waited_while_the_host_was_stalled_is_no_restart() -> None:
     """Late lines of the same board come all at once; those of one that has restarted do not."""
     clock = TeensyClock()
