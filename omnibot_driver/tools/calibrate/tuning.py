@@ -61,8 +61,9 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
         feedback = Gains(0.0, gains.proportional, gains.integral)
         loaded = answer(motor, feedback, HORIZON_TICKS, command=0.0, load=motor.pwm_per_count).speed
         wrong = np.maximum(abs(speed[-1] - 1.0), abs(loaded[-1]))
+        rise_ticks = np.argmax(speed >= 0.9, axis=0) - np.argmax(speed >= 0.1, axis=0)
         return Behaviour(
-            rise_s=(np.argmax(speed >= 0.9, axis=0) - np.argmax(speed >= 0.1, axis=0)) * TICK_S,
+            rise_s=TICK_S * np.asarray(rise_ticks, float),
             overshoot=np.maximum(0.0, speed.max(axis=0) - 1.0),
             command_error_s=abs(speed - 1.0).sum(axis=0) * TICK_S,
             load_error_s=abs(loaded).sum(axis=0) * TICK_S,

@@ -117,8 +117,8 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
     enough = np.sqrt(((told * weights) ** 2).mean(axis=0)) > 0.1 * TOLD
     power = (told**2).sum(axis=0)
     gains = np.where(enough, (told * values).sum(axis=0) / np.where(enough, power, 1.0), np.nan)
-    error = np.sqrt(((values - np.nan_to_num(gains, nan=1.0) * told) ** 2).mean(axis=0))
-    return Answer(best_s, gains, error)
+    errors = np.sqrt(((values - np.nan_to_num(gains, nan=1.0) * told) ** 2).mean(axis=0))
+    return Answer(best_s, gains, errors)
 
 
 def judge(log: Log) -> Iterator[Finding]:
