@@ -177,14 +177,12 @@ class Campaign(Outcome):
         *,
         damaged_bytes: bool,
     ) -> None:
-        own = dict(self._kind.cases) if kind is Rig else {}
-        names = {**cases(0), **own}
-        rows = {name: self.row(name) for name in names if name not in self._kind.without}
+        rows = {name: self.row(name) for name in cases(0) if name not in self._kind.without}
         with self.rig(kind) as rig:
             self.run(Row("warm-up"), lambda rig: rig.wait_ticks(100), rig)
             descriptors, memory = rig.cost()
             for number in range(ROUNDS):
-                for name, case in {**cases(number), **own}.items():
+                for name, case in cases(number).items():
                     if name in rows:
                         self.run(rows[name], case, rig)
             self.judge(rig, damaged_bytes=damaged_bytes)

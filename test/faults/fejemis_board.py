@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping
 from typing import Any, Final
 
+from cases import Case, survivable
 from rig import Rig
 from rig_board import RigBoard
 
@@ -116,6 +117,11 @@ CASES: Final = {
 }
 
 
+def cases(seed: int) -> dict[str, Case[Rig]]:
+    """What is usual on a serial line, and each half alone."""
+    return {**survivable(seed), **CASES}
+
+
 BOARD: Final = RigBoard(
     name="fejemis",
     make=Pair,
@@ -136,7 +142,7 @@ BOARD: Final = RigBoard(
         "reconnect_interval",
     ),
     imu=True,
-    cases=CASES,
+    cases=cases,
     without=frozenset(
         {
             "wheel_cmd has the wrong size",

@@ -25,22 +25,21 @@ class RigBoard:
     ``imu``: whether it sends readings of one; ``jump_stddevs``: by how many of its own standard
     deviations an odometry that is predicted may be put right.
 
-    ``ports``: the driver's parameters that name its ports, by the link to the terminal; ``cases``:
-    faults that this board alone has.
+    ``ports``: the driver's parameters that name its ports, by the link to the terminal.
 
     ``sent``: the frames of its last tick; ``not_sent``: of what was published, by kind, how many
     messages were never sent, and of how many. ``lossy``: settings of board number n for a line that
     loses bytes. ``without``: faults that do not apply, and pieces of the campaign.
 
     ``line``, ``serve``, ``port``: in place of a breakable line of bytes, what carries it, and what
-    the driver's ``port`` is; ``cases``: all that one driver goes through, instead of the usual.
+    the driver's ``port`` is; ``cases``: all that one driver goes through in a round, by the number
+    of the round; None for what is usual on a serial line.
     """
 
     name: str
     make: Callable[[Any], Any]
     parameters: Mapping[str, object] = field(default_factory=dict)
     ports: Callable[[str], Mapping[str, str]] = lambda link: {"port": link}
-    cases: Mapping[str, Callable[[Any], object]] = field(default_factory=dict)
     old_command: bytes
     stop: bytes
     opening: bytes
