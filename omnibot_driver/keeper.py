@@ -14,6 +14,7 @@ import struct
 import subprocess
 import sys
 import termios
+import time
 from collections.abc import Sequence
 from typing import Final
 
@@ -96,6 +97,10 @@ class Keeper:
             self._dismiss(guard.BYE, LEAVES_WITHIN_S)
         else:
             self._dismiss(b"", SPEAKS_WITHIN_S)
+        until = time.monotonic() + DIES_WITHIN_S
+        for process in self._dying:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(max(0.0, until - time.monotonic()))
 
     def _beat(self, process: subprocess.Popen[bytes], word: bytes) -> str:
         """Returns what is wrong with it, and then it is given up."""

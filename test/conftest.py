@@ -8,11 +8,13 @@ Hypothesis tries the same examples in every run, so what turns red was changed;
 
 import os
 import threading
+import time
 from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
 from interpreted import INTERPRETED
+from listener import PATIENCE_S
 from terminal import Terminal
 
 # Domains 0 to 101 are safe on every platform; 0 is everybody's default.
@@ -34,6 +36,9 @@ def nothing_left_behind() -> Iterator[None]:
     """Every link, port and board that a test opens gives its threads and descriptors back."""
     threads, descriptors = driver_threads(), os.listdir("/proc/self/fd")
     yield
+    until = time.monotonic() + PATIENCE_S  # a link does not wait for long for a thread that is busy
+    while driver_threads() != threads and time.monotonic() < until:
+        time.sleep(0.01)
     assert driver_threads() == threads
     assert len(os.listdir("/proc/self/fd")) == len(descriptors)
 

@@ -6,6 +6,7 @@ The line is undamaged, so everything that the board sent is published, and nothi
 message blames the cable.
 """
 
+import math
 import subprocess
 import sys
 import time
@@ -21,6 +22,8 @@ LOOPS: Final = 4
 PIECE: Final = 4
 BYTE_S: Final = 10 / 115200
 TICKS: Final = 3000
+SILENCE_S: Final = 1.0
+"""A busy computer can keep the simulated board silent for so long that the driver is right."""
 TRANSIT: Final = 200
 """Frames that may be under way when the comparison begins."""
 REACH: Final = 200
@@ -28,10 +31,15 @@ REACH: Final = 200
 
 
 class PiecesTerminal(Terminal):
-    """A few bytes at a time, at the pace of the line."""
+    """A few bytes at a time, at the pace of the line. ``silent_s``: the longest pause so far."""
+
+    silent_s = 0.0
+    _sent_at = math.inf
 
     def _send(self, channel: int, data: bytes) -> int:
-        sent = 0
+        sent, now = 0, time.monotonic()
+        self.silent_s = max(self.silent_s, now - self._sent_at)
+        self._sent_at = now
         for at in range(0, len(data), PIECE):
             piece = data[at : at + PIECE]
             time.sleep(len(piece) * BYTE_S)
@@ -106,4 +114,5 @@ def is_busy(rig: PiecesRig, ticks: int = TICKS) -> None:
     rig.findings.expect(len(rig.imu) - imu >= ticks, "fewer Imu messages than ticks")
     rig.findings.expect(not rig.terminal.dropped, f"the kernel lost {rig.terminal.dropped} bytes")
     blamed = [text for text in rig.driver.lines[line:] if "cable" in text]
-    rig.findings.expect(not blamed, f"the line is blamed: {blamed}")
+    punctual = rig.terminal.silent_s < SILENCE_S
+    rig.findings.expect(not (blamed and punctual), f"the line is blamed: {blamed}")

@@ -194,8 +194,11 @@ def test_a_second_request_is_refused_while_one_is_under_way(
 def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
     """The robot's place and heading are the origin from then on."""
     odometry = probe.listen(Odometry, "odom")
-    drive(probe, board)
-    assert board.wait_for(lambda b: b.truth.x_m > 0.1 and still(b), 20.0)
+    for _ in range(20):  # a machine that hangs stops the robot early
+        drive(probe, board)
+        if board.wait_for(lambda b: b.truth.x_m > 0.1, 1.0):
+            break
+    assert board.wait_for(still, 20.0)
     probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.1)
     assert probe.call(Trigger, "reset_odometry").success
     probe.wait_for(lambda: odometry[-1].pose.pose.position.x == pytest.approx(0.0, abs=1e-3))
