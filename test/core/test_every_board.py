@@ -4,9 +4,10 @@
 
 import math
 from collections.abc import Callable
+from random import Random
 
 import pytest
-from any_board import BOARDS, AnyBench, nominal
+from any_board import BOARDS, TICK_S, AnyBench, nominal
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -161,3 +162,25 @@ def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
     assert_stands_for_good(bench)
     with pytest.raises(CommandRefused, match="shutting down"):
         bench.drive()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_odometry_stays_a_number_over_lines_that_come_and_go(bench: AnyBench, seed: int) -> None:
+    """While the robot drives, turns and backs, at any moment; and it is told of nowhere else."""
+    random = Random(seed)
+    for _ in range(6):
+        bench.drive_on(random.choice([0.3, -0.2, 0.0]), random.uniform(0.1, 2.0))
+        bench.close()
+        for _ in range(random.randrange(150)):
+            bench.now += TICK_S
+            bench.robot.advance()
+        bench.open()
+        bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(1.0)
+    for estimate in bench.odometry:
+        errors = estimate.covariance
+        assert estimate.pose.finite
+        assert math.isfinite(errors.xx + errors.yy + errors.yaw_yaw)
+        assert estimate.pose.way_m < 5.0
+    refused = [notice for notice in bench.notices if "implausible" in notice]
+    assert not refused

@@ -169,6 +169,7 @@ class LoisOdometry:
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
         """0x20, or what came behind 0x12. It corrects what is predicted and told next."""
         told = self._board.take(group)
+        duration_s, self._odometry_at_s = now - self._odometry_at_s, now
         if self._ticks is None:
             return
         if now > self._heard_at_s + self._unheard_s > -math.inf:
@@ -179,7 +180,6 @@ class LoisOdometry:
             self._is_firmware()
         elif not (group.appended or self.appends or self._seen_unsigned):
             self._motion.signed |= self._lone_ticks >= LONE_TICKS
-        duration_s, self._odometry_at_s = now - self._odometry_at_s, now
         if told is None or not self._blind:
             self._comparison.begin_odometry()
             self._watch_motion(told)
@@ -189,8 +189,8 @@ class LoisOdometry:
         self._heading_compared = True
 
     def predict(self, now: float) -> FusedOdometry | None:
-        """Where it should be now; None before the first ticks."""
-        if self._ticks is None:
+        """Where it should be now; None before the first ticks on a connection."""
+        if self._ticks is None or self._at_s == -math.inf:
             return None
         self._advance(min(now, self._heard_at_s + self._unheard_s))
         return self._fused(predicted=True, stamp_s=max(now, self._at_s))

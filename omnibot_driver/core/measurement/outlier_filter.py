@@ -11,19 +11,21 @@ A knock may move one axis of an accelerometer for one reading, and then it is tr
 impossible only if it has the size of a bit: a changed bit moves a word by its full scale, a half
 of it, a quarter, and by nothing in between.
 
-A refused displacement is as if it had been lost on the line. This module knows readings and the
-robot's limits; it knows no bytes and no clock.
+Of a board's own odometry, only what is not a number is refused. A refused displacement is as if it
+had been lost on the line. This module knows readings and the robot's limits; it knows no bytes and
+no clock.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import hypot, inf
+from math import hypot, inf, isfinite
 from operator import sub
 from typing import Final
 
 from omnibot_driver.core.readings import (
     DisplacementReading,
     ImuReading,
+    OdometryReading,
     PausedReading,
     PoseReading,
     Reading,
@@ -95,6 +97,9 @@ class OutlierFilter:
             return self._admit_displacement(reading, stamp_s)
         if isinstance(reading, PausedReading):
             return [*self.release(), (reading, stamp_s)]
+        if isinstance(reading, OdometryReading) and not _is_finite(reading):
+            self.refused_displacements += 1
+            return []
         if not isinstance(reading, PoseReading):
             return [(reading, stamp_s)]
         if self._held_motion:
@@ -253,6 +258,13 @@ class _Spikes:
         while bit > step + slack:
             bit /= 2
         return abs(step - bit) <= slack
+
+
+def _is_finite(reading: OdometryReading) -> bool:
+    twist, errors = reading.twist, reading.covariance
+    spread = errors.xx + errors.yy + errors.yaw_yaw + sum(reading.twist_variances)
+    speed = twist.vx_mps + twist.vy_mps + twist.yaw_rate_radps
+    return reading.pose.finite and isfinite(spread) and isfinite(speed)
 
 
 def _steps(before: Sequence[float], after: Sequence[float]) -> Iterator[float]:

@@ -11,10 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits, OutlierFilter
+from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.readings import (
     DisplacementReading,
     ImuReading,
+    OdometryReading,
     PausedReading,
     PoseReading,
     Reading,
@@ -256,3 +260,20 @@ def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]
     assert admitted(list(given), through) == [[reading] for reading in given]
+
+
+@pytest.mark.parametrize("broken", ["pose", "twist", "covariance"])
+def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) -> None:
+    """The board that sends it, or the estimate made of it, is broken."""
+    sound = OdometryReading(
+        1.0, Pose(), BodyTwist(0.0, 0.0, 0.0), Covariance(), (0.0, 0.0), Pose(), None
+    )
+    values = {
+        "pose": Pose(math.nan, 0.0, 0.0),
+        "twist": BodyTwist(math.inf, 0.0, 0.0),
+        "covariance": Covariance(xx=math.nan),
+    }
+    through = gate()
+    assert through.admit(sound, 1.0) == [(sound, 1.0)]
+    assert through.admit(replace(sound, **{broken: values[broken]}), 1.0) == []
+    assert through.refused_displacements == 1

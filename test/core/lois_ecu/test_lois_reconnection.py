@@ -1,0 +1,72 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The odometry of a LOIS ECU over lines that come and go, at any moment and in any order."""
+
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.core.lois_ecu import BoardOdometry, SetDuty, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+WAITS_S = st.sampled_from([0.0, 0.001, 0.01, 0.2, 0.7, 5.0])
+GROUPS = st.builds(
+    BoardOdometry,
+    *(st.floats(-5, 5) for _ in range(6)),
+    appended=st.booleans(),
+)
+HAPPENINGS = st.one_of(
+    st.sampled_from(["connect", "restart", "restart of unknown time", "reset", "halt"]),
+    st.builds(SetRpm, st.integers(-50, 50), st.integers(-50, 50)),
+    st.builds(SetDuty, st.integers(-100, 100), st.integers(-100, 100)),
+    st.builds(Ticks, st.just(0), st.integers(0, 60), st.integers(0, 60)),
+    GROUPS,
+)
+
+
+def happen(odometry: LoisOdometry, what: object, now: float) -> None:
+    if isinstance(what, Ticks):
+        odometry.heard_ticks(what, now)
+    elif isinstance(what, BoardOdometry):
+        odometry.heard_odometry(what, now)
+    elif isinstance(what, SetRpm | SetDuty):
+        odometry.wrote(what, now)
+    elif what == "connect":
+        odometry.connect()
+    elif what == "reset":
+        odometry.reset()
+    elif what == "halt":
+        odometry.halted(now)
+    else:
+        odometry.restarted(now, 1.0 if what == "restart" else None)
+
+
+@given(st.lists(st.tuples(WAITS_S, HAPPENINGS), max_size=30))
+def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, object]]) -> None:
+    """Also where a group comes at once after a new connection."""
+    odometry, now = LoisOdometry(LoisEcuSettings()), 1000.0
+    for wait_s, what in events:
+        now += wait_s
+        happen(odometry, what, now)
+        predicted = odometry.predict(now)
+        if predicted is not None:
+            assert predicted.pose.finite
+            assert math.isfinite(predicted.twist.vx_mps + predicted.twist.yaw_rate_radps)
+            assert min(predicted.covariance.xx, predicted.covariance.yy) >= 0.0
+
+
+def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> None:
+    """Ticks come between two groups of 0x20, and the robot starts backward before the second."""
+    odometry = LoisOdometry(LoisEcuSettings())
+    group = BoardOdometry(0.1, 0.1, 0.3, 0.0, 0.0, 0.0, appended=True)
+    odometry.heard_ticks(Ticks(0, 16, 35), 9.1)
+    odometry.heard_odometry(group, 9.2)
+    odometry.connect()
+    odometry.heard_odometry(group, 10.0)
+    odometry.heard_ticks(Ticks(0, 16, 35), 10.1)
+    odometry.wrote(SetRpm(-20, -20), 10.11)
+    odometry.heard_odometry(group, 10.2)
+    (estimate,) = odometry.heard_ticks(Ticks(200, 16, 36), 10.3)
+    assert math.isfinite(estimate.covariance.xx)
