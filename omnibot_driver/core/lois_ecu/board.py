@@ -27,7 +27,7 @@ from omnibot_driver.core.lois_ecu.messages import (
     TerminalLine,
     Ticks,
 )
-from omnibot_driver.core.lois_ecu.misconfiguration import Suspicion
+from omnibot_driver.core.lois_ecu.misconfiguration import OWN_GAINS, Suspicion, own_gains
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import (
     LoisReading,
@@ -60,7 +60,7 @@ class LoisEcu:
         self._decoder = LoisDecoder(sum_required=self._settings.with_sum)
         self._decoder.statistics = self._statistics
         self._points.connect()
-        self._stall = StallWatch(self._settings.track_m)
+        self._stall = StallWatch(self._settings.track_m, self._settings.rim_mps_per_rpm)
 
     @property
     def settings(self) -> LoisEcuSettings:
@@ -174,17 +174,21 @@ class LoisEcu:
     def figures(self) -> BoardFigures:
         """Over all connections."""
         ticks_ms = self._settings.periods_ms.get(Stream.TICKS, PERIOD_ONCE)
+        gains = own_gains(self._settings)
         return BoardFigures(
             rates_hz={"Odometry": 1e3 / ticks_ms} if ticks_ms < PERIOD_ONCE else {},
             faults=self._statistics.faults + self._decoder.group_statistics.damaged_groups,
             discarded_bytes=self._statistics.discarded_bytes,
             saturated=self._points.saturated,
             odom_hz=self._settings.odom_rate_hz,
+            own={"Gains": f"{gains}: the board's own" if gains else "as set"},
         )
 
     @property
     def advice(self) -> str | None:
-        """Advice on settings that contradict the data; None if there is none."""
+        """Advice on settings that contradict the data, or are missing; None if there is none."""
+        if self.mode is Mode.NOMINAL and (gains := own_gains(self._settings)):
+            return OWN_GAINS.format(gains)
         return self._suspicion.advice
 
     @property

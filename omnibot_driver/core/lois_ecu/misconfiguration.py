@@ -1,13 +1,31 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What bytes that are not lines look like: which other board, or which wrong setting.
+"""What is set wrong, or was not set: by bytes that are not lines, and by the settings themselves.
 
-Knows bytes, no time. One sentence at most, and none while lines are understood.
+Knows bytes and settings, no time. One sentence at most. What bytes look like (which other board,
+which wrong setting) is not said while lines are understood.
 """
 
 import re
 from typing import Final
 
+from omnibot_driver.core.lois_ecu.messages import Setting
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+GAINS: Final = (
+    Setting.LEFT_KP,
+    Setting.LEFT_TN,
+    Setting.LEFT_TD,
+    Setting.RIGHT_KP,
+    Setting.RIGHT_TN,
+    Setting.RIGHT_TD,
+)
+"""Of the speed controllers; the board does not tell which it has."""
+OWN_GAINS: Final = (
+    "the speed controllers run with the board's own {}; with the gains of the public firmware a"
+    " wheel swings, and odometry is 0.2 to 0.9 m off in 5 m: run calibrate step, or set these"
+    " parameters"
+)
 LOOK_AT: Final = 600
 """Bytes without one right line. At the slowest, the board sends 70 of them in a second."""
 
@@ -34,6 +52,13 @@ class Suspicion:
         self._seen = (self._seen + data)[-2 * LOOK_AT :]
         if len(self._seen) >= LOOK_AT:
             self.advice = _advice(self._seen)
+
+
+def own_gains(settings: LoisEcuSettings) -> str:
+    """The names of the gains that are the board's own, while they matter; empty if none are."""
+    if settings.drive_mode != "rpm":
+        return ""
+    return ", ".join(gain.name.lower() for gain in GAINS if gain not in settings.written)
 
 
 def _advice(seen: bytes) -> str:

@@ -5,7 +5,9 @@
 In the eyes of the public firmware's controller a wheel that stands keeps its last speed. If that is
 more than a new, slower set-point, the motor gets no power. RPM 0/0 clears it. Of a wheel that is to
 turn backward 0x20 tells: its pose stands while nothing ticks, and while the other wheel ticks its
-velocity shows the same speed of this one again and again. Knows set-points, reports and times.
+velocity shows the same speed of this one again and again. A wheel that rolls steadily does that
+too, but not at a speed far above its set-point: there the controller gives it no power, so it would
+become slower. Knows set-points, reports and times.
 """
 
 import math
@@ -18,6 +20,9 @@ STALLED_S: Final = 2.0
 """Without a sign of motion. With the firmware's own gains a wheel takes half as long to start."""
 LEAST_RPM: Final = 2
 SAME_MPS: Final = 1e-3
+TOO_FAST: Final = 1.2
+TOO_FAST_RPM: Final = 3
+"""A wheel that rolls backward is up to 10 % and one RPM faster than its set-point."""
 AT_LEAST: Final = 4
 """This many groups must agree: on a bad line few arrive."""
 
@@ -25,8 +30,8 @@ AT_LEAST: Final = 4
 class StallWatch:
     """``looks_stalled`` once for each ``STALLED_S`` that a commanded wheel stands."""
 
-    def __init__(self, track_m: float = 0.47) -> None:
-        self._track_m = track_m
+    def __init__(self, track_m: float = 0.47, rim_mps_per_rpm: float = 0.0136) -> None:
+        self._track_m, self._rpm_mps = track_m, rim_mps_per_rpm
         self._targets = [0, 0]
         self._seen_at = [math.inf, math.inf]
         self._quiet = [0, 0]
@@ -79,11 +84,15 @@ class StallWatch:
         return stalled
 
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
-        """Whether the other wheel has another speed than before, and this one the same."""
+        """Whether this wheel has the same speed as before, and the other one another, or this one
+        is far too fast."""
         if told is None or self._told is None:
             return False
         same = [abs(a - b) < SAME_MPS for a, b in zip(told, self._told, strict=True)]
-        return abs(told[wheel]) > SAME_MPS and same[wheel] and not same[1 - wheel]
+        target = abs(self._targets[wheel])
+        most_mps = max(TOO_FAST * target, target + TOO_FAST_RPM) * self._rpm_mps
+        too_fast = abs(told[wheel]) > most_mps - SAME_MPS
+        return abs(told[wheel]) > SAME_MPS and same[wheel] and (too_fast or not same[1 - wheel])
 
     def _note(self, wheel: int, now: float, *, turns: bool) -> None:
         self._quiet[wheel] += 1

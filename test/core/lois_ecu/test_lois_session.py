@@ -297,7 +297,7 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
         bench.run(0.01)
         advice.add(board.advice)
         assert not told(bench, RecordFailed)
-    assert advice == {None}
+    assert all(one is None or "own left_kp" in one for one in advice)
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:

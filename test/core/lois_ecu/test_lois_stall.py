@@ -7,6 +7,8 @@ import math
 from omnibot_driver.core.lois_ecu import BoardOdometry, SetDuty, SetRpm, Ticks
 from omnibot_driver.core.lois_ecu.stall import StallWatch
 
+UNIT_MPS = 0.13 * math.tau / 60
+
 
 def pose(x_m: float) -> BoardOdometry:
     return BoardOdometry(x_m, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
@@ -44,22 +46,39 @@ def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
     assert watched(SetRpm(-10, -10), ticks=(0, 0), ways_m=0.0) == [2.0, 4.0, 6.0]
 
 
-def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
-    """The pose changes, as the firmware integrates the speed that the left wheel had."""
-    watch, unit = StallWatch(0.47), 0.13 * math.tau / 60
+def looks_stalled(rpm: list[tuple[int, int]]) -> bool:
+    """Whether a wheel does whose set-points are -9 and 9 RPM, with these speeds in 0x20."""
+    watch, unit = StallWatch(0.47, UNIT_MPS), UNIT_MPS
     watch.wrote(SetRpm(-9, 9), 0.0)
-    for step in range(1, 12):
-        left, right = -15 * unit, (8 + step % 3) * unit
+    found = False
+    for step, (left_rpm, right_rpm) in enumerate(rpm, 1):
+        left, right = left_rpm * unit, right_rpm * unit
         turning = (right - left) / 0.47
         group = BoardOdometry(
             0.0, 0.0, 0.1 * step, *heading(left, right, 0.1 * step), turning, appended=True
         )
         watch.heard(group, 0.2 * step)
         watch.heard(Ticks(200 * step, 0, 2 * step), 0.2 * step)
-        if watch.looks_stalled(0.2 * step):
-            assert step == 11
-            return
-    raise AssertionError("it does not look stalled")
+        found |= watch.looks_stalled(0.2 * step)
+    return found
+
+
+def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
+    """The pose changes, as the firmware integrates the speed that the left wheel had."""
+    assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
+    assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
+
+
+def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one() -> None:
+    """It gets no power, so if it rolled it would become slower."""
+    assert looks_stalled([(-15, 9)] * 14)
+    assert looks_stalled([(-12, 9)] * 14)
+
+
+def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
+    """Backward they are up to 10 % too fast, and integer speeds repeat."""
+    assert not looks_stalled([(-9, 9)] * 14)
+    assert not looks_stalled([(-10, 9)] * 14)
 
 
 def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:

@@ -1,0 +1,50 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Gains that the user has not set are the board's own: the driver says so, and what follows."""
+
+from dataclasses import replace
+
+from any_board import AnyBench, LoisRobot
+from lois_drives import HOST_GAINS
+
+from omnibot_driver.core.events import Notice
+from omnibot_driver.core.lois_ecu import Setting
+from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+
+def opened(settings: LoisEcuSettings) -> AnyBench:
+    """A session of ten seconds."""
+    bench = AnyBench(LoisEcuBoard(settings), LoisRobot("firmware"))
+    bench.open()
+    bench.run(10.0)
+    return bench
+
+
+def told(bench: AnyBench) -> list[str]:
+    """Notices on gains."""
+    notices = [event.text for event in bench.events if isinstance(event, Notice)]
+    return [sentence for sentence in notices if "board's own" in sentence]
+
+
+def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
+    """In the log, and as long as it is so in the diagnostics."""
+    bench = opened(LoisEcuSettings())
+    (sentence,) = told(bench)
+    assert "0.2 to 0.9 m off in 5 m: run calibrate step" in sentence
+    assert bench.session.board.figures.own["Gains"].startswith(
+        "left_kp, left_tn, left_td, right_kp"
+    )
+
+
+def test_gains_that_are_set_need_no_words() -> None:
+    """One that is missing is named."""
+    assert told(opened(HOST_GAINS)) == []
+    written = {name: one for name, one in HOST_GAINS.written.items() if name != Setting.RIGHT_TN}
+    (sentence,) = told(opened(replace(HOST_GAINS, written=written)))
+    assert "the board's own right_tn;" in sentence
+
+
+def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
+    """Duty is open loop."""
+    assert told(opened(LoisEcuSettings(drive_mode="duty"))) == []
