@@ -5,7 +5,8 @@
 Shares no code with the driver: a misread manual must not cancel out. ``SimulatedLois`` is pure.
 """
 
-from omnibot_driver.simulator.lois_ecu.board import CHANNELS, Obeyed, SimulatedLois
+from omnibot_driver.simulator.lois_ecu.board import CHANNELS, SimulatedLois
+from omnibot_driver.simulator.lois_ecu.commands import Obeyed
 from omnibot_driver.simulator.lois_ecu.options import add_options, from_arguments
 from omnibot_driver.simulator.lois_ecu.settings import (
     DOCUMENTED,

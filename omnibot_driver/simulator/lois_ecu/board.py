@@ -10,18 +10,19 @@ button is reported on press and on release, and both set the set-points to zero.
 """
 
 from collections import deque
-from dataclasses import dataclass
 from random import Random
 
 from omnibot_driver.simulator.common.board import Channel, Packet
 from omnibot_driver.simulator.lois_ecu import wire
+from omnibot_driver.simulator.lois_ecu.commands import Commands, Obeyed, Parts
 from omnibot_driver.simulator.lois_ecu.odometry import FirmwareOdometry, odometry_of
-from omnibot_driver.simulator.lois_ecu.records import HEADINGS, RPM, TORQUE, Recorder
+from omnibot_driver.simulator.lois_ecu.records import Recorder
 from omnibot_driver.simulator.lois_ecu.sayings import Sayings
 from omnibot_driver.simulator.lois_ecu.sensors import Compass, sentence
 from omnibot_driver.simulator.lois_ecu.settings import LoisSettings
 from omnibot_driver.simulator.lois_ecu.terminal import COMPASS, GPS, Terminal
-from omnibot_driver.simulator.lois_ecu.tuning import CORRECTIONS, adjust, wheels_of
+from omnibot_driver.simulator.lois_ecu.timers import Timers
+from omnibot_driver.simulator.lois_ecu.tuning import CORRECTIONS, wheels_of
 from omnibot_driver.simulator.lois_ecu.uart import Uart
 from omnibot_driver.simulator.lois_ecu.vehicle import TrueState, Vehicle
 
@@ -29,25 +30,7 @@ CHANNELS = (Channel(),)
 STEP_S = 0.001
 STEPS_PER_TICK = 10
 BOOT_S = 2.0
-PERIODS_MS = {0x0D: 1200, 0x0E: 1000, 0x0F: 0xFFFF, 0x10: 400, 0x12: 400, 0x20: 400}
-ONCE, NEVER = 0xFFFE, 0xFFFF
 GPS_SENTENCE_S = 1.0
-BALL_S = 6.0
-
-
-@dataclass(frozen=True, slots=True)
-class Obeyed:
-    """A line that the board obeyed in tick number ``tick``."""
-
-    tick: int
-    command: int
-    payload: int
-
-
-@dataclass(slots=True)
-class _Timer:
-    period_ms: int
-    since_ms: int = 0
 
 
 class SimulatedLois:
@@ -65,9 +48,8 @@ class SimulatedLois:
         self.tick = 0
         self.commands: deque[Obeyed] = deque(maxlen=100_000)
         self._uart = Uart(loses=settings.quirks.deaf_while_sending)
-        self.led = self.pressed = False
-        self.balls = 0
-        self._ball_at_s = -BALL_S
+        self.pressed = False
+        self._obedience = Commands(settings.quirks)
         self._steps = 0
         self._random = Random(f"lois {settings.seed}")
         self._vehicle = Vehicle(settings, CORRECTIONS, self._random)
@@ -96,7 +78,7 @@ class SimulatedLois:
         self._uart.boot()
         self._pending: dict[int, tuple[bool, int]] = {}
         self._clock_ms = 0
-        self._timers = {code: _Timer(period) for code, period in PERIODS_MS.items()}
+        self._timers = Timers()
         self._scan: list[int] = []
         self._control_late = False
         self._control_at_s = self._gps_at_s = self.now_s
@@ -105,6 +87,9 @@ class SimulatedLois:
         self._button_pressed = False
         self._button_news: bool | None = None
         self._records = Recorder(quirks, self.wheels)
+        self._parts = Parts(
+            self.wheels, self.odometry, self._timers, self._terminal, self._reader, self._records
+        )
 
     @property
     def now_s(self) -> float:
@@ -130,6 +115,16 @@ class SimulatedLois:
     def terminal_mode(self) -> int:
         """0 or 4: it speaks for itself."""
         return self._terminal.mode
+
+    @property
+    def led(self) -> bool:
+        """Whether it is on."""
+        return self._obedience.led
+
+    @property
+    def balls(self) -> int:
+        """How many have been dropped."""
+        return self._obedience.balls
 
     @property
     def driven(self) -> bool:
@@ -304,59 +299,15 @@ class SimulatedLois:
         self._uart.say(data, deaf=deaf)
 
     def _periodic(self, code: int) -> None:
-        timer = self._timers[code]
-        if timer.period_ms == NEVER:
-            return
-        if timer.period_ms == ONCE:
-            timer.period_ms = NEVER
-        elif self._clock_ms - timer.since_ms > timer.period_ms:
-            timer.since_ms = self._clock_ms
-        else:
-            return
-        self._say(self._sayings.group(code, self._clock_ms, self.now_s))
+        if self._timers.take(code, self._clock_ms):
+            self._say(self._sayings.group(code, self._clock_ms, self.now_s))
 
     def _say_record(self, data: bytes) -> None:
         """Send a complete record, which delays the periodic messages."""
         if data:
             self._say(data)
-            for timer in self._timers.values():
-                timer.since_ms = self._clock_ms
-
-    # Commands
+            self._timers.restart(self._clock_ms)
 
     def _obey(self, command: int, payload: int) -> None:
-        quirks = self.settings.quirks
         self.commands.append(Obeyed(self.tick, command, payload))
-        left, right = self.wheels
-        high, low = payload >> 16, payload & 0xFFFF
-        signed = [word - 0x10000 if word & 0x8000 else word for word in (high, low)]
-        if command == 0x01:
-            left.command_duty(signed[0])
-            right.command_duty(signed[1])
-        elif command == 0x02:
-            left.command_rpm(signed[0])
-            right.command_rpm(signed[1])
-        elif command == 0x03:
-            self.led = low & 0xFF != 0
-        elif command in (RPM, TORQUE, HEADINGS):
-            self._records.start(command, payload)
-        elif command in self._timers:
-            if command != 0x20 or not quirks.odometry_period_is_fixed:
-                self._timers[command] = _Timer(low, self._clock_ms)
-        elif command == 0x11:
-            self._terminal.mode = low & 0xFF
-            self._reader.checks = self._terminal.mode != 4
-            if quirks.terminal_mode_zeroes_correction:
-                left.short_correction = wire.number_of(payload)
-        elif command == 0x18:
-            left.reset()
-            right.reset()
-            if not quirks.reset_clears_ticks_only:
-                self.odometry.clear()
-        elif command == 0x19:
-            still = self.now_s < self._ball_at_s + BALL_S and quirks.one_ball_in_six_seconds
-            if not still:
-                self.balls += 1
-                self._ball_at_s = self.now_s
-        else:
-            adjust(self.wheels, command, wire.number_of(payload), quirks)
+        self._obedience.obey(self._parts, command, payload, self.now_s, self._clock_ms)

@@ -1,0 +1,55 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""When each message of the board is due. Knows the board's clock and numbers of messages."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+PERIODS_MS = {0x0D: 1200, 0x0E: 1000, 0x0F: 0xFFFF, 0x10: 400, 0x12: 400, 0x20: 400}
+ONCE, NEVER = 0xFFFE, 0xFFFF
+
+
+@dataclass(slots=True)
+class Timer:
+    """Of one message."""
+
+    period_ms: int
+    since_ms: int = 0
+
+
+class Timers:
+    """By number of message, in the order in which the board looks at them."""
+
+    def __init__(self) -> None:
+        self._timers = {code: Timer(period) for code, period in PERIODS_MS.items()}
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._timers)
+
+    def __contains__(self, code: int) -> bool:
+        return code in self._timers
+
+    def __getitem__(self, code: int) -> Timer:
+        return self._timers[code]
+
+    def set(self, code: int, period_ms: int, clock_ms: int) -> None:
+        """Begin a new period."""
+        self._timers[code] = Timer(period_ms, clock_ms)
+
+    def restart(self, clock_ms: int) -> None:
+        """Begin every period anew."""
+        for timer in self._timers.values():
+            timer.since_ms = clock_ms
+
+    def take(self, code: int, clock_ms: int) -> bool:
+        """Whether this message is due now; it counts as sent."""
+        timer = self._timers[code]
+        if timer.period_ms == NEVER:
+            return False
+        if timer.period_ms == ONCE:
+            timer.period_ms = NEVER
+            return True
+        if clock_ms - timer.since_ms <= timer.period_ms:
+            return False
+        timer.since_ms = clock_ms
+        return True
