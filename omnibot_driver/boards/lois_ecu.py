@@ -19,7 +19,7 @@ from omnibot_driver.boards.lois_ecu_parameters import (
 )
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.lois_ecu import PERIOD_OFF, TerminalMode
-from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.parameters import table
 from omnibot_driver.transports.serial_port import SerialPort

@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 from omnibot_driver.boards import lois_ecu_records
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.lois_ecu import RecordKind
-from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, RecordReading
 from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.session import Session

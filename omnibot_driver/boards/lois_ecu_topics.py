@@ -17,7 +17,7 @@ from omnibot_driver.boards.lois_ecu_record_topics import Recorder
 from omnibot_driver.core.commands.limits import require_finite
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.lois_ecu import TerminalLine
-from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import (
     FixReading,
     HeadingReading,

@@ -100,7 +100,7 @@ class LoisRobot:
 
 
 def lois_ecu(firmware: str) -> tuple[Board, Any]:
-    from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+    from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
     from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
     return LoisEcuBoard(LoisEcuSettings()), LoisRobot(firmware)

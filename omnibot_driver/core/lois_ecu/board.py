@@ -1,287 +1,270 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU: its lines as readings, orders as its lines.
+"""The LOIS ECU as a board of the driver: what ``LoisConversation`` knows, in the words of the seam.
 
-``wrote`` must be called with whatever goes out: the odometry rests on it, since the board tells
-little of where its wheels turn. ``translation`` explains what the board sends, how settings reach
-it in ``opening``, why set-points look as they do in ``outbound``.
+Its odometry is its own: told ``odom_rate_hz`` times a second, predicted from one group of ticks to
+the next. Displacements tell whether the robot obeys, and stands; where the board is blind they are
+marked as not measured.
 """
 
-from collections.abc import Sequence
+import math
+from typing import Final
 
-from omnibot_driver.core.board import BoardFigures, Mode
-from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.board import Board, BoardFigures, Mode
+from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Order, TurnWheels
+from omnibot_driver.core.commands.set_point_stream import SetpointStream
+from omnibot_driver.core.commands.stop_proof import StopProof
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.lois_ecu import outbound
-from omnibot_driver.core.lois_ecu.decoder import DecoderStatistics, LoisDecoder
-from omnibot_driver.core.lois_ecu.messages import (
-    PERIOD_ONCE,
-    BoardOdometry,
-    Command,
-    DistributeBall,
-    GpsDate,
-    RecordKind,
-    Report,
-    Reset,
-    Stream,
-    TerminalLine,
-    Ticks,
-)
-from omnibot_driver.core.lois_ecu.misconfiguration import OWN_GAINS, Suspicion, own_gains
+from omnibot_driver.core.lois_ecu.conversation import LoisConversation
+from omnibot_driver.core.lois_ecu.messages import EStopButton, RecordKind, SetLed, Ticks
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
-from omnibot_driver.core.lois_ecu.readings import (
-    LoisReading,
-    TerminalLeft,
-)
-from omnibot_driver.core.lois_ecu.set_points import SetPoints
+from omnibot_driver.core.lois_ecu.readings import LoisReading, WheelReading
+from omnibot_driver.core.lois_ecu.reset_proof import ResetProof
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
-from omnibot_driver.core.lois_ecu.stall import StallWatch
-from omnibot_driver.core.lois_ecu.traits import STANDS_AFTER_S, TRAITS
-from omnibot_driver.core.lois_ecu.translation import Translation
-from omnibot_driver.core.lois_ecu.upkeep import Upkeep
+from omnibot_driver.core.lois_ecu.traits import TRAITS
+from omnibot_driver.core.packets import NO_PACKETS, Packets, joined, packed
+from omnibot_driver.core.readings import (
+    DisplacementReading,
+    EStopButtonReading,
+    ExtraReading,
+    OdometryReading,
+    Reading,
+    ResetReading,
+)
+
+RESETS: Final = 8
+RESET_AGAIN_S: Final = 0.9
+"""Longer than a wheel rolls on, and than four groups of ticks take."""
+STEADY_S: Final = 0.3
+"""More than one period of the ticks without a change of the counts."""
+HEARD: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
+"""A first message, which tells nothing of motion yet."""
 
 
-class LoisEcu:
-    """One LOIS ECU on one line. ``settings`` may be replaced at any time."""
+class LoisEcuBoard(Board):
+    """One LOIS ECU. ``settings`` may be replaced at any time."""
 
     traits = TRAITS
 
     def __init__(self, settings: LoisEcuSettings) -> None:
-        self._settings = settings
-        self._translation = Translation(settings)
-        self._suspicion = Suspicion()
-        self._statistics = DecoderStatistics()
-        self._points = SetPoints(settings)
-        self._upkeep = Upkeep(settings, self._points)
-        self.mode = Mode.UNKNOWN
-        self._forget_line()
+        self._ecu = LoisConversation(settings)
+        self._once: Packets = NO_PACKETS
+        self._rolled = Pose()
+        self._connect()
 
-    def _forget_line(self) -> None:
-        self._decoder = LoisDecoder(sum_required=self._settings.with_sum)
-        self._decoder.statistics = self._statistics
-        self._points.connect()
-        self._stall = StallWatch(self._settings.track_m, self._settings.rim_mps_per_rpm)
+    def _connect(self) -> None:
+        self._odometry_at = -math.inf
+        self._reset_proof: ResetProof | None = None
+        self._reset_seen: Ticks | None = None
+        self._resets_left = 0
+        self._reset_at_s = math.inf
+        self._reset_shown = False
 
     @property
     def settings(self) -> LoisEcuSettings:
         """The settings that the wire does not reveal."""
-        return self._settings
+        return self._ecu.settings
 
     @settings.setter
     def settings(self, settings: LoisEcuSettings) -> None:
-        self._settings = self._translation.settings = self._points.settings = settings
-        self._upkeep.configure(settings)
-        self._decoder.sum_required = settings.with_sum
+        if settings != self._ecu.settings:
+            self._ecu.settings = settings
+
+    @property
+    def mode(self) -> Mode:
+        """Nominal while it is heard."""
+        return self._ecu.mode
+
+    @property
+    def figures(self) -> BoardFigures:
+        """Over all connections."""
+        return self._ecu.figures
+
+    @property
+    def advice(self) -> str | None:
+        """Advice on settings that contradict the data; None if there is none."""
+        return self._ecu.advice
+
+    @property
+    def shows_standstill(self) -> bool:
+        """The public firmware counts no ticks of a wheel that was not commanded forward."""
+        return self._ecu.translation.odometry.counting
 
     # Inbound
 
     def connect(self) -> None:
         """The line is new; the settings are written again."""
-        self.mode = Mode.UNKNOWN
-        self._upkeep.connect()
-        self._forget_line()
-        self._translation.connect()
+        self._ecu.connect()
+        self._once = NO_PACKETS
+        self._connect()
 
-    def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
-        """The readings that these bytes complete. Call it without bytes when none came."""
-        self._suspicion.look(data)
-        return self._understood(self._decoder.feed(data, now), now)
+    def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
+        """Decode bytes; returns the readings that they complete."""
+        before = self.mode
+        readings = self._read(self._ecu.receive(data, now))
+        if not readings and self.mode is not before:
+            return [HEARD]
+        return readings
 
-    def flush(self, now: float) -> list[LoisReading]:
-        """The line is closed: what was held is all there will be."""
-        return self._understood(self._decoder.flush(now), now)
-
-    def _understood(self, reports: list[Report], now: float) -> list[LoisReading]:
-        restarts = self._translation.restarts
-        if reports:
-            own = not all(isinstance(report, TerminalLine) for report in reports)
-            if own and self.mode is Mode.UNKNOWN and self._upkeep.opened:
-                self._upkeep.writer.begin(now)  # it may have booted, and lost its settings
-            self.mode = Mode.NOMINAL
-            self._upkeep.heard_at_s = now
-            self._suspicion.understood()
-            if own:
-                self._upkeep.change.protocol_heard(now)
-                self._decoder.terminal = self._upkeep.change.terminal
-        times = self._decoder.times
-        for at, report in zip(times, reports, strict=True):
-            if isinstance(report, Ticks):
-                self._upkeep.writer.ticks_came(at)
-            elif isinstance(report, GpsDate):
-                self._upkeep.writer.date_came()
-            if isinstance(report, Ticks | BoardOdometry):
-                self._stall.heard(report, at)
-        if self._translation.odometry.appends and self._stall.looks_stalled(now):
-            self._points.clear_again()
-        found = self._translation.readings(reports, times, self._decoder.clock_unit, now)
-        if self._translation.restarts != restarts:
-            self._upkeep.writer.begin(now)
-        if self._upkeep.change.left:
-            self._upkeep.change.left = False
-            self._upkeep.writer.begin(now)
-            found.append(TerminalLeft())
-        if self._decoder.in_record:  # right lines, of which there is no report yet
-            self._upkeep.heard_at_s = now
-            self._suspicion.understood()
-        return self._upkeep.request.look(
-            found,
-            self._decoder,
-            "the board has restarted; call again"
-            if self._translation.restarts != restarts
-            else self._upkeep.change.reason,
-            self._settings.ticks_per_revolution,
-        )
+    def flush(self, now: float) -> list[Reading]:
+        """The line is closed."""
+        return self._read(self._ecu.flush(now))
 
     def silence(self) -> None:
-        """Forget the mode, as the board has been silent for too long."""
-        self.mode = Mode.UNKNOWN
+        """Note that the board is silent, and may be lost."""
+        self._ecu.silence()
 
-    @property
-    def translation(self) -> Translation:
-        """The translation, which knows the robot's state."""
-        return self._translation
-
-    @property
-    def held_until(self) -> float:
-        """The time at which ``receive`` without bytes returns held data; infinity without any."""
-        return self._decoder.resolves_at
-
-    def predicted(self, now: float) -> FusedOdometry | None:
-        """The predicted pose of the robot now; None before the first ticks."""
-        return self._translation.odometry.predict(now)
+    def elapse(self, now: float) -> list[Reading]:
+        """Groups that were held until nothing spoke against them, and odometry."""
+        readings: list[Reading] = []
+        if now >= self._ecu.held_until:
+            readings += self.receive(b"", now)
+        if now >= self._odometry_at and self.mode is Mode.NOMINAL:
+            period_s = 1.0 / self.settings.odom_rate_hz
+            self._odometry_at = max(self._odometry_at + period_s, now)
+            if (fused := self._ecu.predicted(now)) is not None:
+                readings.append(self._told(fused))
+        return readings
 
     def reset_odometry(self) -> None:
-        """Begin the odometry frame at the robot's present pose."""
-        self._translation.odometry.reset()
+        """The frame begins where the robot stands."""
+        self._ecu.reset_odometry()
 
-    def stands(self, now: float) -> bool | None:
-        """Whether the robot is seen to stand since it was stopped; None where that is unknown.
+    def _read(self, found: list[LoisReading]) -> list[Reading]:
+        readings: list[Reading] = []
+        for reading in found:
+            match reading:
+                case DisplacementReading():
+                    readings.append(reading)
+                case FusedOdometry():
+                    self._rolled = self._rolled + self._tangent(reading)
+                case WheelReading():
+                    pass
+                case EStopButton(pressed):
+                    readings.append(EStopButtonReading(pressed))
+                case _:
+                    readings.append(ExtraReading(reading))
+        return readings + self._shown_reset()
 
-        The public firmware counts no ticks of a wheel that was commanded backward, or by RPM 0/0.
-        """
-        points, translation = self._points, self._translation
-        if points.stood:
-            return True
-        if now - translation.last_ticks_at_s > STANDS_AFTER_S:
-            return None
-        still_since_s = max(translation.ticked_at_s, points.stopped_at_s)
-        if points.driving or now - still_since_s < STANDS_AFTER_S:
-            return False
-        points.stood = translation.odometry.counting
-        return points.stood or None
+    def _shown_reset(self) -> list[Reading]:
+        proof, known = self._reset_proof, self._ecu.translation
+        if proof is None or known.ticks is None or known.ticks is self._reset_seen:
+            return []
+        self._reset_seen, now = known.ticks, known.last_ticks_at_s
+        if not proof.look(known.ticks, now):
+            return []
+        if not self._reset_shown:
+            self._reset_shown, self._reset_at_s = True, math.inf
+            self._ecu.write_settings(now)
+        return [ResetReading(proof.remark)]
 
-    @property
-    def figures(self) -> BoardFigures:
-        """Over all connections."""
-        ticks_ms = self._settings.periods_ms.get(Stream.TICKS, PERIOD_ONCE)
-        gains = own_gains(self._settings)
-        return BoardFigures(
-            rates_hz={"Odometry": 1e3 / ticks_ms} if ticks_ms < PERIOD_ONCE else {},
-            faults=self._statistics.faults + self._decoder.group_statistics.damaged_groups,
-            discarded_bytes=self._statistics.discarded_bytes,
-            saturated=self._points.saturated,
-            odom_hz=self._settings.odom_rate_hz,
-            own={"Gains": f"{gains}: the board's own" if gains else "as set"},
+    def _tangent(self, fused: FusedOdometry) -> Pose:
+        """The robot's motion since the last estimate, by both wheels."""
+        left_m, right_m = fused.wheel_ways_m
+        sign = -1.0 if self.settings.inverted else 1.0
+        return Pose((left_m + right_m) / 2, 0.0, sign * (right_m - left_m) / self.settings.track_m)
+
+    def _told(self, fused: FusedOdometry) -> OdometryReading:
+        return OdometryReading(
+            fused.stamp_s,
+            fused.pose,
+            fused.twist,
+            fused.covariance,
+            fused.twist_covariance,
+            self._rolled + self._tangent(fused),
+            None if fused.blind else fused.twist,
         )
-
-    @property
-    def advice(self) -> str | None:
-        """Advice on settings that contradict the data, or are missing; None if there is none."""
-        if self.mode is Mode.NOMINAL and (gains := own_gains(self._settings)):
-            return OWN_GAINS.format(gains)
-        return self._suspicion.advice
-
-    @property
-    def configured(self) -> bool:
-        """Whether the settings have gone out; by RPM the wheels do not turn before."""
-        return self._upkeep.opened and self._upkeep.writer.done
-
-    @property
-    def confirmed(self) -> bool:
-        """Whether the board has answered, and shown that it took the period of its ticks."""
-        return self._upkeep.writer.confirmed
 
     # Outbound
 
-    def due(self, now: float) -> bytes:
-        """Settings, modes, and what clears up after a Stop; call it at ``wake_at``."""
-        data = self._upkeep.due(now, stands=bool(self.stands(now)))
-        self._decoder.terminal = self._upkeep.change.terminal
-        return data
-
     @property
     def wake_at(self) -> float:
-        """The time at which ``due`` must be called again."""
-        return min(self._upkeep.wake_at, self._decoder.resolves_at)
+        """The time of the next ``due`` or ``elapse``."""
+        odometry_at = self._odometry_at if self.mode is Mode.NOMINAL else math.inf
+        once_at = -math.inf if self._once else math.inf
+        return min(self._ecu.wake_at, odometry_at, once_at, self._reset_at_s)
 
-    @property
-    def driving(self) -> bool:
-        """Whether the last set-point moves the robot."""
-        return self._points.driving
+    def due(self, now: float) -> Packets:
+        """Settings, and what clears up after a Stop."""
+        once, self._once = self._once, NO_PACKETS
+        data = self._ecu.due(now)
+        if now >= self._reset_at_s:
+            data += joined(self._reset())
+            self._say_reset_again(now)
+        if data:
+            self._ecu.wrote(data, now)
+        return packed(data) + once
 
-    def wrote(self, data: bytes, now: float) -> None:
-        """These bytes went to the board."""
-        said = self._points.wrote(data, now)
-        if said:
-            self._stall.wrote(said[-1], now)
-        for command in said:
-            self._translation.odometry.wrote(command, now)
+    def actuator(self, proof: StopProof) -> SetpointStream:
+        """Set-points, as RPM or as duty."""
+        return SetpointStream(self, proof, heard=self._heard)
 
-    def stop(self) -> bytes:
+    def _heard(self, packets: Packets, now: float) -> None:
+        self._ecu.wrote(joined(packets), now)
+        if self._ecu.driving:
+            self._reset_proof, self._reset_at_s = None, math.inf
+        elif self._resets_left == RESETS:
+            self._say_reset_again(now)
+
+    def encode(self, order: Order) -> Packets:
+        """The lines that say it. Raises CommandRefused for a pose."""
+        match order:
+            case Drive(twist):
+                return packed(self._ecu.velocity(twist))
+            case TurnWheels(rates_radps):
+                return packed(self._ecu.wheels(rates_radps))
+            case EmergencyStop():
+                return self.emergency_stop()
+            case GoTo():
+                raise CommandRefused("cmd_pose refused: this board has no positional control")
+        return self.stop()
+
+    def meaning(self, packets: Packets) -> BodyTwist:
+        """The body velocity that the last set-point in them commands."""
+        return self._ecu.meaning(joined(packets))
+
+    def wake(self) -> Packets:
+        """Stop; any line begins a new one, so what was half said is forgotten."""
+        return self.stop()
+
+    def stop(self) -> Packets:
         """Duty 0/0."""
-        return self._lines(outbound.STOP)
+        return packed(self._ecu.stop())
 
-    def emergency_stop(self) -> bytes:
-        """RPM 0/0, which alternates with Stop; the board has no latch of its own.
+    def emergency_stop(self) -> Packets:
+        """RPM 0/0: the board has no emergency stop command."""
+        return packed(self._ecu.emergency_stop())
 
-        Nothing in a terminal mode, where Stop alone goes out: the public firmware passes all that
-        it hears on to the sensor, and reads no faster than 480 characters a second.
-        """
-        return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
+    def reset(self) -> Packets:
+        """Stop, and the board's counters begin anew; sent again until they show it."""
+        self._resets_left, self._reset_shown = RESETS, False
+        return self._reset()
 
-    def velocity(self, twist: BodyTwist) -> bytes:
-        """Encode a velocity by the drive mode; Stop if it rounds to zero."""
-        return self.wheels(self._points.kinematics.wheel_rates(twist))
+    def _reset(self) -> Packets:
+        known = self._ecu.translation
+        steady = known.last_ticks_at_s - known.ticked_at_s >= STEADY_S
+        if self._reset_proof is None:
+            self._reset_proof = ResetProof(known.ticks, steady=steady)
+        else:
+            self._reset_proof.again(known.ticks, steady=steady)
+        return packed(self._ecu.reset())
 
-    def wheels(self, rates_radps: Sequence[float]) -> bytes:
-        """Left and right in rad/s; Stop when both round to nothing. Raises CommandRefused."""
-        if self._upkeep.change.reason and any(rates_radps):
-            raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")
-        return self._lines(*self._points.wheels(rates_radps))
+    def _say_reset_again(self, now: float) -> None:
+        self._resets_left -= 1
+        self._reset_at_s = now + RESET_AGAIN_S if self._resets_left else math.inf
 
-    def duty(self, percents: Sequence[float]) -> bytes:
-        """Left and right in percent, open loop. Refused in RPM mode."""
-        return self._lines(self._points.duty(percents))
+    # What only this board has
 
-    def meaning(self, data: bytes) -> BodyTwist:
-        """The body velocity that the last set-point in these bytes commands."""
-        return self._points.meaning(data)
-
-    # Other requests
-
-    def reset(self) -> bytes:
-        """Stop, then the board's reset; the counters begin anew."""
-        self._decoder.forget_counters()
-        self._translation.connect()
-        return self._lines(outbound.STOP, Reset())
-
-    def write_settings(self, now: float) -> None:
-        """All of them again: by the manual a reset is one of controllers and interfaces too."""
-        self._upkeep.writer.begin(now)
-
-    def say(self, command: Command, now: float) -> None:
-        """Something that may be repeated, until it has surely arrived."""
-        self._upkeep.writer.write(command, now)
-
-    def distribute_ball(self) -> bytes:
-        """Once; do not repeat it."""
-        return self._lines(DistributeBall())
+    def set_led(self, on: bool, now: float) -> None:
+        """Said until it has surely arrived."""
+        self._ecu.say(SetLed(on), now)
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Begin to record. Raises RequestRefused where it could not complete."""
-        if self._upkeep.change.reason:
-            raise RequestRefused(f"record refused: {self._upkeep.change.reason}")
-        self._upkeep.request.begin(kind, samples, self._decoder)
+        """Begin to record; a RecordReading or a RecordFailed comes of it. Raises RequestRefused."""
+        self._ecu.record(kind, samples)
 
-    def _lines(self, *commands: Command) -> bytes:
-        return outbound.lines(*commands, with_sum=self._settings.with_sum)
+    def distribute_ball(self) -> None:
+        """Said once, as each is another ball; a lost line is not noticed."""
+        self._once += packed(self._ecu.distribute_ball())

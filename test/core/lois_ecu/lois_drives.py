@@ -9,7 +9,7 @@ from random import Random
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu import Setting
-from omnibot_driver.core.lois_ecu.board import LoisEcu
+from omnibot_driver.core.lois_ecu.conversation import LoisConversation
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import LoisReading
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
@@ -103,7 +103,7 @@ class Drive:
     way_m: float
     turned_rad: float
     last: FusedOdometry
-    driver: LoisEcu
+    driver: LoisConversation
 
     @property
     def error(self) -> Pose:
@@ -165,7 +165,7 @@ class Rig:
     ) -> None:
         self._loss, self._random = loss, Random(f"line {settings.seed}")
         self.board = SimulatedLois(settings)
-        self.driver = LoisEcu(HOST_GAINS if ours is None else ours)
+        self.driver = LoisConversation(HOST_GAINS if ours is None else ours)
         self.estimates: list[tuple[FusedOdometry, Pose]] = []
         self.readings: list[LoisReading] = []
         self.way_m = self.turned_rad = 0.0

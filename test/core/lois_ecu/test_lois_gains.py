@@ -9,7 +9,7 @@ from lois_drives import HOST_GAINS
 
 from omnibot_driver.core.events import Notice
 from omnibot_driver.core.lois_ecu import Setting
-from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 

@@ -22,7 +22,7 @@ from omnibot_driver.core.lois_ecu import (
     encode_command,
     encode_report,
 )
-from omnibot_driver.core.lois_ecu.board import LoisEcu
+from omnibot_driver.core.lois_ecu.conversation import LoisConversation
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import Firmware, LoisSettings
@@ -260,7 +260,7 @@ def test_a_board_that_restarts_ends_the_motion_in_odom(
 def test_other_wheels_count_from_the_next_group_on() -> None:
     """The way until then stays."""
     ours = LoisEcuSettings()
-    ecu = LoisEcu(ours)
+    ecu = LoisConversation(ours)
     ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)
     for step in range(3):
         ecu.receive(encode_report(Ticks(400 * step, 10 * step, 10 * step + 1)), 0.4 * step)

@@ -8,7 +8,7 @@ import pytest
 from any_board import MAKERS, TICK_S, AnyBench
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 OMNIBOT = b"\xff\xfa" + bytes(range(12)) + b"\x55\xff\xfb" + bytes(range(8))

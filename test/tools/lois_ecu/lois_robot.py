@@ -15,7 +15,7 @@ from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.events import Extra
 from omnibot_driver.core.lois_ecu import RecordKind
-from omnibot_driver.core.lois_ecu.driven_board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordReading
 from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.settings import SessionSettings

@@ -1,0 +1,287 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The LOIS ECU: its lines as readings, orders as its lines.
+
+``wrote`` must be called with whatever goes out: the odometry rests on it, since the board tells
+little of where its wheels turn. ``translation`` explains what the board sends, how settings reach
+it in ``opening``, why set-points look as they do in ``outbound``.
+"""
+
+from collections.abc import Sequence
+
+from omnibot_driver.core.board import BoardFigures, Mode
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.lois_ecu import outbound
+from omnibot_driver.core.lois_ecu.decoder import DecoderStatistics, LoisDecoder
+from omnibot_driver.core.lois_ecu.messages import (
+    PERIOD_ONCE,
+    BoardOdometry,
+    Command,
+    DistributeBall,
+    GpsDate,
+    RecordKind,
+    Report,
+    Reset,
+    Stream,
+    TerminalLine,
+    Ticks,
+)
+from omnibot_driver.core.lois_ecu.misconfiguration import OWN_GAINS, Suspicion, own_gains
+from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
+from omnibot_driver.core.lois_ecu.readings import (
+    LoisReading,
+    TerminalLeft,
+)
+from omnibot_driver.core.lois_ecu.set_points import SetPoints
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.stall import StallWatch
+from omnibot_driver.core.lois_ecu.traits import STANDS_AFTER_S, TRAITS
+from omnibot_driver.core.lois_ecu.translation import Translation
+from omnibot_driver.core.lois_ecu.upkeep import Upkeep
+
+
+class LoisConversation:
+    """One LOIS ECU on one line. ``settings`` may be replaced at any time."""
+
+    traits = TRAITS
+
+    def __init__(self, settings: LoisEcuSettings) -> None:
+        self._settings = settings
+        self._translation = Translation(settings)
+        self._suspicion = Suspicion()
+        self._statistics = DecoderStatistics()
+        self._points = SetPoints(settings)
+        self._upkeep = Upkeep(settings, self._points)
+        self.mode = Mode.UNKNOWN
+        self._forget_line()
+
+    def _forget_line(self) -> None:
+        self._decoder = LoisDecoder(sum_required=self._settings.with_sum)
+        self._decoder.statistics = self._statistics
+        self._points.connect()
+        self._stall = StallWatch(self._settings.track_m, self._settings.rim_mps_per_rpm)
+
+    @property
+    def settings(self) -> LoisEcuSettings:
+        """The settings that the wire does not reveal."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: LoisEcuSettings) -> None:
+        self._settings = self._translation.settings = self._points.settings = settings
+        self._upkeep.configure(settings)
+        self._decoder.sum_required = settings.with_sum
+
+    # Inbound
+
+    def connect(self) -> None:
+        """The line is new; the settings are written again."""
+        self.mode = Mode.UNKNOWN
+        self._upkeep.connect()
+        self._forget_line()
+        self._translation.connect()
+
+    def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
+        """The readings that these bytes complete. Call it without bytes when none came."""
+        self._suspicion.look(data)
+        return self._understood(self._decoder.feed(data, now), now)
+
+    def flush(self, now: float) -> list[LoisReading]:
+        """The line is closed: what was held is all there will be."""
+        return self._understood(self._decoder.flush(now), now)
+
+    def _understood(self, reports: list[Report], now: float) -> list[LoisReading]:
+        restarts = self._translation.restarts
+        if reports:
+            own = not all(isinstance(report, TerminalLine) for report in reports)
+            if own and self.mode is Mode.UNKNOWN and self._upkeep.opened:
+                self._upkeep.writer.begin(now)  # it may have booted, and lost its settings
+            self.mode = Mode.NOMINAL
+            self._upkeep.heard_at_s = now
+            self._suspicion.understood()
+            if own:
+                self._upkeep.change.protocol_heard(now)
+                self._decoder.terminal = self._upkeep.change.terminal
+        times = self._decoder.times
+        for at, report in zip(times, reports, strict=True):
+            if isinstance(report, Ticks):
+                self._upkeep.writer.ticks_came(at)
+            elif isinstance(report, GpsDate):
+                self._upkeep.writer.date_came()
+            if isinstance(report, Ticks | BoardOdometry):
+                self._stall.heard(report, at)
+        if self._translation.odometry.appends and self._stall.looks_stalled(now):
+            self._points.clear_again()
+        found = self._translation.readings(reports, times, self._decoder.clock_unit, now)
+        if self._translation.restarts != restarts:
+            self._upkeep.writer.begin(now)
+        if self._upkeep.change.left:
+            self._upkeep.change.left = False
+            self._upkeep.writer.begin(now)
+            found.append(TerminalLeft())
+        if self._decoder.in_record:  # right lines, of which there is no report yet
+            self._upkeep.heard_at_s = now
+            self._suspicion.understood()
+        return self._upkeep.request.look(
+            found,
+            self._decoder,
+            "the board has restarted; call again"
+            if self._translation.restarts != restarts
+            else self._upkeep.change.reason,
+            self._settings.ticks_per_revolution,
+        )
+
+    def silence(self) -> None:
+        """Forget the mode, as the board has been silent for too long."""
+        self.mode = Mode.UNKNOWN
+
+    @property
+    def translation(self) -> Translation:
+        """The translation, which knows the robot's state."""
+        return self._translation
+
+    @property
+    def held_until(self) -> float:
+        """The time at which ``receive`` without bytes returns held data; infinity without any."""
+        return self._decoder.resolves_at
+
+    def predicted(self, now: float) -> FusedOdometry | None:
+        """The predicted pose of the robot now; None before the first ticks."""
+        return self._translation.odometry.predict(now)
+
+    def reset_odometry(self) -> None:
+        """Begin the odometry frame at the robot's present pose."""
+        self._translation.odometry.reset()
+
+    def stands(self, now: float) -> bool | None:
+        """Whether the robot is seen to stand since it was stopped; None where that is unknown.
+
+        The public firmware counts no ticks of a wheel that was commanded backward, or by RPM 0/0.
+        """
+        points, translation = self._points, self._translation
+        if points.stood:
+            return True
+        if now - translation.last_ticks_at_s > STANDS_AFTER_S:
+            return None
+        still_since_s = max(translation.ticked_at_s, points.stopped_at_s)
+        if points.driving or now - still_since_s < STANDS_AFTER_S:
+            return False
+        points.stood = translation.odometry.counting
+        return points.stood or None
+
+    @property
+    def figures(self) -> BoardFigures:
+        """Over all connections."""
+        ticks_ms = self._settings.periods_ms.get(Stream.TICKS, PERIOD_ONCE)
+        gains = own_gains(self._settings)
+        return BoardFigures(
+            rates_hz={"Odometry": 1e3 / ticks_ms} if ticks_ms < PERIOD_ONCE else {},
+            faults=self._statistics.faults + self._decoder.group_statistics.damaged_groups,
+            discarded_bytes=self._statistics.discarded_bytes,
+            saturated=self._points.saturated,
+            odom_hz=self._settings.odom_rate_hz,
+            own={"Gains": f"{gains}: the board's own" if gains else "as set"},
+        )
+
+    @property
+    def advice(self) -> str | None:
+        """Advice on settings that contradict the data, or are missing; None if there is none."""
+        if self.mode is Mode.NOMINAL and (gains := own_gains(self._settings)):
+            return OWN_GAINS.format(gains)
+        return self._suspicion.advice
+
+    @property
+    def configured(self) -> bool:
+        """Whether the settings have gone out; by RPM the wheels do not turn before."""
+        return self._upkeep.opened and self._upkeep.writer.done
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the board has answered, and shown that it took the period of its ticks."""
+        return self._upkeep.writer.confirmed
+
+    # Outbound
+
+    def due(self, now: float) -> bytes:
+        """Settings, modes, and what clears up after a Stop; call it at ``wake_at``."""
+        data = self._upkeep.due(now, stands=bool(self.stands(now)))
+        self._decoder.terminal = self._upkeep.change.terminal
+        return data
+
+    @property
+    def wake_at(self) -> float:
+        """The time at which ``due`` must be called again."""
+        return min(self._upkeep.wake_at, self._decoder.resolves_at)
+
+    @property
+    def driving(self) -> bool:
+        """Whether the last set-point moves the robot."""
+        return self._points.driving
+
+    def wrote(self, data: bytes, now: float) -> None:
+        """These bytes went to the board."""
+        said = self._points.wrote(data, now)
+        if said:
+            self._stall.wrote(said[-1], now)
+        for command in said:
+            self._translation.odometry.wrote(command, now)
+
+    def stop(self) -> bytes:
+        """Duty 0/0."""
+        return self._lines(outbound.STOP)
+
+    def emergency_stop(self) -> bytes:
+        """RPM 0/0, which alternates with Stop; the board has no latch of its own.
+
+        Nothing in a terminal mode, where Stop alone goes out: the public firmware passes all that
+        it hears on to the sensor, and reads no faster than 480 characters a second.
+        """
+        return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
+
+    def velocity(self, twist: BodyTwist) -> bytes:
+        """Encode a velocity by the drive mode; Stop if it rounds to zero."""
+        return self.wheels(self._points.kinematics.wheel_rates(twist))
+
+    def wheels(self, rates_radps: Sequence[float]) -> bytes:
+        """Left and right in rad/s; Stop when both round to nothing. Raises CommandRefused."""
+        if self._upkeep.change.reason and any(rates_radps):
+            raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")
+        return self._lines(*self._points.wheels(rates_radps))
+
+    def duty(self, percents: Sequence[float]) -> bytes:
+        """Left and right in percent, open loop. Refused in RPM mode."""
+        return self._lines(self._points.duty(percents))
+
+    def meaning(self, data: bytes) -> BodyTwist:
+        """The body velocity that the last set-point in these bytes commands."""
+        return self._points.meaning(data)
+
+    # Other requests
+
+    def reset(self) -> bytes:
+        """Stop, then the board's reset; the counters begin anew."""
+        self._decoder.forget_counters()
+        self._translation.connect()
+        return self._lines(outbound.STOP, Reset())
+
+    def write_settings(self, now: float) -> None:
+        """All of them again: by the manual a reset is one of controllers and interfaces too."""
+        self._upkeep.writer.begin(now)
+
+    def say(self, command: Command, now: float) -> None:
+        """Something that may be repeated, until it has surely arrived."""
+        self._upkeep.writer.write(command, now)
+
+    def distribute_ball(self) -> bytes:
+        """Once; do not repeat it."""
+        return self._lines(DistributeBall())
+
+    def record(self, kind: RecordKind, samples: int) -> None:
+        """Begin to record. Raises RequestRefused where it could not complete."""
+        if self._upkeep.change.reason:
+            raise RequestRefused(f"record refused: {self._upkeep.change.reason}")
+        self._upkeep.request.begin(kind, samples, self._decoder)
+
+    def _lines(self, *commands: Command) -> bytes:
+        return outbound.lines(*commands, with_sum=self._settings.with_sum)

@@ -1,0 +1,68 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A whole session with a simulated LOIS ECU, in simulated time."""
+
+from typing import Any
+
+import pytest
+from any_board import AnyBench, LoisRobot
+
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.policy import CommandSettings
+from omnibot_driver.core.events import Extra
+from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.requests import Request, RequestDone
+from omnibot_driver.core.settings import SessionSettings
+from omnibot_driver.simulator.lois_ecu import SimulatedLois
+
+SETTINGS = SessionSettings(
+    limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
+)
+FIRMWARE = pytest.mark.parametrize("firmware", ["documented", "firmware"])
+
+
+class Bench(AnyBench):
+    """A driver with these settings, and a board with this firmware."""
+
+    def __init__(self, firmware: str, settings: LoisEcuSettings | None = None) -> None:
+        self.lois = LoisRobot(firmware)
+        super().__init__(LoisEcuBoard(settings or LoisEcuSettings()), self.lois)
+        self.open()
+        self.run_until(lambda: self.session.state == "nominal")
+        self.run(1.5)
+
+    @property
+    def board(self) -> SimulatedLois:
+        return self.lois.board
+
+    def reset(self) -> RequestDone:
+        self.session.request(Request.RESET, "token", self.now)
+        self.settle()
+        before = len(self.answers)
+        self.run_until(lambda: len(self.answers) > before)
+        return self.answers[-1]
+
+    @property
+    def answers(self) -> list[RequestDone]:
+        return [event for event in self.events if isinstance(event, RequestDone)]
+
+    def presses(self, pressed: bool) -> None:
+        self.board.press(pressed)
+        self.run(0.5)
+
+
+def told(bench: Bench, kind: type) -> list[Any]:
+    """Values of this kind that were passed on."""
+    return [
+        event.value
+        for event in bench.events
+        if isinstance(event, Extra) and isinstance(event.value, kind)
+    ]
+
+
+def configure(bench: Bench, settings: LoisEcuSettings) -> None:
+    """As the node does it when parameters change."""
+    bench.session.configure(SETTINGS, bench.now, board=settings)
+    bench.settle()

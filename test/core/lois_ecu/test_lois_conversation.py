@@ -1,0 +1,228 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The LOIS ECU as the rest of the driver sees it, against the simulated board."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from lois_drives import HOST_GAINS, Rig, nominal
+
+from omnibot_driver.core.board import Mode
+from omnibot_driver.core.lois_ecu import (
+    EStopButton,
+    RecordKind,
+    Setting,
+    TerminalMode,
+    encode_command,
+    encode_report,
+)
+from omnibot_driver.core.lois_ecu.conversation import LoisConversation
+from omnibot_driver.core.lois_ecu.messages import Heading, SetTerminalMode
+from omnibot_driver.core.lois_ecu.readings import (
+    RecordFailed,
+    RecordReading,
+)
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.readings import DisplacementReading
+from omnibot_driver.simulator.lois_ecu import FIRMWARE, Firmware, LoisSettings
+
+BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
+RPM = math.tau / 60
+
+
+@BOTH
+def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
+    """The low-pass, the periods and what the user set arrive in spite of what the board misses."""
+    rig = Rig(nominal(firmware), LoisEcuSettings(written={Setting.LEFT_KP: 0.5}))
+    assert rig.driver.mode is Mode.UNKNOWN
+    rig.run(5.0)
+    assert rig.driver.mode is Mode.NOMINAL
+    assert rig.driver.configured
+    assert rig.driver.confirmed
+    assert rig.board.wheels[0].controller.gains.kp == pytest.approx(0.5)
+    rig.order(20, 20, 4.0)
+    assert rig.board.truth.speed_mps > 0.2
+    assert any(isinstance(reading, DisplacementReading) for reading in rig.readings)
+
+
+@pytest.mark.slow
+def test_a_restarted_board_is_configured_again() -> None:
+    """Else its wheels would not turn."""
+    rig = Rig(nominal("firmware"))
+    rig.run(5.0)
+    rig.order(20, 20, 4.0)
+    rig.order(0, 0, 2.0)
+    rig.board.reboot()
+    for _ in range(18):
+        rig.run(0.1)
+    rig.driver.silence()
+    rig.run(4.0)
+    assert rig.driver.confirmed
+    rig.order(20, 20, 4.0)
+    assert rig.board.truth.speed_mps > 0.2
+    place, true = rig.estimates[-1][0].pose, rig.estimates[-1][1]
+    assert place.way_to(true).way_m < 0.15
+
+
+def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
+    """Ticks that begin anew."""
+    rig = Rig(LoisSettings(quirks=replace(FIRMWARE, slow_boot=False)))
+    rig.run(5.0)
+    rig.order(20, 20, 6.0)
+    rig.order(0, 0, 2.0)
+    rig.board.reboot()
+    rig.run(3.0)
+    assert rig.driver._translation.restarts == 1
+    assert rig.board.wheels[0].controller.gains.low_pass == pytest.approx(0.1)
+
+
+@pytest.mark.slow
+@BOTH
+@pytest.mark.parametrize(
+    "before", [TerminalMode.GPS, TerminalMode.HOST_WITHOUT_SUM, TerminalMode.VIRTUAL_COM]
+)
+def test_a_board_that_was_left_in_another_mode_is_fetched_back(
+    firmware: Firmware, before: TerminalMode
+) -> None:
+    """Whatever a program before us has set; also with the checksum of what we say turned off."""
+    rig = Rig(nominal(firmware))
+    rig.run(2.1)
+    for _ in range(6):
+        rig.board.receive(encode_command(SetTerminalMode(before)))
+        rig.board.step()
+    rig.driver = LoisConversation(LoisEcuSettings())
+    for _ in range(120):
+        rig.run(0.1)
+    assert rig.driver.mode is Mode.NOMINAL
+    assert rig.driver.confirmed
+    assert rig.board.wheels[0].short_correction == pytest.approx(1.0761719)
+
+
+def test_a_board_without_checksum_is_driven_without() -> None:
+    """0x11 value 4, and the left short correction that it overwrites."""
+    rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
+    for _ in range(140):
+        rig.run(0.1)
+    assert rig.driver.confirmed
+    assert rig.board.terminal_mode == 4
+    assert rig.board.wheels[0].short_correction == pytest.approx(1.0761719)
+    rig.order(20, 20, 4.0)
+    assert rig.board.truth.speed_mps > 0.2
+
+
+@BOTH
+def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
+    """After driving forward; the public firmware tells nothing after driving backward."""
+    rig = Rig(nominal(firmware))
+    rig.run(5.0)
+    rig.order(20, 20, 4.0)
+    assert rig.driver.stands(rig.now) is False
+    rig.order(0, 0, 0.1)
+    assert rig.driver.stands(rig.now) is False
+    while not rig.driver.stands(rig.now):
+        rig.order(0, 0, 0.05)
+        assert rig.now < 11.0
+    assert rig.board.standing
+    rig.run(5.0)
+    assert rig.driver.stands(rig.now)
+    rig.order(-20, -20, 4.0)
+    rig.order(0, 0, 0.75)
+    rig.run(0.7)
+    assert rig.driver.stands(rig.now) is (None if firmware == "firmware" else True)
+
+
+@pytest.mark.slow
+@BOTH
+def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
+    """Also slower, in the same direction, at once: the firmware remembers the old speed."""
+    rig = Rig(nominal(firmware))
+    rig.run(5.0)
+    for _ in range(3):
+        for speed in (-30, -8, 30, 8):
+            before_m = rig.way_m
+            rig.order(speed, speed, 3.0)
+            assert rig.way_m - before_m > 0.1, speed
+            rig.order(0, 0, 0.7)
+
+
+def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
+    """Why RPM 0/0 stands before the first set-points; without feed-forward."""
+    rig = Rig(nominal("firmware"), LoisEcuSettings())
+    rig.run(5.0)
+    rig.order(-30, -30, 4.0)
+    rig.order(0, 0, 0.7)
+    for _ in range(60):
+        rig.board.receive(b":02fff8fff838\n")
+        for _ in range(5):
+            rig.board.step()
+    assert rig.board.motors[0].rpm == 0.0
+
+
+@pytest.mark.slow
+@BOTH
+def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
+    """Latching is the driver's affair."""
+    rig = Rig(nominal(firmware))
+    rig.run(5.0)
+    rig.order(20, 20, 3.0)
+    rig.board.press(True)
+    rig.run(1.0)
+    assert EStopButton(True) in rig.readings
+    assert rig.board.standing
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", RecordKind)
+@BOTH
+def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
+    """While the wheels turn; its unit is that of the firmware, known by the board's clock."""
+    rig = Rig(nominal(firmware))
+    rig.run(5.0)
+    rig.order(20, 20, 3.0)
+    rig.driver.record(kind, 21)
+    rig.run(7.0)
+    (reading,) = [reading for reading in rig.readings if isinstance(reading, RecordReading)]
+    assert reading.record.kind is kind
+    assert len(reading.record.left) == 21
+    assert len(reading.record.right) == (0 if kind is RecordKind.HEADING else 21)
+    assert reading.count_s == (1e-4 if firmware == "firmware" else 1e-7)
+    assert not [reading for reading in rig.readings if isinstance(reading, RecordFailed)]
+
+
+def test_a_record_that_lost_a_line_is_given_up() -> None:
+    """It is dropped whole."""
+    rig = Rig(nominal("firmware"))
+    rig.run(5.0)
+    rig.driver.record(RecordKind.TORQUE, 100)
+    rig.run(9.0)
+    while not rig.driver._decoder.in_record:
+        rig.run(0.01)
+    rig.board.step()
+    rig.run(2.0)
+    assert [reading for reading in rig.readings if isinstance(reading, RecordFailed)]
+    assert not [reading for reading in rig.readings if isinstance(reading, RecordReading)]
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"\xff\xfa" + bytes(12), "OmniBot"),
+        (b"$GPRMC,120000,A,4807.0,N,01131.0,E*00\r\n", "NMEA"),
+        (bytes(range(128, 256)), "baudrate"),
+        (b":1000000005\n", "without checksum"),
+        (b":1000000005ff\n", "wrong checksums"),
+        (b":100005\n", "lines of 8 characters"),
+        (b"hello world\n", "line of this board"),
+    ],
+)
+def test_what_is_no_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> None:
+    """The message is withdrawn when it is one after all."""
+    ecu = LoisConversation(HOST_GAINS)
+    assert ecu.receive(data * 100, 0.0) == []
+    assert ecu.advice is not None
+    assert words in ecu.advice
+    assert ecu.mode is Mode.UNKNOWN
+    ecu.receive(b"\n" + encode_report(Heading(5)), 1.0)
+    assert ecu.advice is None
+    assert ecu.mode is Mode.NOMINAL

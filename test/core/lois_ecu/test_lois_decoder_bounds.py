@@ -1,0 +1,135 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The LOIS decoder on any bytes, and at byte losses.
+
+Set ``LOIS_SEEDS`` to measure longer: ``LOIS_SEEDS=100 pytest -s -k byte_loss`` prints the figures.
+"""
+
+import os
+from collections import Counter
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lois_streams import decoded, lossy, pieces, reports
+
+from omnibot_driver.core.lois_ecu import (
+    BoardOdometry,
+    LoisDecoder,
+    Record,
+    RecordKind,
+    encode_report,
+)
+from omnibot_driver.core.lois_ecu.messages import Report
+
+SEEDS = int(os.environ.get("LOIS_SEEDS", "2"))
+payloads = st.one_of(st.sampled_from([0, 0xFFFFFFFF, 0x016A016A]), st.integers(0, 2**32 - 1))
+codes = st.sampled_from([0x04, 0x05, 0x0C, 0x0D, 0x10, 0x12, 0x17, 0x20])
+
+
+@given(st.lists(st.binary(max_size=600), max_size=8), st.booleans())
+def test_any_bytes_are_taken_in_any_chunks_with_equal_results(
+    chunks: list[bytes], terminal: bool
+) -> None:
+    """Nothing raises, and little is held."""
+    data = b"".join(chunks)
+    results = []
+    for cut in (chunks, [data], [bytes([byte]) for byte in data]):
+        decoder = LoisDecoder(sum_required=False)
+        decoder.terminal = terminal
+        found: list[Report] = []
+        for chunk in cut:
+            found += decoder.feed(chunk, 0.0)
+            assert len(decoder._held) < 256
+        found += decoder.flush(0.0)
+        results.append((found, decoder.statistics, decoder.group_statistics))
+    assert results[0] == results[1] == results[2]
+
+
+@given(
+    st.lists(st.tuples(codes, payloads, st.integers(0, 13), st.integers(0, 9)), max_size=60),
+    st.sampled_from(RecordKind),
+)
+def test_any_lines_are_taken_in_any_chunks_with_equal_results(
+    lines: list[tuple[int, int, int, int]], kind: RecordKind
+) -> None:
+    """Right ones and cut ones in any order."""
+    data = b""
+    for code, payload, at, harm in lines:
+        line = b":%02x%08x" % (code, payload)
+        total = 0
+        for character in line:
+            total ^= character
+        line += b"%02x\n" % total
+        data += line if harm else line[:at] + line[at + 1 :]
+    results = []
+    for cut in ([data], [bytes([byte]) for byte in data]):
+        decoder = LoisDecoder()
+        decoder.expect_record(kind, 4, 3)
+        found: list[Report] = []
+        for chunk in cut:
+            found += decoder.feed(chunk, 0.0)
+        found += decoder.flush(0.0)
+        results.append((list(map(repr, found)), decoder.statistics, decoder.group_statistics))
+    assert results[0] == results[1]
+
+
+@pytest.mark.parametrize("code", [b"17", b"04"])
+def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
+    """0/0 is both; the manual's number, and the one under which the firmware answers."""
+    decoder = LoisDecoder()
+    decoder.expect_record(RecordKind.TORQUE, 3, 3)
+    zero, some = b":" + code + b"00000000", b":" + code + b"00010002"
+    found: list[Report] = []
+    for text in (zero, some, zero, zero):
+        total = 0
+        for character in text:
+            total ^= character
+        found += decoder.feed(text + b"%02x\n" % total, 0.0)
+    assert found == [Record(RecordKind.TORQUE, (0, 1, 0), (0, 2, 0))]
+
+
+def test_a_record_without_end_is_not_kept() -> None:
+    """No more than was asked for."""
+    decoder = LoisDecoder()
+    decoder.expect_record(RecordKind.RPM, 10, 10)
+    decoder.feed(b":04000a000b3d\n" * 5000, 0.0)
+    assert len(decoder._assembler._record._payloads) == 10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("chance", [1e-3, 1e-2])
+@pytest.mark.parametrize("sum_required", [True, False], ids=["with sum", "sum off"])
+@pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
+def test_no_value_is_wrong_at_byte_loss(chance: float, sum_required: bool, firmware: bool) -> None:
+    """Of ten minutes each seed; what comes out at 1e-2 is bounded from below by kind."""
+    sent, came, wrong = Counter[str](), Counter[str](), Counter[str]()
+    for seed in range(SEEDS):
+        said = reports(600.0, firmware=firmware)
+        stream = pieces(said)
+        if not sum_required:
+            stream = [
+                (at, b"".join(line[:11] + b"\n" for line in data.splitlines()))
+                for at, data in stream
+            ]
+        true = Counter(encode_report(report) for _, report in said)
+        found, _ = decoded(lossy(stream, chance, Random(seed)), sum_required=sum_required)
+        for _, report in said:
+            sent[_kind(report)] += 1
+        for report in found:
+            came[_kind(report)] += 1
+            wrong[_kind(report)] += encode_report(report) not in true
+    print(f"\nloss {chance:g}, sum {sum_required}, firmware {firmware}: wrong {dict(wrong)}")
+    print({kind: f"{came[kind] / sent[kind]:.3f} of {sent[kind]}" for kind in sent})
+    assert not any(wrong.values())
+    for kind in sent:
+        characters = {"BoardOdometry": 98, "appended": 98, "Ticks": 56, "GpsPosition": 42}
+        expected = (1 - chance) ** characters.get(kind, 14)
+        assert came[kind] > 0.85 * expected * sent[kind]
+
+
+def _kind(report: Report) -> str:
+    if isinstance(report, BoardOdometry) and report.appended:
+        return "appended"
+    return type(report).__name__

@@ -1,0 +1,128 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Set-points of a LOIS ECU by hand: what a motion is in its lines."""
+
+import math
+
+import pytest
+
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.lois_ecu import RecordKind, SetDuty, encode_command
+from omnibot_driver.core.lois_ecu.conversation import LoisConversation
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+STOP = b":01000000003b\n"
+CLEAR = b":020000000038\n"
+RPM = math.tau / 60
+
+
+def started(settings: LoisEcuSettings | None = None) -> LoisConversation:
+    """Past the first set-points after a Stop."""
+    ecu = LoisConversation(LoisEcuSettings() if settings is None else settings)
+    ecu.wrote(CLEAR * 3, 0.0)
+    return ecu
+
+
+def test_stop_is_duty_zero_and_the_emergency_stop_is_rpm_zero() -> None:
+    """So both kinds of zero alternate under the e-stop."""
+    ecu = LoisConversation(LoisEcuSettings())
+    assert ecu.stop() == STOP
+    assert ecu.emergency_stop() == CLEAR
+
+
+@pytest.mark.parametrize(
+    ("rates", "line"),
+    [
+        ((20, 20), b":020014001438\n"),
+        ((20, -20), b":020014ffec3b\n"),
+        ((0.4, -0.4), STOP),
+        ((0.6, 0.0), b":020001000039\n"),
+        ((100, 50), b":020032001938\n"),
+        ((-500, 0), b":02ffce00006f\n"),
+    ],
+)
+def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: bytes) -> None:
+    """Both are slowed alike; what rounds to nothing is Stop."""
+    ecu = started()
+    total = 0
+    for character in line[:11]:
+        total ^= character
+    data = ecu.wheels([rate * RPM for rate in rates])
+    assert data == line[:11] + b"%02x\n" % total
+    assert ecu.figures.saturated == (max(map(abs, rates)) > 50)
+
+
+def test_a_twist_is_said_and_understood() -> None:
+    """0.2723 m/s forward are 20 RPM; turning left speeds up the right wheel."""
+    ecu = started()
+    assert ecu.velocity(BodyTwist(0.2723, 0.0, 0.0)) == b":020014001438\n"
+    meaning = ecu.meaning(ecu.velocity(BodyTwist(0.3, 0.1, 0.5)))
+    assert meaning.vx_mps == pytest.approx(0.3, abs=0.007)
+    assert meaning.vy_mps == 0.0
+    assert meaning.yaw_rate_radps == pytest.approx(0.5, abs=0.03)
+    assert ecu.meaning(ecu.stop()) == BodyTwist(0.0, 0.0, 0.0)
+
+
+def test_an_inverted_board_has_its_wheels_exchanged() -> None:
+    """In what is said and in what is meant by it."""
+    ecu = started(LoisEcuSettings(inverted=True))
+    left = ecu.velocity(BodyTwist(0.0, 0.0, 0.5))
+    assert left == started().velocity(BodyTwist(0.0, 0.0, -0.5))
+    assert ecu.meaning(left).yaw_rate_radps > 0
+
+
+def test_duty_is_limited_and_belongs_to_its_mode() -> None:
+    """In percent, both slowed alike."""
+    with pytest.raises(CommandRefused, match="drive_mode is rpm"):
+        started().duty((10, 10))
+    ecu = started(LoisEcuSettings(drive_mode="duty", max_duty=60))
+    assert ecu.duty((50, 50)) == b":01003200323b\n"
+    assert ecu.duty((120, 60)) == encode_command_duty(60, 30)
+    assert ecu.velocity(BodyTwist(0.2, 0.0, 0.0)) == encode_command_duty(26, 26)
+    assert ecu.meaning(encode_command_duty(26, 26)).vx_mps == pytest.approx(0.2)
+
+
+def encode_command_duty(left: int, right: int) -> bytes:
+    """By the codec, which has golden lines of its own."""
+    return encode_command(SetDuty(left, right))
+
+
+def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
+    """Three times, as one may be lost: a wheel that stands would never start otherwise."""
+    ecu = started()
+    drive = b":020014001438\n"
+    for now in (1.0, 1.1):
+        ecu.wrote(ecu.wheels((20 * RPM, 20 * RPM)), now)
+    ecu.wrote(ecu.stop(), 2.0)
+    for now in (2.1, 2.2, 2.3):
+        data = ecu.wheels((20 * RPM, 20 * RPM))
+        assert data == CLEAR + drive
+        ecu.wrote(data, now)
+    assert ecu.wheels((20 * RPM, 20 * RPM)) == drive
+
+
+def test_a_record_that_cannot_complete_is_refused() -> None:
+    """More than 1024 samples never end."""
+    ecu = started()
+    for samples in (0, 1025):
+        with pytest.raises(RequestRefused, match="1 to 1024"):
+            ecu.record(RecordKind.TORQUE, samples)
+
+
+@pytest.mark.parametrize(
+    ("kind", "samples", "line"),
+    [
+        (RecordKind.RPM, 100, b":04006400643e\n"),
+        (RecordKind.TORQUE, 1, b":17000100013c\n"),
+        (RecordKind.HEADING, 3, b":0c000000036a\n"),
+    ],
+)
+def test_a_record_is_asked_for_three_times(kind: RecordKind, samples: int, line: bytes) -> None:
+    """As a line may be lost; in a third of a second, as each makes the board begin anew."""
+    ecu = started()
+    ecu.record(kind, samples)
+    sent = b"".join(ecu.due(0.01 * step) for step in range(100))
+    assert sent.count(line) == 3
+    ecu.record(kind, samples)
+    assert line in b"".join(ecu.due(1.0 + 0.01 * step) for step in range(30))

@@ -1,0 +1,132 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Terminal modes and drive modes of a LOIS ECU: stopped first, refused, left and taken up again."""
+
+import pytest
+from lois_bench import FIRMWARE, Bench, configure, told
+
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.lois_ecu import RecordKind, TerminalLine, TerminalMode
+from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.readings import RecordFailed, TerminalLeft
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+GPS = LoisEcuSettings(terminal_mode=TerminalMode.GPS)
+COMPASS = LoisEcuSettings(terminal_mode=TerminalMode.COMPASS)
+
+
+@FIRMWARE
+def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
+    """The mode is written when the robot stands; then lines of the sensor are passed on."""
+    bench = Bench(firmware)
+    bench.drive_on(0.3, 3.0)
+    begun = len(bench.written)
+    configure(bench, COMPASS)
+    stood: list[bool] = []
+    while bench.board.terminal_mode == 0:
+        with pytest.raises(CommandRefused, match="terminal_mode is compass"):
+            bench.drive()
+        bench.run(0.05)
+        stood.append(bench.board.standing)
+        assert len(stood) < 200
+    assert stood[-1]
+    assert bench.written[begun][1].startswith(b":01000000003b\n")
+    bench.run(2.0)
+    assert told(bench, TerminalLine)[-1].text.startswith("$HCHDT")
+    assert bench.robot.stands
+    bench.drive(0.0)
+
+
+@FIRMWARE
+@pytest.mark.parametrize("hears", [True, False])
+def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
+    firmware: str, hears: bool
+) -> None:
+    """Said once; also where the first lines that end the mode are lost."""
+    bench = Bench(firmware)
+    configure(bench, GPS)
+    bench.run_until(lambda: bench.board.terminal_mode == 1)
+    bench.run(2.0)
+    assert not told(bench, TerminalLeft)
+    bench.hears = hears
+    configure(bench, LoisEcuSettings())
+    bench.run(1.3)
+    bench.hears = True
+    bench.run_until(lambda: bool(told(bench, TerminalLeft)))
+    bench.run(2.0)
+    assert len(told(bench, TerminalLeft)) == 1
+    assert bench.board.terminal_mode == 0
+    assert bench.board.wheels[0].short_correction == pytest.approx(1.0761719)
+    bench.drive_on()
+    assert not bench.robot.stands
+
+
+def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
+    """With its settings before."""
+    bench = Bench("firmware", GPS)
+    bench.run_until(lambda: bench.board.terminal_mode == 1)
+    bench.run(1.0)
+    bench.board.reboot()
+    bench.run(2.5)
+    assert bench.board.terminal_mode == 0
+    bench.run_until(lambda: bench.board.terminal_mode == 1)
+    assert bench.board.wheels[0].controller.gains.low_pass == 1.0
+
+
+@FIRMWARE
+def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
+    """Its release moves nothing."""
+    bench = Bench(firmware)
+    configure(bench, GPS)
+    bench.run_until(lambda: bench.board.terminal_mode == 1)
+    bench.estop(True)
+    bench.run(0.5)
+    assert bench.board.commands[-1].command in (0x01, 0x02)
+    bench.estop(False)
+    with pytest.raises(CommandRefused, match="terminal_mode is gps"):
+        bench.drive()
+
+
+@FIRMWARE
+def test_another_drive_mode_stops_first(firmware: str) -> None:
+    """Motion is refused until the robot stands, then it goes by duty."""
+    bench = Bench(firmware)
+    bench.drive_on(0.3, 3.0)
+    configure(bench, LoisEcuSettings(drive_mode="duty"))
+    with pytest.raises(CommandRefused, match="drive_mode becomes duty"):
+        bench.drive()
+    bench.run_until(lambda: bench.robot.stands)
+    with pytest.raises(CommandRefused, match="wait"):
+        bench.drive()
+    bench.run(1.0)
+    bench.drive_on(0.3, 2.0)
+    assert bench.board.commands[-1].command == 0x01
+    assert not bench.robot.stands
+
+
+def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
+    """The public firmware reads no faster than the compass, 4800 baud: Stop alone goes out."""
+    bench = Bench("firmware")
+    configure(bench, COMPASS)
+    bench.run_until(lambda: bench.board.terminal_mode == 2)
+    bench.estop(True)
+    bench.run(3.0)
+    obeyed = len(bench.board.commands)
+    bench.run(1.0)
+    assert len(bench.board.commands) - obeyed > 10
+    configure(bench, LoisEcuSettings())
+    bench.run_until(lambda: bench.board.terminal_mode == 0)
+
+
+def test_a_terminal_mode_ends_a_record() -> None:
+    """The board would send it into silence."""
+    bench = Bench("firmware")
+    board = bench.session.board
+    assert isinstance(board, LoisEcuBoard)
+    board.record(RecordKind.TORQUE, 500)
+    bench.run(0.5)
+    configure(bench, GPS)
+    bench.run(0.5)
+    assert "terminal_mode is gps" in told(bench, RecordFailed)[0].reason
+    with pytest.raises(RequestRefused, match="terminal_mode is gps"):
+        board.record(RecordKind.TORQUE, 500)
