@@ -32,7 +32,6 @@ __all__ = [
     "Obeyed",
     "Quirks",
     "SimulatedLois",
-    "TrueState",
     "add_options",
     "from_arguments",
 ]

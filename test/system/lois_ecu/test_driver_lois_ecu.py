@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver with a LOIS ECU on a real pseudo-terminal, as documented and as its firmware is."""
+"""The driver with a LOIS ECU on a real pseudo-terminal: it drives, and what should stop it does."""
 
 import math
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -13,21 +13,16 @@ from typing import Any, Final
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import Driver
-from geometry_msgs.msg import Twist
+from lois_ecu_rig import Ecu, driven, ecu_of
 from nav_msgs.msg import Odometry
 from probe import Probe
-from rcl_interfaces.msg import Log, Parameter, ParameterType, ParameterValue
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
-from sensor_msgs.msg import Imu, JointState, NavSatFix, NavSatStatus, TimeReference
-from std_msgs.msg import Bool, Float32MultiArray, String
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
-from omnibot_driver.simulator.common.serving import PtyBoard
-from omnibot_driver.simulator.lois_ecu import QUIRKS, LoisSettings, SimulatedLois
-from omnibot_driver.tools.calibrate.interruption import Interruption
-from omnibot_driver.tools.calibrate.robot import connect
-from omnibot_driver.tools.calibrate.tick_records import read
-from omnibot_driver.tools.needs import ToolError
+from omnibot_driver.simulator.lois_ecu import QUIRKS
 
 Start = Callable[..., Any]
 PATIENCE_S: Final = 30.0
@@ -44,76 +39,6 @@ GAINS: Final = {
     "right_td": 0.60868,
 }
 """Of docs/boards/lois_ecu.md: with them no wheel swings."""
-
-
-class Ecu:
-    """A simulated board in real time."""
-
-    def __init__(self, firmware: Any, served: "PtyBoard[SimulatedLois]") -> None:
-        self.firmware, self.served = firmware, served
-
-    @property
-    def path(self) -> str:
-        return self.served.path
-
-    def wait_for(self, predicate: Callable[[SimulatedLois], object]) -> None:
-        assert self.served.wait_for(lambda board: bool(predicate(board)), PATIENCE_S), list(
-            self.served.board.commands
-        )[-20:]
-
-    def do(self, action: Callable[[SimulatedLois], object]) -> Any:
-        with self.served.lock:
-            return action(self.served.board)
-
-    def stands_for_good(self) -> None:
-        """For a second and a half."""
-        since: list[int] = []
-
-        def stood(board: SimulatedLois) -> bool:
-            if not board.standing:
-                since.clear()
-                return False
-            since.append(board.tick)
-            return since[-1] - since[0] >= 150
-
-        self.wait_for(stood)
-
-
-def ecu_of(firmware: Any, stack: ExitStack, **settings: Any) -> Ecu:
-    board = SimulatedLois(LoisSettings(quirks=QUIRKS[firmware], **settings))
-    return Ecu(firmware, stack.enter_context(PtyBoard(board)))
-
-
-@pytest.fixture(params=QUIRKS)
-def ecu(request: pytest.FixtureRequest, stack: ExitStack) -> Ecu:
-    return ecu_of(request.param, stack)
-
-
-@pytest.fixture
-def driver(ecu: Ecu, start_driver: Start) -> Driver:
-    started: Driver = start_driver(ecu.path, board="lois_ecu")
-    return started
-
-
-@pytest.fixture
-def probe(driver: Driver, probe_of: Start) -> Probe:
-    probe: Probe = probe_of(driver)
-    probe.wait_for_state("nominal")
-    return probe
-
-
-@contextmanager
-def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Commanded ten times a second; begins when it moves."""
-    publisher = probe.publisher(Twist, "cmd_vel")
-    twist = Twist()
-    twist.linear.x, twist.angular.z = vx, yaw
-    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
-    try:
-        ecu.wait_for(lambda board: not board.standing)
-        yield
-    finally:
-        probe.remove(timer)
 
 
 def test_it_drives_and_odometry_tells_how_far(
@@ -216,16 +141,6 @@ def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
         probe.wait_for(lambda: odometry[-1].pose.pose.position.x > 0.8)
 
 
-def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
-    """A ball is asked for once."""
-    assert probe.call(SetBool, "led", data=True).success
-    ecu.wait_for(lambda board: board.led)
-    assert probe.call(SetBool, "led", data=False).success
-    ecu.wait_for(lambda board: not board.led)
-    assert probe.call(Trigger, "distribute_ball").success
-    assert ecu.do(lambda board: board.balls) <= 1
-
-
 def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, probe: Probe) -> None:
     """Nothing else is written that the user did not set."""
     client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
@@ -240,57 +155,6 @@ def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, pr
     ecu.wait_for(lambda board: board.wheels[0].controller.gains.kp == pytest.approx(0.5))
     written = {obeyed.command for obeyed in ecu.do(lambda board: list(board.commands))}
     assert written <= {0x01, 0x02, 0x06, 0x0F, 0x11, 0x12, 0x13, 0x20, 0x23}
-
-
-def test_gps_time_and_heading_are_published_where_the_board_tells_them(
-    start_driver: Start, probe_of: Start, stack: ExitStack
-) -> None:
-    """In ENU: the robot looks east, and magnetic north is ahead by the declination."""
-    ecu = ecu_of("documented", stack, running=True)
-    driver = start_driver(
-        ecu.path, board="lois_ecu", date_period=0.5, time_period=0.5, magnetic_declination=0.1
-    )
-    probe: Probe = probe_of(driver)
-    fixes = probe.listen(NavSatFix, "fix")
-    times = probe.listen(TimeReference, "time_reference")
-    headings = probe.listen(Imu, "imu/heading")
-    probe.wait_for(lambda: fixes and times and headings)
-    assert fixes[-1].header.frame_id == "gps_link"
-    assert fixes[-1].status.status == NavSatStatus.STATUS_FIX
-    assert fixes[-1].latitude == pytest.approx(48.1, abs=1e-4)
-    assert fixes[-1].position_covariance[0] >= 0.16
-    assert times[-1].time_ref.sec > 946_684_800
-    turn = headings[-1].orientation
-    assert 2 * math.atan2(turn.z, turn.w) == pytest.approx(-0.1, abs=0.03)
-    assert headings[-1].angular_velocity_covariance[0] == -1.0
-
-
-def test_a_fix_of_the_public_firmware_is_none(
-    start_driver: Start, probe_of: Start, stack: ExitStack
-) -> None:
-    """It sends zeros."""
-    probe: Probe = probe_of(start_driver(ecu_of("firmware", stack).path, board="lois_ecu"))
-    fixes = probe.listen(NavSatFix, "fix")
-    probe.wait_for(lambda: fixes)
-    assert fixes[-1].status.status == NavSatStatus.STATUS_NO_FIX
-
-
-def test_duties_are_commanded_in_duty_mode_alone(
-    start_driver: Start, probe_of: Start, stack: ExitStack
-) -> None:
-    """Limited by max_duty, and they expire like other commands."""
-    ecu = ecu_of("firmware", stack)
-    driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty", max_duty=40)
-    probe: Probe = probe_of(driver)
-    probe.wait_for_state("nominal")
-    publisher = probe.publisher(Float32MultiArray, "duty_cmd")
-    timer = probe.node.create_timer(
-        0.1, lambda: publisher.publish(Float32MultiArray(data=[30.0, 60.0]))
-    )
-    ecu.wait_for(lambda board: [wheel.duty_percent for wheel in board.wheels] == [20, 40])
-    ecu.wait_for(lambda board: not board.standing)
-    probe.remove(timer)
-    ecu.stands_for_good()
 
 
 @pytest.mark.parametrize("firmware", QUIRKS)
@@ -310,31 +174,6 @@ def test_it_runs_inside_the_driver_too(firmware: str, start_driver: Start, probe
     probe.wait_for_graph(lambda: topics() >= {"imu/heading", "estop_button"})
     assert "imu/data_raw" not in topics()
     assert driver.end(signal.SIGINT) == 0
-
-
-def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
-    start_driver: Start, probe_of: Start, stack: ExitStack
-) -> None:
-    """Both are parameters of a driver that runs; what they need is there and goes with them.
-
-    The public firmware passes on both sensors in either mode, and here they speak at once.
-    """
-    ecu = ecu_of("firmware", stack, running=True)
-    probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
-    probe.wait_for_state("nominal")
-    lines = probe.listen(String, f"{NODE}/terminal")
-    log = probe.listen(Log, "/rosout")
-    set_parameter(probe, "terminal_mode", "gps")
-    probe.wait_for(lambda: lines and lines[-1].data.startswith("$HCHDT"))
-    set_parameter(probe, "terminal_mode", "host")
-    probe.wait_for(lambda: any("presses and releases" in line.msg for line in log))
-    set_parameter(probe, "drive_mode", "duty")
-    publisher = probe.publisher(Float32MultiArray, "duty_cmd")
-    timer = probe.node.create_timer(
-        0.1, lambda: publisher.publish(Float32MultiArray(data=[30.0, 30.0]))
-    )
-    ecu.wait_for(lambda board: [wheel.duty_percent for wheel in board.wheels] == [30, 30])
-    probe.remove(timer)
 
 
 def test_a_record_is_a_file_and_an_estop_ends_one(
@@ -361,38 +200,3 @@ def test_a_record_is_a_file_and_an_estop_ends_one(
     assert not ended.success
     assert "e-stop" in ended.message
     assert len(list(folder.iterdir())) == 1
-
-
-def set_parameter(probe: Probe, name: str, value: str) -> None:
-    """While it runs."""
-    client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
-    assert client.wait_for_service(PATIENCE_S)
-    text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
-    future = client.call_async(SetParameters.Request(parameters=[Parameter(name=name, value=text)]))
-    probe.wait_for_future(future)
-    assert future.result().results[0].successful, future.result().results[0].reason
-
-
-def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
-    start_driver: Start, stack: ExitStack, tmp_path: Path
-) -> None:
-    """The file has the ticks of both wheels from their start on; a refusal is passed on as it
-    is."""
-    ecu = ecu_of("firmware", stack, running=True)
-    driver = start_driver(
-        ecu.path,
-        board="lois_ecu",
-        record_samples=40,
-        record_directory=str(tmp_path),
-        cmd_vel_timeout=3.0,
-    )
-    driver.wait_for_line("state: nominal")
-    with Interruption() as interruption, connect(driver.namespace, [], interruption) as robot:
-        path = robot.record("record_rpm", "wheel_cmd", [3.0, 3.0])
-        ecu.stands_for_good()
-        found = read(path)
-        assert [len(found[side]) for side in ("left", "right")] == [40, 40]
-        assert robot.parameters["motion_monitor"] is True
-        robot.call("estop", on=True)
-        with pytest.raises(ToolError, match="e-stop"):
-            robot.record("record_rpm", "wheel_cmd", [3.0, 3.0])

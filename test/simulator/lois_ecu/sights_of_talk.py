@@ -1,0 +1,269 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Whether a board has a quirk of what it hears, says and records.
+
+Each function has the name of its quirk.
+"""
+
+from dataclasses import replace
+from itertools import pairwise
+
+from lois_rig import Rig, odometry_in, ticks_in
+
+from omnibot_driver.core.lois_ecu import (
+    PERIOD_OFF,
+    DistributeBall,
+    EStopButton,
+    GpsPosition,
+    Heading,
+    Record,
+    RecordHeading,
+    RecordKind,
+    RecordRpm,
+    RecordTorque,
+    Reset,
+    SetDuty,
+    SetPeriod,
+    SetRpm,
+    SetTerminalMode,
+    Setting,
+    Stream,
+    TerminalMode,
+    WriteSetting,
+    encode_command,
+)
+from omnibot_driver.simulator.lois_ecu import Quirks
+
+
+def with_sum(text: bytes) -> bytes:
+    """The XOR of its characters, and the end."""
+    total = 0
+    for character in text:
+        total ^= character
+    return text + b"%02x\n" % total
+
+
+def extra_settings(quirks: Quirks) -> bool:
+    """Feed-forward alone turns the wheels at once."""
+    rig = Rig(replace(quirks, low_pass_starts_at_zero=False))
+    rig.run(2.1)
+    for setting in (Setting.LEFT_KP, Setting.RIGHT_KP):
+        rig.say(WriteSetting(setting, 0.0))
+    rig.say(WriteSetting(Setting.LEFT_FEED_FORWARD, 2.0))
+    rig.drive(30, 30, 1.0)
+    return rig.board.motors[0].rpm > 20
+
+
+def appends_odometry(quirks: Quirks) -> bool:
+    """0x12 has groups of six."""
+    return any(group.appended for group in odometry_in(Rig(quirks).run(4.0)))
+
+
+def clock_in_ms(quirks: Quirks) -> bool:
+    """Not in ns."""
+    rig = Rig(quirks)
+    rig.run(6.0)
+    return rig.decoder.clock_unit == "ms"
+
+
+def clock_stops_while_sending(quirks: Quirks) -> bool:
+    """So it runs slow, the more is sent."""
+    rig = Rig(quirks)
+    rig.run(3.0)
+    began, counts = rig.now, [ticks_in(rig.run(0.5))[-1].time_counts]
+    for _ in range(50):
+        counts += [ticks.time_counts for ticks in ticks_in(rig.run(0.5))]
+    passed = sum((after - before) % 2**32 for before, after in pairwise(counts))
+    return passed < 0.97 * (rig.now - began - 0.7) * (1e3 if quirks.clock_in_ms else 1e9)
+
+
+def deaf_while_sending(quirks: Quirks) -> bool:
+    """Of single lines 3 to 10 % are lost."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    for number in range(300):
+        rig.board.receive(encode_command(SetRpm(number, 0)))
+        rig.run(0.05 + number % 7 / 100)
+    obeyed = len(rig.board.commands)
+    assert obeyed > 260
+    return obeyed < 295
+
+
+def deaf_while_counting(quirks: Quirks) -> bool:
+    """At full speed more than a tenth of single lines are lost."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetDuty(100, 100))
+    rig.run(1.0)
+    before = len(rig.board.commands)
+    for number in range(300):
+        rig.board.receive(encode_command(SetDuty(100, 90 + number % 10)))
+        rig.run(0.05 + number % 7 / 100)
+    return len(rig.board.commands) - before < 270
+
+
+def button_waits_while_sending(quirks: Quirks) -> bool:
+    """A record of 100 samples takes 0.12 s."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetDuty(50, 50), RecordTorque(100, 100))
+    while not any(start in rig.board.step() for start in (b":0405", b":1705")):
+        pass
+    rig.board.press(True)
+    rig.board.step()
+    rig.board.step()
+    return rig.board.driven
+
+
+def odometry_period_is_fixed(quirks: Quirks) -> bool:
+    """0x20 cannot be turned off."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetPeriod(Stream.ODOMETRY, PERIOD_OFF))
+    rig.run(0.5)
+    return any(not group.appended for group in odometry_in(rig.run(3.0)))
+
+
+def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
+    """Also where the mode stays what it was."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetTerminalMode(TerminalMode.HOST))
+    return rig.board.wheels[0].short_correction < 1e-6
+
+
+def button_is_lost_in_terminal_mode(quirks: Quirks) -> bool:
+    """Nothing tells of it, not even afterwards."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetTerminalMode(TerminalMode.GPS))
+    rig.board.press(True)
+    heard = rig.run(1.0)
+    rig.say(SetTerminalMode(TerminalMode.HOST))
+    return EStopButton(True) not in heard + rig.run(1.0)
+
+
+def terminal_mixes_sensors(quirks: Quirks) -> bool:
+    """The compass speaks in the GPS's mode."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetTerminalMode(TerminalMode.GPS))
+    return b"$HCHDT" in b"".join(rig.board.step() for _ in range(100))
+
+
+def terminal_passes_input_on(quirks: Quirks) -> bool:
+    """The compass takes 34 lines a second; the board cannot obey more."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(SetTerminalMode(TerminalMode.COMPASS))
+    for _ in range(100):
+        rig.board.receive(encode_command(SetDuty(0, 0)))
+        rig.run(0.02)
+    return len(rig.board.commands) < 20
+
+
+def one_ball_in_six_seconds(quirks: Quirks) -> bool:
+    """The second one is ignored, the one after that is not."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.say(DistributeBall(), DistributeBall())
+    rig.run(6.0)
+    rig.say(DistributeBall())
+    return rig.board.balls == 2
+
+
+def reset_clears_ticks_only(quirks: Quirks) -> bool:
+    """The odometry stays, and the robot drives on."""
+    rig = Rig(quirks).booted()
+    rig.drive(20, 30, 4.0)
+    rig.say(Reset())
+    assert rig.board.wheels[0].ticks < 5
+    rig.run(1.0)
+    return rig.board.driven and abs(rig.board.odometry.pose[0]) > 0.1
+
+
+def gps_is_ignored(quirks: Quirks) -> bool:
+    """0/0."""
+    return GpsPosition(0.0, 0.0) in Rig(quirks).run(4.0)
+
+
+def headings_average_over_north(quirks: Quirks) -> bool:
+    """A robot that turns through north seems to look south."""
+    rig = Rig(quirks).booted()
+    rig.say(SetPeriod(Stream.HEADING, 40), SetPeriod(Stream.TICKS, PERIOD_OFF))
+    rig.drive(-20, 20, 12.0)
+    reports = [report for _, report in rig.heard if isinstance(report, Heading)]
+    leaps = [
+        abs((after.heading_deg - before.heading_deg + 180) % 360 - 180)
+        for before, after in pairwise(reports)
+    ]
+    return max(leaps[40:]) > 60
+
+
+def _record(rig: Rig, kind: RecordKind, count: int, seconds: float) -> Record | None:
+    made = {RecordKind.RPM: RecordRpm, RecordKind.TORQUE: RecordTorque}.get(kind)
+    rig.decoder.expect_record(kind, count, count if made else 0)
+    rig.say(made(count, count) if made else RecordHeading(count))
+    found = [report for report in rig.run(seconds) if isinstance(report, Record)]
+    return found[0] if found else None
+
+
+def records_in_100_us(quirks: Quirks) -> bool:
+    """At 20 RPM a tick takes 50 ms, which do not fit 16 bits of 100 ns."""
+    rig = Rig(quirks).booted()
+    rig.drive(20, 20, 5.0)
+    record = _record(rig, RecordKind.RPM, 20, 4.0)
+    assert record is not None
+    assert len(record.left) == len(record.right) == 20
+    return 450 < sum(record.left) / 20 < 550
+
+
+def torque_comes_as_rpm(quirks: Quirks) -> bool:
+    """Under 0x04."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.board.receive(encode_command(RecordTorque(5, 5)))
+    sent = b"".join(rig.board.step() for _ in range(300))
+    assert (b":1700" in sent) != (b":0400c8" in sent)
+    return b":0400c8" in sent
+
+
+def record_waits_for_one_more(quirks: Quirks) -> bool:
+    """The record is sent after one more sample."""
+    rig = Rig(quirks, compass_period_s=1.0)
+    rig.run(2.5)
+    return _record(rig, RecordKind.HEADING, 3, 3.1) is None
+
+
+def large_records_never_end(quirks: Quirks) -> bool:
+    """1025 torque samples would be there after 93 s, or 205 s."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    rig.board.receive(with_sum(b":1704010401"))
+    rig.run(0.1)
+    assert rig.board.commands[-1].command == 0x17
+    seconds = 1030 * (0.091 if quirks.fast_control else 0.2)
+    rig.decoder.expect_record(RecordKind.TORQUE, 1024, 1024)
+    return not any(isinstance(report, Record) for report in rig.run(seconds + 5.0))
+
+
+def lenient_hex(quirks: Quirks) -> bool:
+    """A payload with letters that are not digits, and a right checksum."""
+    rig = Rig(quirks)
+    rig.run(2.1)
+    for _ in range(5):
+        rig.board.receive(with_sum(b":020014zz14"))
+        rig.run(0.1)
+    return any(obeyed.payload == 0x00140000 for obeyed in rig.board.commands)
+
+
+def slow_boot(quirks: Quirks) -> bool:
+    """Silent; what comes meanwhile is read afterwards."""
+    rig = Rig(quirks)
+    rig.board.receive(encode_command(SetDuty(0, 0)))
+    early = rig.run(1.9)
+    deaf = not rig.board.commands
+    rig.run(0.2)
+    assert len(rig.board.commands) == 1
+    assert deaf is not bool(early)
+    return deaf

@@ -1,0 +1,34 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A driver with a LOIS ECU, as documented and as its firmware is."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+from driver_process import Driver
+from lois_ecu_rig import Ecu, ecu_of
+from probe import Probe
+
+from omnibot_driver.simulator.lois_ecu import QUIRKS
+
+Start = Callable[..., Any]
+
+
+@pytest.fixture(params=QUIRKS)
+def ecu(request: pytest.FixtureRequest, stack: ExitStack) -> Ecu:
+    return ecu_of(request.param, stack)
+
+
+@pytest.fixture
+def driver(ecu: Ecu, start_driver: Start) -> Driver:
+    started: Driver = start_driver(ecu.path, board="lois_ecu")
+    return started
+
+
+@pytest.fixture
+def probe(driver: Driver, probe_of: Start) -> Probe:
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    return probe

@@ -1,0 +1,80 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A simulated LOIS ECU in real time on a pseudo-terminal, for the driver."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any, Final
+
+from geometry_msgs.msg import Twist
+from probe import Probe
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+
+from omnibot_driver.simulator.common.serving import PtyBoard
+from omnibot_driver.simulator.lois_ecu import QUIRKS, LoisSettings, SimulatedLois
+
+PATIENCE_S: Final = 30.0
+NODE: Final = "omnibot_driver"
+
+
+class Ecu:
+    """A simulated board in real time."""
+
+    def __init__(self, firmware: Any, served: "PtyBoard[SimulatedLois]") -> None:
+        self.firmware, self.served = firmware, served
+
+    @property
+    def path(self) -> str:
+        return self.served.path
+
+    def wait_for(self, predicate: Callable[[SimulatedLois], object]) -> None:
+        assert self.served.wait_for(lambda board: bool(predicate(board)), PATIENCE_S), list(
+            self.served.board.commands
+        )[-20:]
+
+    def do(self, action: Callable[[SimulatedLois], object]) -> Any:
+        with self.served.lock:
+            return action(self.served.board)
+
+    def stands_for_good(self) -> None:
+        """For a second and a half."""
+        since: list[int] = []
+
+        def stood(board: SimulatedLois) -> bool:
+            if not board.standing:
+                since.clear()
+                return False
+            since.append(board.tick)
+            return since[-1] - since[0] >= 150
+
+        self.wait_for(stood)
+
+
+def ecu_of(firmware: Any, stack: ExitStack, **settings: Any) -> Ecu:
+    board = SimulatedLois(LoisSettings(quirks=QUIRKS[firmware], **settings))
+    return Ecu(firmware, stack.enter_context(PtyBoard(board)))
+
+
+@contextmanager
+def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
+    """Commanded ten times a second; begins when it moves."""
+    publisher = probe.publisher(Twist, "cmd_vel")
+    twist = Twist()
+    twist.linear.x, twist.angular.z = vx, yaw
+    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
+    try:
+        ecu.wait_for(lambda board: not board.standing)
+        yield
+    finally:
+        probe.remove(timer)
+
+
+def set_parameter(probe: Probe, name: str, value: str) -> None:
+    """While it runs."""
+    client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
+    assert client.wait_for_service(PATIENCE_S)
+    text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
+    future = client.call_async(SetParameters.Request(parameters=[Parameter(name=name, value=text)]))
+    probe.wait_for_future(future)
+    assert future.result().results[0].successful, future.result().results[0].reason

@@ -1,0 +1,136 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The driver with a LOIS ECU on a real pseudo-terminal: what this board alone has."""
+
+import math
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from lois_ecu_rig import Ecu, ecu_of, set_parameter
+from probe import Probe
+from rcl_interfaces.msg import Log
+from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, TimeReference
+from std_msgs.msg import Float32MultiArray, String
+from std_srvs.srv import SetBool, Trigger
+
+from omnibot_driver.tools.calibrate.interruption import Interruption
+from omnibot_driver.tools.calibrate.robot import connect
+from omnibot_driver.tools.calibrate.tick_records import read
+from omnibot_driver.tools.needs import ToolError
+
+Start = Callable[..., Any]
+NODE: Final = "omnibot_driver"
+
+
+def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
+    """A ball is asked for once."""
+    assert probe.call(SetBool, "led", data=True).success
+    ecu.wait_for(lambda board: board.led)
+    assert probe.call(SetBool, "led", data=False).success
+    ecu.wait_for(lambda board: not board.led)
+    assert probe.call(Trigger, "distribute_ball").success
+    assert ecu.do(lambda board: board.balls) <= 1
+
+
+def test_gps_time_and_heading_are_published_where_the_board_tells_them(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """In ENU: the robot looks east, and magnetic north is ahead by the declination."""
+    ecu = ecu_of("documented", stack, running=True)
+    driver = start_driver(
+        ecu.path, board="lois_ecu", date_period=0.5, time_period=0.5, magnetic_declination=0.1
+    )
+    probe: Probe = probe_of(driver)
+    fixes = probe.listen(NavSatFix, "fix")
+    times = probe.listen(TimeReference, "time_reference")
+    headings = probe.listen(Imu, "imu/heading")
+    probe.wait_for(lambda: fixes and times and headings)
+    assert fixes[-1].header.frame_id == "gps_link"
+    assert fixes[-1].status.status == NavSatStatus.STATUS_FIX
+    assert fixes[-1].latitude == pytest.approx(48.1, abs=1e-4)
+    assert fixes[-1].position_covariance[0] >= 0.16
+    assert times[-1].time_ref.sec > 946_684_800
+    turn = headings[-1].orientation
+    assert 2 * math.atan2(turn.z, turn.w) == pytest.approx(-0.1, abs=0.03)
+    assert headings[-1].angular_velocity_covariance[0] == -1.0
+
+
+def test_a_fix_of_the_public_firmware_is_none(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """It sends zeros."""
+    probe: Probe = probe_of(start_driver(ecu_of("firmware", stack).path, board="lois_ecu"))
+    fixes = probe.listen(NavSatFix, "fix")
+    probe.wait_for(lambda: fixes)
+    assert fixes[-1].status.status == NavSatStatus.STATUS_NO_FIX
+
+
+def test_duties_are_commanded_in_duty_mode_alone(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """Limited by max_duty, and they expire like other commands."""
+    ecu = ecu_of("firmware", stack)
+    driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty", max_duty=40)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    publisher = probe.publisher(Float32MultiArray, "duty_cmd")
+    timer = probe.node.create_timer(
+        0.1, lambda: publisher.publish(Float32MultiArray(data=[30.0, 60.0]))
+    )
+    ecu.wait_for(lambda board: [wheel.duty_percent for wheel in board.wheels] == [20, 40])
+    ecu.wait_for(lambda board: not board.standing)
+    probe.remove(timer)
+    ecu.stands_for_good()
+
+
+def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """Both are parameters of a driver that runs; what they need is there and goes with them.
+
+    The public firmware passes on both sensors in either mode, and here they speak at once.
+    """
+    ecu = ecu_of("firmware", stack, running=True)
+    probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
+    probe.wait_for_state("nominal")
+    lines = probe.listen(String, f"{NODE}/terminal")
+    log = probe.listen(Log, "/rosout")
+    set_parameter(probe, "terminal_mode", "gps")
+    probe.wait_for(lambda: lines and lines[-1].data.startswith("$HCHDT"))
+    set_parameter(probe, "terminal_mode", "host")
+    probe.wait_for(lambda: any("presses and releases" in line.msg for line in log))
+    set_parameter(probe, "drive_mode", "duty")
+    publisher = probe.publisher(Float32MultiArray, "duty_cmd")
+    timer = probe.node.create_timer(
+        0.1, lambda: publisher.publish(Float32MultiArray(data=[30.0, 30.0]))
+    )
+    ecu.wait_for(lambda board: [wheel.duty_percent for wheel in board.wheels] == [30, 30])
+    probe.remove(timer)
+
+
+def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
+    start_driver: Start, stack: ExitStack, tmp_path: Path
+) -> None:
+    """The file has the ticks of both wheels from their start on; a refusal is passed on as it
+    is."""
+    ecu = ecu_of("firmware", stack, running=True)
+    driver = start_driver(
+        ecu.path,
+        board="lois_ecu",
+        record_samples=40,
+        record_directory=str(tmp_path),
+        cmd_vel_timeout=3.0,
+    )
+    driver.wait_for_line("state: nominal")
+    with Interruption() as interruption, connect(driver.namespace, [], interruption) as robot:
+        path = robot.record("record_rpm", "wheel_cmd", [3.0, 3.0])
+        ecu.stands_for_good()
+        found = read(path)
+        assert [len(found[side]) for side in ("left", "right")] == [40, 40]
+        assert robot.parameters["motion_monitor"] is True
+        robot.call("estop", on=True)
+        with pytest.raises(ToolError, match="e-stop"):
+            robot.record("record_rpm", "wheel_cmd", [3.0, 3.0])
