@@ -10,12 +10,18 @@ import os
 import threading
 import time
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
 from interpreted import INTERPRETED
 from listener import PATIENCE_S
 from terminal import Terminal
+
+if TYPE_CHECKING:
+    from guarded_line import Line
+
+    from omnibot_driver.simulator.omnibot import PtyBoard
 
 # Domains 0 to 101 are safe on every platform; 0 is everybody's default.
 os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
@@ -51,7 +57,29 @@ def driver_threads() -> list[str]:
 
 @pytest.fixture
 def terminal() -> Iterator[Terminal]:
-    """Closed before it is looked what was left behind."""
+    """A terminal that is closed before the test looks for what was left behind."""
     terminal = Terminal()
     yield terminal
     terminal.close()
+
+
+@pytest.fixture
+def line() -> Iterator["Line"]:
+    """Where no process and no descriptor may be left behind."""
+    from guarded_line import Line
+
+    descriptors = len(os.listdir("/proc/self/fd"))
+    line = Line()
+    yield line
+    line.close()
+    assert len(os.listdir("/proc/self/fd")) == descriptors
+    assert line.children() == [], "a process is left behind, or a zombie"
+
+
+@pytest.fixture
+def board() -> Iterator["PtyBoard"]:
+    """A board that runs, on a pseudo-terminal."""
+    from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
+
+    with PtyBoard(SimulatedBoard(BoardSettings(running=True))) as board:
+        yield board

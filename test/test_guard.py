@@ -1,121 +1,29 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The guard as a process, on a real pseudo-terminal, with and without its keeper."""
+"""The guard as a process of its own, on a real pseudo-terminal."""
 
 import ast
-import contextlib
 import os
-import select
 import signal
 import socket
 import threading
 import time
-import tty
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import pytest
-from terminal import fill
+from guarded_line import (
+    LAST_WORDS,
+    LATCHED_WORDS,
+    PATIENCE_S,
+    Line,
+    alive,
+    beat_until,
+    started,
+    status_of,
+)
 
 from omnibot_driver import guard
 from omnibot_driver.core.packets import packed
-from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
-
-PATIENCE_S = 20.0
-LAST_WORDS = b"these are my last words"
-LATCHED_WORDS = b"and these under the e-stop"
-
-
-class Line:
-    """A pseudo-terminal: ``near`` is the driver's port; the far end is read here."""
-
-    def __init__(self) -> None:
-        self._far, self.near = os.openpty()
-        tty.setraw(self.near)
-        os.set_blocking(self.near, False)
-        self.heard = b""
-        self._others = children()
-
-    def children(self) -> list[int]:
-        """The processes begun since this line was made, zombies included."""
-        return [pid for pid in children() if pid not in self._others]
-
-    def hear(self, words: bytes) -> bytes:
-        """Everything so far, once these words are in it."""
-        end = time.monotonic() + PATIENCE_S
-        while words not in self.heard:
-            assert select.select([self._far], [], [], end - time.monotonic())[0], self.heard
-            self.heard += os.read(self._far, 4096)
-        return self.heard
-
-    def fill(self) -> None:
-        """Fill the terminal's buffer."""
-        fill(self.near)
-
-    def hang_up(self) -> None:
-        os.close(self._far)
-        self._far = -1
-
-    def close(self) -> None:
-        os.close(self.near)
-        if self._far >= 0:
-            os.close(self._far)
-
-
-@pytest.fixture
-def line() -> Iterator[Line]:
-    descriptors = len(os.listdir("/proc/self/fd"))
-    line = Line()
-    yield line
-    line.close()
-    assert len(os.listdir("/proc/self/fd")) == descriptors
-    assert line.children() == [], "a process is left behind, or a zombie"
-
-
-def children() -> list[int]:
-    """Our child processes, zombies included."""
-    found = []
-    for directory in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):
-            after_name = (directory / "stat").read_text().rpartition(")")[2].split()
-            if int(after_name[1]) == os.getpid():
-                found.append(int(directory.name))
-    return found
-
-
-def started(pid: int) -> None:
-    """Wait until Python has come up in it, and it does not heed SIGTERM any more."""
-    end = time.monotonic() + PATIENCE_S
-    bit = 1 << (signal.SIGTERM - 1)
-    while not int(status_of(pid, "SigIgn"), 16) & bit:
-        assert time.monotonic() < end
-        time.sleep(0.005)  # what a process ignores changes without an event
-
-
-def status_of(pid: int, field: str) -> str:
-    text = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
-    return text.partition(f"{field}:")[2].split()[0]
-
-
-def alive(keeper: Keeper, seconds: float) -> float:
-    """Beat as the driver does, whose pace is the thing itself; the longest pause in between."""
-    begun_s = beaten_s = time.monotonic()
-    longest_s = 0.0
-    while (now := time.monotonic()) < begun_s + seconds:
-        keeper.beat(now)
-        time.sleep(0.05)
-        longest_s, beaten_s = max(longest_s, time.monotonic() - beaten_s), now
-    return longest_s
-
-
-def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
-    """Beat as the driver does until the condition holds; returns the messages."""
-    told, end = "", time.monotonic() + PATIENCE_S
-    while not predicate():
-        assert time.monotonic() < end
-        told += keeper.beat(time.monotonic())
-        time.sleep(0.05)
-    return told
+from omnibot_driver.keeper import Keeper
 
 
 def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
@@ -169,31 +77,6 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
     assert b"missing" not in line.hear(2 * b"newest" + b"newest")
 
 
-def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
-    """It would say old ones."""
-    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
-    (first,) = line.children()
-    os.kill(first, signal.SIGSTOP)
-    os.waitid(os.P_PID, first, os.WSTOPPED)
-    for number in range(200):
-        keeper.change(packed(b"%d" % number + bytes(1000)), packed(LATCHED_WORDS))
-    keeper.change(packed(b"newest"), packed(LATCHED_WORDS))
-    beat_until(keeper, lambda: line.children() not in ([first], []))
-    keeper.end(stopped=False)
-    assert LAST_WORDS not in line.hear(2 * b"newest")
-
-
-def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
-    """It has not come up yet."""
-    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
-    children = line.children()
-    for number in range(30):
-        keeper.change(packed(b"%d" % number), packed(LATCHED_WORDS))
-        assert keeper.beat(1000.0) == ""
-    assert line.children() == children
-    keeper.end(stopped=True)
-
-
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
     """Old commands wait there; they are read only after the guard has gone."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
@@ -211,122 +94,6 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
     line.hang_up()
     keeper.end(stopped=False)
     assert process.returncode == 0  # it was not killed
-
-
-def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
-    """The new one guards."""
-    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
-    (first,) = line.children()
-    os.kill(first, signal.SIGKILL)
-    told = beat_until(keeper, lambda: line.children() not in ([first], []))
-    assert "exit code -9" in told
-    assert told.count("starting another one") == 1
-    (second,) = line.children()
-    os.kill(second, signal.SIGKILL)
-    assert beat_until(keeper, lambda: line.children() not in ([second], [])) == ""
-    keeper.end(stopped=False)
-    line.hear(LAST_WORDS)
-
-
-def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
-    line: Line, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The driver drives on without."""
-    with monkeypatch.context() as without:
-        without.setattr("sys.executable", "/no/python")
-        keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
-        assert "cannot start the guard process" in keeper.beat(1000.0)
-    assert keeper.beat(1000.5) == ""
-    assert line.children() == []
-    keeper.beat(1001.5)
-    keeper.end(stopped=False)
-    line.hear(LAST_WORDS)
-
-
-def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
-    """A stopped guard would not stop the robot; the driver does not wait until its pipe is full."""
-    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
-    (first,) = line.children()
-    started(first)
-    os.kill(first, signal.SIGSTOP)
-    os.waitid(os.P_PID, first, os.WSTOPPED)
-    assert [keeper.beat(1000.0) for _ in range(HANGS_AFTER)] == [""] * HANGS_AFTER
-    assert line.children() == [first]
-    assert keeper.beat(1000.0) == "the guard process hung; starting another one"
-    beat_until(keeper, lambda: first not in line.children())
-    keeper.end(stopped=False)
-    line.hear(LAST_WORDS)
-
-
-def test_a_guard_that_does_not_die_never_holds_up_a_beat(
-    line: Line, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As in an uninterruptible sleep. It is replaced at once, and reaped later."""
-    monkeypatch.setattr("subprocess.Popen.wait", lambda *_: pytest.fail("a beat waits"))
-    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
-    (first,) = line.children()
-    started(first)
-    os.kill(first, signal.SIGSTOP)
-    os.waitid(os.P_PID, first, os.WSTOPPED)
-    with monkeypatch.context() as undying:
-        undying.setattr("subprocess.Popen.kill", lambda _process: None)
-        told = [keeper.beat(1000.0 + n * BEAT_S) for n in range(HANGS_AFTER + 2)]
-        assert [text for text in told if text] == ["the guard process hung; starting another one"]
-        assert len(line.children()) == 2
-        assert first in line.children()
-    os.kill(first, signal.SIGKILL)
-    beat_until(keeper, lambda: first not in line.children())
-    monkeypatch.undo()
-    keeper.end(stopped=False)
-    line.hear(LAST_WORDS)
-
-
-def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    """More guards would not help on a host where nothing can be killed."""
-    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
-    stopped: set[int] = set()
-    with monkeypatch.context() as undying:
-        undying.setattr("subprocess.Popen.kill", lambda _process: None)
-        for second in range(10 * HANGS_AFTER):
-            for pid in set(line.children()) - stopped:
-                os.kill(pid, signal.SIGSTOP)
-                os.waitid(os.P_PID, pid, os.WSTOPPED)
-                stopped.add(pid)
-            keeper.beat(1000.0 + second)
-    assert len(line.children()) == MOST_DYING
-    for pid in stopped:
-        os.kill(pid, signal.SIGKILL)
-    beat_until(keeper, lambda: stopped.isdisjoint(line.children()))
-    keeper.end(stopped=False)
-    line.hear(LAST_WORDS)
-
-
-def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
-    """It does not hear the good-bye."""
-    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
-    (pid,) = line.children()
-    os.kill(pid, signal.SIGSTOP)
-    keeper.end(stopped=True)
-
-
-@pytest.mark.filterwarnings("ignore:subprocess .* is still running:ResourceWarning")
-def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
-    line: Line, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A stopped process that no signal reaches stands for an uninterruptible sleep."""
-    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
-    (pid,) = line.children()
-    os.kill(pid, signal.SIGSTOP)
-    monkeypatch.setattr("subprocess.Popen.kill", lambda _process: None)
-    ending = threading.Thread(target=keeper.end, kwargs={"stopped": True})
-    ending.start()
-    ending.join(PATIENCE_S)
-    ended = not ending.is_alive()
-    os.kill(pid, signal.SIGKILL)
-    ending.join()
-    with contextlib.suppress(ChildProcessError):
-        os.waitpid(pid, 0)
-    assert ended
 
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pacing, repeating, timing out and the latch, with frames that mean nothing."""
+"""Pacing, repeating and timing out, with frames that mean nothing."""
 
 import math
 from typing import Any
@@ -8,60 +8,16 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from set_point_bench import BOTH, GO, STOP, TIMEOUT_S, TURN, Stream, make_stream, order, run
 
-from omnibot_driver.core.commands.orders import EMERGENCY_STOP, Order
-from omnibot_driver.core.commands.orders import STOP as STAND
 from omnibot_driver.core.commands.policy import (
     STOPPING_S,
     UNPROVED_S,
-    CommandPolicy,
     CommandSettings,
 )
-from omnibot_driver.core.commands.set_point_stream import MOTION_PACE_S, PACE_S, SetpointStream
-from omnibot_driver.core.commands.set_points import Authority, SteadySetpoint
-from omnibot_driver.core.commands.stop_proof import StopProof
-from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.packets import Packets, joined, packed
-
-STOP, ESTOP, GO, TURN = b"stop", b"estop", b"go", b"turn"
-BOTH = ESTOP + STOP
-TIMEOUT_S = 0.5
-
-
-class Words:
-    """An encoder of orders that are their own bytes."""
-
-    def stop(self) -> Packets:
-        return packed(STOP)
-
-    def emergency_stop(self) -> Packets:
-        return packed(ESTOP)
-
-    def encode(self, order: Order | bytes) -> Packets:
-        if isinstance(order, bytes):
-            return packed(order)
-        return packed(ESTOP if order is EMERGENCY_STOP else STOP)
-
-    def meaning(self, packets: Packets) -> BodyTwist:
-        return BodyTwist(0.0, 0.0, 0.0)
-
-
-class Stream(CommandPolicy):
-    """The policy with a stream of set-points, in bytes."""
-
-    def __init__(self, settings: CommandSettings) -> None:
-        proof = StopProof()
-        self.actuator = SetpointStream(Words(), proof)
-        super().__init__(settings, self.actuator, proof)
-
-    def write(self, now: float) -> bytes:
-        return joined(self.due(now))
-
-
-def order(stream: Stream, frame: bytes, now: float, authority: Authority = Authority.BASE) -> None:
-    wanted: Any = STAND if frame == STOP else frame
-    setpoint = SteadySetpoint(authority, wanted, stream.actuator.is_zero)
-    stream.command(setpoint, now, expires_at=now + TIMEOUT_S)
+from omnibot_driver.core.commands.set_point_stream import MOTION_PACE_S, PACE_S
+from omnibot_driver.core.commands.set_points import Authority
+from omnibot_driver.core.packets import packed
 
 
 class Climbing:
@@ -87,23 +43,6 @@ class Climbing:
 @pytest.fixture
 def stream() -> Stream:
     return make_stream()
-
-
-def make_stream() -> Stream:
-    return Stream(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=20.0))
-
-
-def run(stream: Stream, start: float, end: float) -> list[tuple[float, bytes]]:
-    """Serve the stream whenever it wants to be, as the pacer does."""
-    written = []
-    now = start
-    while now <= end:
-        frame = stream.write(now)
-        if frame:
-            written.append((now, frame))
-        assert stream.wake_at > now, "the pacer would spin"
-        now = stream.wake_at
-    return written
 
 
 def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> None:
@@ -184,14 +123,6 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     assert stream.write(1.02) == GO
 
 
-def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
-    """It is sent twice, even if it was sent just before."""
-    stream.latch(1.0)
-    stream.write(1.0)
-    stream.connect(1.001)
-    assert stream.write(1.001) == 2 * BOTH
-
-
 def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
     """After the first Stop, a thousand more a second would only fill the line."""
     written = []
@@ -263,69 +194,6 @@ def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
     stream.discard(1.0)
     assert stream.write(1.0) == b""
     assert stream.wake_at == math.inf
-
-
-def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """Neither the Stop between them nor the newer command is sent."""
-    order(stream, GO, 1.0)
-    stream.write(1.0)
-    order(stream, TURN, 1.001, Authority.WHEELS)
-    stream.latch(1.001)
-    assert stream.current is None
-    assert {frame for _, frame in run(stream, 1.001, 1.2)} == {2 * BOTH, BOTH}
-
-
-def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """Stop with it: firmware that ignores mode 10 has to stand as well. At first both twice."""
-    order(stream, GO, 1.0)
-    stream.write(1.0)
-    stream.latch(1.001)
-    assert stream.write(1.001) == 2 * BOTH
-    written = run(stream, 1.001, 101.0)
-    assert {frame for _, frame in written} == {BOTH}
-    assert len(written) == pytest.approx(2000, abs=2)
-
-
-def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
-    stream: Stream,
-) -> None:
-    """Letters at 50 Hz, and the stop still goes out at 20 Hz."""
-    stream.latch(1.0)
-    written = 0
-    for step in range(1000):
-        now = 1.0 + step * 0.001
-        if step % 20 == 7:
-            stream.actuator.wrote(packed(b"S"), now)
-        written += stream.write(now) in (BOTH, 2 * BOTH)
-    assert written >= 20
-
-
-def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
-    """A button node may publish as fast as it likes; the line has to take other things too."""
-    written = []
-    for step in range(1000):
-        now = 1.0 + step * 0.001
-        stream.latch(now)
-        written.append(stream.write(now))
-    assert written.count(2 * BOTH) == 1
-    assert written.count(BOTH) == pytest.approx(19, abs=1)
-
-
-def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: Stream) -> None:
-    """The robot moves again only on a command that is newer than the release."""
-    order(stream, GO, 1.0)
-    stream.write(1.0)
-    stream.latch(1.1)
-    stream.write(1.1)
-    stream.release(1.2)
-    assert {frame for _, frame in run(stream, 1.2, 5.0)} == {STOP}
-
-
-def test_a_release_without_a_latch_does_nothing(stream: Stream) -> None:
-    """Releasing twice must not stop a robot that drives again."""
-    order(stream, GO, 1.0)
-    stream.release(1.0)
-    assert stream.write(1.0) == GO
 
 
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:

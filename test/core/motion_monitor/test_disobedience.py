@@ -4,7 +4,6 @@
 
 import pytest
 from disobedient_robots import (
-    PERIOD_S,
     SLOWLY,
     Triple,
     by_wheels,
@@ -13,23 +12,27 @@ from disobedient_robots import (
     stopped_after_s,
     try_to_drive,
 )
-from robots import drive_on, driving, estop, push, standing
+from robots import driving
 from session_bench import STOP, TICK_S, Bench
 
-from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, SimulatedBoard
-from omnibot_driver.simulator.omnibot.motors import WheelGains
 
 WITHIN_S = 0.3
 
 FORWARD, TURN, TURN_SLOWLY = (0.5, 0.0, 0.0), (0.0, 0.0, 0.5), (0.0, 0.0, 0.15)
+
 A_AND_B = {"motor_wiring": (2, 1, 3)}
+
 A_REVERSED = {"motor_wiring": (-1, 2, 3)}
+
 ALL_REVERSED = {"motor_wiring": (-1, -2, -3)}
+
 FAST = {"linear_scale": 70 / 2.38}
+
 FAST_TURNS = {"angular_scale": 500 / 2.38}
+
 BY_HALF, TURNS_BY_HALF = {"linear_scale": 70 / 1.5}, {"angular_scale": 500 / 1.6}
+
 DISOBEYING = {
     "too fast": (FAST, FORWARD, "moves faster", "`linear_scale`"),
     "too fast, slowly": (FAST, SLOWLY, "moves faster", "`linear_scale`"),
@@ -47,11 +50,6 @@ DISOBEYING = {
     "motor A reversed": (A_REVERSED, SLOWLY, "wrong direction", "wiring of the wheels"),
     "all reversed": (ALL_REVERSED, TURN_SLOWLY, "wrong direction", "wiring of the wheels"),
 }
-
-
-@pytest.fixture
-def bench() -> Bench:
-    return driving()
 
 
 @pytest.mark.parametrize("frame", ["earth", "body", "wheel_counts"])
@@ -101,18 +99,6 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
         bench.drive(speed_mps)
         bench.run(TICK_S)
     assert bench.now - begun <= WITHIN_S
-
-
-def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
-    """A calibration needs that, since it measures wrong settings."""
-    bench = started(BoardSettings(running=True, **A_REVERSED))  # type: ignore[arg-type]
-    stopped_after_s(bench, SLOWLY)
-    bench.configure(motion_monitor=False)
-    assert try_to_drive(bench, 2.0) == 20
-    assert not bench.session.figures(bench.now).commands.monitored
-    bench.configure(motion_monitor=True)
-    assert stopped_after_s(bench, SLOWLY) <= 1.0
-    assert bench.session.figures(bench.now).commands.interlock
 
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
@@ -185,53 +171,6 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
     assert bench.board.truth.x_m < -0.1
 
 
-def test_a_refused_command_says_why() -> None:
-    """It also says what to do."""
-    bench = on_the_wrong_switch("earth")
-    stopped_after_s(bench, SLOWLY)
-    with pytest.raises(CommandRefused, match="the motion monitor has stopped the robot; send a"):
-        bench.drive(*SLOWLY)
-
-
-def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
-    """A zero command does, once; after the second time within a minute only ~/start."""
-    bench = on_the_wrong_switch("earth")
-    stopped_after_s(bench, SLOWLY)
-    assert try_to_drive(bench, 3.0) == 0
-    where = bench.board.truth.x_m
-    assert try_to_drive(bench, 3.0) == 0
-    assert bench.board.truth.x_m == pytest.approx(where, abs=0.001)
-    bench.drive()
-    assert 0 < try_to_drive(bench, 2.0) < 12
-    assert "until ~/start" in bench.notices[-1]
-    bench.drive()
-    bench.run(1.0)
-    assert try_to_drive(bench, 2.0) == 0
-    assert bench.session.figures(bench.now).commands.trips == 2
-    assert bench.ask(Request.START, 5.0).success
-    assert try_to_drive(bench, 1.0) > 0
-
-
-def test_silence_for_the_timeout_lets_it_move_again() -> None:
-    """The sender has let go."""
-    bench = on_the_wrong_switch("earth")
-    stopped_after_s(bench, SLOWLY)
-    assert try_to_drive(bench, 2.0) == 0
-    assert bench.session.figures(bench.now).commands.interlock
-    bench.run(0.6)
-    assert try_to_drive(bench, 0.1) == 1
-    assert not bench.session.figures(bench.now).commands.interlock
-
-
-def test_the_e_stop_works_while_motion_is_refused() -> None:
-    """Its release does not end the refusal."""
-    bench = on_the_wrong_switch("earth")
-    stopped_after_s(bench, SLOWLY)
-    assert estop(bench, True) == "e-stop latched"
-    estop(bench, False)
-    assert try_to_drive(bench, 0.3) == 0
-
-
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
     """A sender of goals must not restart it in jerks."""
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
@@ -256,124 +195,3 @@ def test_a_robot_that_is_faster_than_it_can_be_is_stopped() -> None:
     assert bench.now - begun <= WITHIN_S
     assert [text for text in bench.notices if "`fastest_linear_speed`" in text]
     assert bench.session.figures(bench.now).commands.trips == 1
-
-
-def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
-    """Blocked wheels, no motor power, or a switch that stands on position; it is not stopped."""
-    bench = started(BoardSettings(running=True, control="position"), control="velocity")
-    for _ in range(10):
-        drive_on(bench)
-    assert len(bench.notices) == 1
-    assert "`control_method`" in bench.notices[0]
-    assert bench.session.figures(bench.now).commands.trips == 0
-
-
-@pytest.mark.parametrize("held_s", [0.3, 0.8, 3.0])
-@pytest.mark.parametrize("gains", [WheelGains(), WheelGains(proportional=0.0, integral=0.3)])
-def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
-    held_s: float, gains: WheelGains
-) -> None:
-    """Its wheel controllers have wound up, and Stop would not unwind them."""
-    bench = driving(wheel_gains=gains)
-    bench.board.grip()
-    for _ in range(round(held_s / PERIOD_S)):
-        bench.drive(0.4)
-        bench.run(PERIOD_S)
-    bench.board.let_go()
-    for _ in range(20):
-        bench.drive(0.4)
-        bench.run(PERIOD_S)
-    assert len(bench.notices) == (held_s > 1.0)
-    assert bench.session.figures(bench.now).commands.trips == 0
-
-
-def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
-    """The cable to it was cut twice."""
-    bench = standing()
-    for hears in (False, True, False):
-        bench.hears = hears
-        for _ in range(10):
-            drive_on(bench)
-        bench.drive()
-        bench.run(3.0)
-        bench.hears = True
-        bench.run(3.0)
-    assert len([text for text in bench.notices if "does not move" in text]) == 2
-
-
-def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
-    """Motion within the noise cannot be judged."""
-    for _ in range(40):
-        bench.drive(0.001, 0.0, 0.01)
-        bench.run(0.1)
-    for _ in range(40):
-        bench.drive()
-        bench.run(0.1)
-    assert bench.notices == []
-
-
-def test_in_imu_only_mode_nothing_is_found() -> None:
-    """There are no displacements to compare."""
-    bench = Bench(BoardSettings(running=True, imu_only=True, **FAST))  # type: ignore[arg-type]
-    bench.open()
-    bench.run_until_state("imu_only")
-    for _ in range(10):
-        drive_on(bench)
-    bench.run(5.0)
-    assert not [text for text in bench.notices if text.startswith("robot")]
-    assert bench.session.figures(bench.now).commands.trips == 0
-
-
-def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench: Bench) -> None:
-    """The cut outlasts the first Stops; its deltas show that it drives on."""
-    bench.hears = False
-    bench.run(20.0)
-    assert not bench.still()
-    assert len([text for text in bench.notices if "without a command" in text]) == 1
-    bench.hears = True
-    bench.run(0.5)
-    assert bench.still()
-    bench.run(3.0)
-    start = len(bench.written)
-    bench.run(3.0)
-    assert bench.written_since(start) == b""
-
-
-def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> None:
-    """Stopping takes a moment, and a bump is not a drive."""
-    bench.run(4.0)
-    for _ in range(5):
-        push(bench, 0.005, 0.0, 0.0)
-        bench.run(0.4)
-    assert bench.notices == []
-
-
-def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
-    """Stop at once, then ever more rarely; nothing is refused afterwards."""
-    bench = standing()
-    bench.board.grip(0.3, 0.0, 0.2)
-    start = len(bench.written)
-    begun = bench.now
-    while bench.written_since(start) == b"":
-        bench.run(TICK_S)
-    assert bench.now - begun <= WITHIN_S
-    bench.run(80.0)
-    times = [at - begun for at, _ in bench.written[start:]]
-    assert sum(40.0 < at < 80.0 for at in times) <= 150
-    assert len([text for text in bench.notices if "without a command" in text]) == 1
-    bench.board.let_go()
-    bench.run(1.0)
-    drive_on(bench)
-    assert not bench.still()
-
-
-def test_the_stops_for_a_robot_that_moves_without_a_command_do_not_hinder_the_next_one(
-    bench: Bench,
-) -> None:
-    """They are harmless, and a command replaces them."""
-    bench.hears = False
-    bench.run(4.0)
-    bench.hears = True
-    drive_on(bench)
-    assert not bench.still()
-    assert bench.written[-1][1] != STOP

@@ -1,0 +1,85 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The e-stop in the stream of set-points, and its release."""
+
+import pytest
+from set_point_bench import BOTH, GO, STOP, TURN, Stream, make_stream, order, run
+
+from omnibot_driver.core.commands.set_points import Authority
+from omnibot_driver.core.packets import packed
+
+
+@pytest.fixture
+def stream() -> Stream:
+    return make_stream()
+
+
+def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
+    """It is sent twice, even if it was sent just before."""
+    stream.latch(1.0)
+    stream.write(1.0)
+    stream.connect(1.001)
+    assert stream.write(1.001) == 2 * BOTH
+
+
+def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
+    """Neither the Stop between them nor the newer command is sent."""
+    order(stream, GO, 1.0)
+    stream.write(1.0)
+    order(stream, TURN, 1.001, Authority.WHEELS)
+    stream.latch(1.001)
+    assert stream.current is None
+    assert {frame for _, frame in run(stream, 1.001, 1.2)} == {2 * BOTH, BOTH}
+
+
+def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
+    """Stop with it: firmware that ignores mode 10 has to stand as well. At first both twice."""
+    order(stream, GO, 1.0)
+    stream.write(1.0)
+    stream.latch(1.001)
+    assert stream.write(1.001) == 2 * BOTH
+    written = run(stream, 1.001, 101.0)
+    assert {frame for _, frame in written} == {BOTH}
+    assert len(written) == pytest.approx(2000, abs=2)
+
+
+def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
+    stream: Stream,
+) -> None:
+    """Letters at 50 Hz, and the stop still goes out at 20 Hz."""
+    stream.latch(1.0)
+    written = 0
+    for step in range(1000):
+        now = 1.0 + step * 0.001
+        if step % 20 == 7:
+            stream.actuator.wrote(packed(b"S"), now)
+        written += stream.write(now) in (BOTH, 2 * BOTH)
+    assert written >= 20
+
+
+def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
+    """A button node may publish as fast as it likes; the line has to take other things too."""
+    written = []
+    for step in range(1000):
+        now = 1.0 + step * 0.001
+        stream.latch(now)
+        written.append(stream.write(now))
+    assert written.count(2 * BOTH) == 1
+    assert written.count(BOTH) == pytest.approx(19, abs=1)
+
+
+def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: Stream) -> None:
+    """The robot moves again only on a command that is newer than the release."""
+    order(stream, GO, 1.0)
+    stream.write(1.0)
+    stream.latch(1.1)
+    stream.write(1.1)
+    stream.release(1.2)
+    assert {frame for _, frame in run(stream, 1.2, 5.0)} == {STOP}
+
+
+def test_a_release_without_a_latch_does_nothing(stream: Stream) -> None:
+    """Releasing twice must not stop a robot that drives again."""
+    order(stream, GO, 1.0)
+    stream.release(1.0)
+    assert stream.write(1.0) == GO

@@ -1,0 +1,76 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a robot that the motion monitor has stopped needs before it may move again."""
+
+import pytest
+from disobedient_robots import (
+    SLOWLY,
+    on_the_wrong_switch,
+    started,
+    stopped_after_s,
+    try_to_drive,
+)
+from robots import estop
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.requests import Request
+from omnibot_driver.simulator.omnibot import BoardSettings
+
+
+def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
+    """A calibration needs that, since it measures wrong settings."""
+    bench = started(BoardSettings(running=True, motor_wiring=(-1, 2, 3)))
+    stopped_after_s(bench, SLOWLY)
+    bench.configure(motion_monitor=False)
+    assert try_to_drive(bench, 2.0) == 20
+    assert not bench.session.figures(bench.now).commands.monitored
+    bench.configure(motion_monitor=True)
+    assert stopped_after_s(bench, SLOWLY) <= 1.0
+    assert bench.session.figures(bench.now).commands.interlock
+
+
+def test_a_refused_command_says_why() -> None:
+    """It also says what to do."""
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    with pytest.raises(CommandRefused, match="the motion monitor has stopped the robot; send a"):
+        bench.drive(*SLOWLY)
+
+
+def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
+    """A zero command does, once; after the second time within a minute only ~/start."""
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    assert try_to_drive(bench, 3.0) == 0
+    where = bench.board.truth.x_m
+    assert try_to_drive(bench, 3.0) == 0
+    assert bench.board.truth.x_m == pytest.approx(where, abs=0.001)
+    bench.drive()
+    assert 0 < try_to_drive(bench, 2.0) < 12
+    assert "until ~/start" in bench.notices[-1]
+    bench.drive()
+    bench.run(1.0)
+    assert try_to_drive(bench, 2.0) == 0
+    assert bench.session.figures(bench.now).commands.trips == 2
+    assert bench.ask(Request.START, 5.0).success
+    assert try_to_drive(bench, 1.0) > 0
+
+
+def test_silence_for_the_timeout_lets_it_move_again() -> None:
+    """The sender has let go."""
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    assert try_to_drive(bench, 2.0) == 0
+    assert bench.session.figures(bench.now).commands.interlock
+    bench.run(0.6)
+    assert try_to_drive(bench, 0.1) == 1
+    assert not bench.session.figures(bench.now).commands.interlock
+
+
+def test_the_e_stop_works_while_motion_is_refused() -> None:
+    """Its release does not end the refusal."""
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    assert estop(bench, True) == "e-stop latched"
+    estop(bench, False)
+    assert try_to_drive(bench, 0.3) == 0

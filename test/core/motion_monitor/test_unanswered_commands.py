@@ -1,0 +1,140 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A robot that does not move when it is commanded, or moves when it is not."""
+
+import pytest
+from disobedient_robots import (
+    PERIOD_S,
+    started,
+)
+from robots import drive_on, driving, push, standing
+from session_bench import STOP, TICK_S, Bench
+
+from omnibot_driver.simulator.omnibot import BoardSettings
+from omnibot_driver.simulator.omnibot.motors import WheelGains
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return driving()
+
+
+def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
+    """Blocked wheels, no motor power, or a switch that stands on position; it is not stopped."""
+    bench = started(BoardSettings(running=True, control="position"), control="velocity")
+    for _ in range(10):
+        drive_on(bench)
+    assert len(bench.notices) == 1
+    assert "`control_method`" in bench.notices[0]
+    assert bench.session.figures(bench.now).commands.trips == 0
+
+
+@pytest.mark.parametrize("held_s", [0.3, 0.8, 3.0])
+@pytest.mark.parametrize("gains", [WheelGains(), WheelGains(proportional=0.0, integral=0.3)])
+def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
+    held_s: float, gains: WheelGains
+) -> None:
+    """Its wheel controllers have wound up, and Stop would not unwind them."""
+    bench = driving(wheel_gains=gains)
+    bench.board.grip()
+    for _ in range(round(held_s / PERIOD_S)):
+        bench.drive(0.4)
+        bench.run(PERIOD_S)
+    bench.board.let_go()
+    for _ in range(20):
+        bench.drive(0.4)
+        bench.run(PERIOD_S)
+    assert len(bench.notices) == (held_s > 1.0)
+    assert bench.session.figures(bench.now).commands.trips == 0
+
+
+def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
+    """The cable to it was cut twice."""
+    bench = standing()
+    for hears in (False, True, False):
+        bench.hears = hears
+        for _ in range(10):
+            drive_on(bench)
+        bench.drive()
+        bench.run(3.0)
+        bench.hears = True
+        bench.run(3.0)
+    assert len([text for text in bench.notices if "does not move" in text]) == 2
+
+
+def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
+    """Motion within the noise cannot be judged."""
+    for _ in range(40):
+        bench.drive(0.001, 0.0, 0.01)
+        bench.run(0.1)
+    for _ in range(40):
+        bench.drive()
+        bench.run(0.1)
+    assert bench.notices == []
+
+
+def test_in_imu_only_mode_nothing_is_found() -> None:
+    """There are no displacements to compare."""
+    bench = Bench(BoardSettings(running=True, imu_only=True, linear_scale=70 / 2.38))
+    bench.open()
+    bench.run_until_state("imu_only")
+    for _ in range(10):
+        drive_on(bench)
+    bench.run(5.0)
+    assert not [text for text in bench.notices if text.startswith("robot")]
+    assert bench.session.figures(bench.now).commands.trips == 0
+
+
+def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench: Bench) -> None:
+    """The cut outlasts the first Stops; its deltas show that it drives on."""
+    bench.hears = False
+    bench.run(20.0)
+    assert not bench.still()
+    assert len([text for text in bench.notices if "without a command" in text]) == 1
+    bench.hears = True
+    bench.run(0.5)
+    assert bench.still()
+    bench.run(3.0)
+    start = len(bench.written)
+    bench.run(3.0)
+    assert bench.written_since(start) == b""
+
+
+def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> None:
+    """Stopping takes a moment, and a bump is not a drive."""
+    bench.run(4.0)
+    for _ in range(5):
+        push(bench, 0.005, 0.0, 0.0)
+        bench.run(0.4)
+    assert bench.notices == []
+
+
+def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
+    """Stop at once, then ever more rarely; nothing is refused afterwards."""
+    bench = standing()
+    bench.board.grip(0.3, 0.0, 0.2)
+    start = len(bench.written)
+    begun = bench.now
+    while bench.written_since(start) == b"":
+        bench.run(TICK_S)
+    assert bench.now - begun <= 0.3
+    bench.run(80.0)
+    times = [at - begun for at, _ in bench.written[start:]]
+    assert sum(40.0 < at < 80.0 for at in times) <= 150
+    assert len([text for text in bench.notices if "without a command" in text]) == 1
+    bench.board.let_go()
+    bench.run(1.0)
+    drive_on(bench)
+    assert not bench.still()
+
+
+def test_the_stops_for_a_robot_that_moves_without_a_command_do_not_hinder_the_next_one(
+    bench: Bench,
+) -> None:
+    """They are harmless, and a command replaces them."""
+    bench.hears = False
+    bench.run(4.0)
+    bench.hears = True
+    drive_on(bench)
+    assert not bench.still()
+    assert bench.written[-1][1] != STOP

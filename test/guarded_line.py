@@ -1,0 +1,106 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A line with a guard, and how a test acts as the driver that it guards."""
+
+import contextlib
+import os
+import select
+import signal
+import time
+import tty
+from collections.abc import Callable
+from pathlib import Path
+
+from terminal import fill
+
+from omnibot_driver.keeper import Keeper
+
+PATIENCE_S = 20.0
+
+
+LAST_WORDS = b"these are my last words"
+
+
+LATCHED_WORDS = b"and these under the e-stop"
+
+
+class Line:
+    """A pseudo-terminal: ``near`` is the driver's port; the far end is read here."""
+
+    def __init__(self) -> None:
+        self._far, self.near = os.openpty()
+        tty.setraw(self.near)
+        os.set_blocking(self.near, False)
+        self.heard = b""
+        self._others = children()
+
+    def children(self) -> list[int]:
+        """The processes begun since this line was made, zombies included."""
+        return [pid for pid in children() if pid not in self._others]
+
+    def hear(self, words: bytes) -> bytes:
+        """Everything so far, once these words are in it."""
+        end = time.monotonic() + PATIENCE_S
+        while words not in self.heard:
+            assert select.select([self._far], [], [], end - time.monotonic())[0], self.heard
+            self.heard += os.read(self._far, 4096)
+        return self.heard
+
+    def fill(self) -> None:
+        """Fill the terminal's buffer."""
+        fill(self.near)
+
+    def hang_up(self) -> None:
+        os.close(self._far)
+        self._far = -1
+
+    def close(self) -> None:
+        os.close(self.near)
+        if self._far >= 0:
+            os.close(self._far)
+
+
+def children() -> list[int]:
+    """Our child processes, zombies included."""
+    found = []
+    for directory in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            after_name = (directory / "stat").read_text().rpartition(")")[2].split()
+            if int(after_name[1]) == os.getpid():
+                found.append(int(directory.name))
+    return found
+
+
+def started(pid: int) -> None:
+    """Wait until Python has come up in it, and it does not heed SIGTERM any more."""
+    end = time.monotonic() + PATIENCE_S
+    bit = 1 << (signal.SIGTERM - 1)
+    while not int(status_of(pid, "SigIgn"), 16) & bit:
+        assert time.monotonic() < end
+        time.sleep(0.005)  # what a process ignores changes without an event
+
+
+def status_of(pid: int, field: str) -> str:
+    text = Path(f"/proc/{pid}/status").read_text(encoding="ascii")
+    return text.partition(f"{field}:")[2].split()[0]
+
+
+def alive(keeper: Keeper, seconds: float) -> float:
+    """Beat as the driver does, whose pace is the thing itself; the longest pause in between."""
+    begun_s = beaten_s = time.monotonic()
+    longest_s = 0.0
+    while (now := time.monotonic()) < begun_s + seconds:
+        keeper.beat(now)
+        time.sleep(0.05)
+        longest_s, beaten_s = max(longest_s, time.monotonic() - beaten_s), now
+    return longest_s
+
+
+def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
+    """Beat as the driver does until the condition holds; returns the messages."""
+    told, end = "", time.monotonic() + PATIENCE_S
+    while not predicate():
+        assert time.monotonic() < end
+        told += keeper.beat(time.monotonic())
+        time.sleep(0.05)
+    return told

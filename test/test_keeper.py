@@ -1,0 +1,155 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Guards that die, hang, or cannot be started: the driver replaces them and does not wait."""
+
+import contextlib
+import os
+import signal
+import threading
+
+import pytest
+from guarded_line import LAST_WORDS, LATCHED_WORDS, PATIENCE_S, Line, beat_until, started
+
+from omnibot_driver.core.packets import packed
+from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
+
+
+def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
+    """It would say old ones."""
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    (first,) = line.children()
+    os.kill(first, signal.SIGSTOP)
+    os.waitid(os.P_PID, first, os.WSTOPPED)
+    for number in range(200):
+        keeper.change(packed(b"%d" % number + bytes(1000)), packed(LATCHED_WORDS))
+    keeper.change(packed(b"newest"), packed(LATCHED_WORDS))
+    beat_until(keeper, lambda: line.children() not in ([first], []))
+    keeper.end(stopped=False)
+    assert LAST_WORDS not in line.hear(2 * b"newest")
+
+
+def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
+    """It has not come up yet."""
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    children = line.children()
+    for number in range(30):
+        keeper.change(packed(b"%d" % number), packed(LATCHED_WORDS))
+        assert keeper.beat(1000.0) == ""
+    assert line.children() == children
+    keeper.end(stopped=True)
+
+
+def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
+    """The new one guards."""
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    (first,) = line.children()
+    os.kill(first, signal.SIGKILL)
+    told = beat_until(keeper, lambda: line.children() not in ([first], []))
+    assert "exit code -9" in told
+    assert told.count("starting another one") == 1
+    (second,) = line.children()
+    os.kill(second, signal.SIGKILL)
+    assert beat_until(keeper, lambda: line.children() not in ([second], [])) == ""
+    keeper.end(stopped=False)
+    line.hear(LAST_WORDS)
+
+
+def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The driver drives on without."""
+    with monkeypatch.context() as without:
+        without.setattr("sys.executable", "/no/python")
+        keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+        assert "cannot start the guard process" in keeper.beat(1000.0)
+    assert keeper.beat(1000.5) == ""
+    assert line.children() == []
+    keeper.beat(1001.5)
+    keeper.end(stopped=False)
+    line.hear(LAST_WORDS)
+
+
+def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
+    """A stopped guard would not stop the robot; the driver does not wait until its pipe is full."""
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    (first,) = line.children()
+    started(first)
+    os.kill(first, signal.SIGSTOP)
+    os.waitid(os.P_PID, first, os.WSTOPPED)
+    assert [keeper.beat(1000.0) for _ in range(HANGS_AFTER)] == [""] * HANGS_AFTER
+    assert line.children() == [first]
+    assert keeper.beat(1000.0) == "the guard process hung; starting another one"
+    beat_until(keeper, lambda: first not in line.children())
+    keeper.end(stopped=False)
+    line.hear(LAST_WORDS)
+
+
+def test_a_guard_that_does_not_die_never_holds_up_a_beat(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in an uninterruptible sleep. It is replaced at once, and reaped later."""
+    monkeypatch.setattr("subprocess.Popen.wait", lambda *_: pytest.fail("a beat waits"))
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    (first,) = line.children()
+    started(first)
+    os.kill(first, signal.SIGSTOP)
+    os.waitid(os.P_PID, first, os.WSTOPPED)
+    with monkeypatch.context() as undying:
+        undying.setattr("subprocess.Popen.kill", lambda _process: None)
+        told = [keeper.beat(1000.0 + n * BEAT_S) for n in range(HANGS_AFTER + 2)]
+        assert [text for text in told if text] == ["the guard process hung; starting another one"]
+        assert len(line.children()) == 2
+        assert first in line.children()
+    os.kill(first, signal.SIGKILL)
+    beat_until(keeper, lambda: first not in line.children())
+    monkeypatch.undo()
+    keeper.end(stopped=False)
+    line.hear(LAST_WORDS)
+
+
+def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    """More guards would not help on a host where nothing can be killed."""
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    stopped: set[int] = set()
+    with monkeypatch.context() as undying:
+        undying.setattr("subprocess.Popen.kill", lambda _process: None)
+        for second in range(10 * HANGS_AFTER):
+            for pid in set(line.children()) - stopped:
+                os.kill(pid, signal.SIGSTOP)
+                os.waitid(os.P_PID, pid, os.WSTOPPED)
+                stopped.add(pid)
+            keeper.beat(1000.0 + second)
+    assert len(line.children()) == MOST_DYING
+    for pid in stopped:
+        os.kill(pid, signal.SIGKILL)
+    beat_until(keeper, lambda: stopped.isdisjoint(line.children()))
+    keeper.end(stopped=False)
+    line.hear(LAST_WORDS)
+
+
+def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
+    """It does not hear the good-bye."""
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    (pid,) = line.children()
+    os.kill(pid, signal.SIGSTOP)
+    keeper.end(stopped=True)
+
+
+@pytest.mark.filterwarnings("ignore:subprocess .* is still running:ResourceWarning")
+def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stopped process that no signal reaches stands for an uninterruptible sleep."""
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    (pid,) = line.children()
+    os.kill(pid, signal.SIGSTOP)
+    monkeypatch.setattr("subprocess.Popen.kill", lambda _process: None)
+    ending = threading.Thread(target=keeper.end, kwargs={"stopped": True})
+    ending.start()
+    ending.join(PATIENCE_S)
+    ended = not ending.is_alive()
+    os.kill(pid, signal.SIGKILL)
+    ending.join()
+    with contextlib.suppress(ChildProcessError):
+        os.waitpid(pid, 0)
+    assert ended

@@ -1,0 +1,96 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A driver that did not run for a while: the robot is stopped, and what waited is refused."""
+
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+
+import pytest
+from listener import PATIENCE_S, STOP, Listener, link_to, session
+
+from omnibot_driver import stall_detector
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.session import Session
+from omnibot_driver.simulator.omnibot import PtyBoard
+
+pytestmark = pytest.mark.usefixtures("nothing_left_behind")
+
+
+def obeyed(command: Callable[[], None]) -> bool:
+    """Commands may be refused just after a stall, when the reader runs before the pacer."""
+    try:
+        command()
+    except CommandRefused:
+        return False
+    return True
+
+
+def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
+    board: PtyBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thread with the lock keeps the pacer from passing; what is sent later is obeyed."""
+    monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
+    listener, ours = Listener(), session()
+    link = link_to(board.path, listener, ours)
+    link.start()
+    listener.wait_for(lambda: ours.state == "nominal")
+    drive = partial(link.command, Session.command_twist, BodyTwist(0.2, 0.0, 0.0))
+    for _ in range(20):  # a machine that hangs is another standstill
+        if obeyed(lambda: drive([time.time_ns()])) and board.wait_for(lambda b: b.driven, 0.3):
+            break
+    else:
+        raise AssertionError("it does not drive")
+    hold, held = threading.Event(), threading.Event()
+
+    def hang(_session: Session, _now: float) -> None:
+        held.set()
+        hold.wait(PATIENCE_S)
+
+    holder = threading.Thread(target=link.call, args=(hang,))
+    holder.start()
+    held.wait(PATIENCE_S)
+    assert board.wait_for(lambda b: not b.driven, PATIENCE_S)
+    sent_ns = time.time_ns()
+    hold.set()
+    holder.join(PATIENCE_S)
+    with pytest.raises(CommandRefused, match="waited"):
+        drive([sent_ns])
+    with pytest.raises(CommandRefused, match="waited while the driver was stalled"):
+        drive([time.time_ns(), sent_ns])  # or so, as little is known of its sender
+    listener.wait_for(lambda: any("stalled" in str(event) for event in listener.events))
+    assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
+
+    listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
+    link.close("stop")
+
+
+def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No thread misses a beat by the steady clock; the robot is still stopped."""
+    suspended_s = 0.0
+    monkeypatch.setattr(
+        "omnibot_driver.shared_session.boot_time_s",
+        lambda: stall_detector.boot_time_s() + suspended_s,
+    )
+    monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
+    listener, ours = Listener(), session()
+    link = link_to(board.path, listener, ours)
+    link.start()
+    listener.wait_for(lambda: ours.state == "nominal")
+    drive = partial(link.command, Session.command_twist, BodyTwist(0.3, 0.0, 0.0))
+    for _ in range(20):  # a machine that hangs is another standstill
+        fresh = obeyed(lambda: drive([time.time_ns()]))
+        if fresh and board.wait_for(lambda b: b.commands[-1].kind == "velocity", 0.3):
+            break
+    else:
+        raise AssertionError("it does not drive")
+    suspended_s = 3600.0
+    assert board.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
+    listener.wait_for(lambda: any("for 36" in str(event) for event in listener.events))
+    with pytest.raises(CommandRefused, match="waited"):
+        drive([time.time_ns() - 1_000_000_000])  # while it was suspended, by a clock that went on
+    listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
+    assert board.wait_for(lambda b: b.commands[-1].kind == "velocity", PATIENCE_S)
+    link.close("stop")
