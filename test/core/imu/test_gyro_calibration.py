@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from random import Random
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omnibot_driver.core.imu.gyro_calibration import (
@@ -164,6 +164,7 @@ def test_a_measurement_that_is_given_up_says_why_once() -> None:
 
 
 @pytest.mark.slow
+@settings(max_examples=25)
 @given(biases)
 def test_standstills_refine_the_bias_little_by_little(bias: Vector3) -> None:
     """The bias moves by a twentieth of the difference each second."""

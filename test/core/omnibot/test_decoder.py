@@ -10,7 +10,7 @@ from random import Random
 
 import pytest
 from frame_strategies import believable_frames, frames
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from strategies import chunkings, cut
 from streams import (
@@ -64,7 +64,6 @@ def test_an_undamaged_stream_is_decoded_in_random_chunks(name: str) -> None:
 
 @pytest.mark.slow
 @given(st.lists(believable_frames, max_size=25), st.data())
-@settings(max_examples=300)
 def test_in_step_any_content_is_delivered_in_any_chunks(
     sent: list[Frame], data: st.DataObject
 ) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import pytest
 from frame_strategies import triples
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from streams import BYTE_S, LEAD_IN, REST, RUNNING_STREAMS, TICK_S, frames_of, ticks_of
 
@@ -91,7 +91,6 @@ def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: in
     st.lists(st.tuples(triples, triples, st.booleans()), min_size=4, max_size=12),
     st.lists(st.floats(0.0, 0.03), min_size=1, max_size=12),
 )
-@settings(max_examples=300)
 def test_any_content_comes_through_a_reader_that_is_always_late(
     content: list[tuple[tuple[int, int, int], tuple[int, int, int], bool]], late_s: list[float]
 ) -> None:

@@ -6,7 +6,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from session_bench import TICK_S, Bench
 
@@ -44,6 +44,7 @@ def step(before: OdometryEstimate, after: OdometryEstimate) -> float:
 
 
 @pytest.mark.slow
+@settings(max_examples=30)
 @given(st.integers(20, 700), st.sampled_from(["earth", "body"]), st.floats(-0.4, 0.4))
 @example(ticks=400, frame="earth", vx=0.4)
 @example(ticks=592, frame="earth", vx=0.0)
