@@ -8,14 +8,12 @@ Hypothesis tries the same examples in every run, so what turns red was changed;
 
 import os
 import threading
-import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
 from interpreted import INTERPRETED
-from listener import PATIENCE_S
 from terminal import Terminal
 
 if TYPE_CHECKING:
@@ -26,6 +24,9 @@ if TYPE_CHECKING:
 # Domains 0 to 101 are safe on every platform; 0 is everybody's default.
 os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 101)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+
+ENDS_WITHIN_S = 60.0
+"""A thread of a link that was closed; the driver itself waits for it less long."""
 
 settings.register_profile("exploring", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("same", settings.get_profile("exploring"), derandomize=True)
@@ -42,9 +43,9 @@ def nothing_left_behind() -> Iterator[None]:
     """Every link, port and board that a test opens gives its threads and descriptors back."""
     threads, descriptors = driver_threads(), os.listdir("/proc/self/fd")
     yield
-    until = time.monotonic() + PATIENCE_S  # a link does not wait for long for a thread that is busy
-    while driver_threads() != threads and time.monotonic() < until:
-        time.sleep(0.01)
+    for thread in threading.enumerate():
+        if thread.name in driver_threads() and thread.name not in threads:
+            thread.join(ENDS_WITHIN_S)
     assert driver_threads() == threads
     assert len(os.listdir("/proc/self/fd")) == len(descriptors)
 

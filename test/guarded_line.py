@@ -15,7 +15,7 @@ from terminal import fill
 
 from omnibot_driver.keeper import Keeper
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 LAST_WORDS = b"these are my last words"
@@ -91,7 +91,7 @@ def alive(keeper: Keeper, seconds: float) -> float:
     longest_s = 0.0
     while (now := time.monotonic()) < begun_s + seconds:
         keeper.beat(now)
-        time.sleep(0.05)
+        time.sleep(0.05)  # the driver's own pace is what is simulated
         longest_s, beaten_s = max(longest_s, time.monotonic() - beaten_s), now
     return longest_s
 
@@ -102,5 +102,11 @@ def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
     while not predicate():
         assert time.monotonic() < end
         told += keeper.beat(time.monotonic())
-        time.sleep(0.05)
+        time.sleep(0.05)  # the driver's own pace is what is simulated
     return told
+
+
+def replaced(line: Line, guard: int) -> bool:
+    """Whether another guard runs, and this one has ended and is no zombie."""
+    found = line.children()
+    return bool(found) and guard not in found

@@ -19,7 +19,7 @@ from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link
 from omnibot_driver.simulator.omnibot import SimulatedBoard
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 STOP = bytes(8) + bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 EMERGENCY_STOP = bytes(8) + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
 START = bytes(8) + b"S"

@@ -13,7 +13,7 @@ import threading
 from collections.abc import Sequence
 from typing import Self
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 class PseudoTerminal:

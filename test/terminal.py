@@ -8,7 +8,7 @@ import select
 import time
 import tty
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 def fill(descriptor: int, words: bytes = b"x") -> None:
@@ -23,7 +23,7 @@ def fill(descriptor: int, words: bytes = b"x") -> None:
             while True:
                 taken += os.write(descriptor, words[taken % len(words) :])
                 full = 0
-        time.sleep(0.01)
+        time.sleep(0.01)  # no event says that the kernel has moved it
 
 
 class Terminal:

@@ -17,6 +17,7 @@ from guarded_line import (
     Line,
     alive,
     beat_until,
+    replaced,
     started,
     status_of,
 )
@@ -72,7 +73,7 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
     line.hear(2 * b"newest latched")  # no heartbeat comes
     assert LAST_WORDS not in line.heard
     os.kill(first, signal.SIGKILL)
-    beat_until(keeper, lambda: line.children() not in ([first], []))
+    beat_until(keeper, lambda: replaced(line, first))
     keeper.end(stopped=False)
     assert b"missing" not in line.hear(2 * b"newest" + b"newest")
 

@@ -8,7 +8,7 @@ import signal
 import threading
 
 import pytest
-from guarded_line import LAST_WORDS, LATCHED_WORDS, PATIENCE_S, Line, beat_until, started
+from guarded_line import LAST_WORDS, LATCHED_WORDS, PATIENCE_S, Line, beat_until, replaced, started
 
 from omnibot_driver.core.packets import packed
 from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
@@ -23,7 +23,7 @@ def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Lin
     for number in range(200):
         keeper.change(packed(b"%d" % number + bytes(1000)), packed(LATCHED_WORDS))
     keeper.change(packed(b"newest"), packed(LATCHED_WORDS))
-    beat_until(keeper, lambda: line.children() not in ([first], []))
+    beat_until(keeper, lambda: replaced(line, first))
     keeper.end(stopped=False)
     assert LAST_WORDS not in line.hear(2 * b"newest")
 
@@ -44,12 +44,12 @@ def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGKILL)
-    told = beat_until(keeper, lambda: line.children() not in ([first], []))
+    told = beat_until(keeper, lambda: replaced(line, first))
     assert "exit code -9" in told
     assert told.count("starting another one") == 1
     (second,) = line.children()
     os.kill(second, signal.SIGKILL)
-    assert beat_until(keeper, lambda: line.children() not in ([second], [])) == ""
+    assert beat_until(keeper, lambda: replaced(line, second)) == ""
     keeper.end(stopped=False)
     line.hear(LAST_WORDS)
 

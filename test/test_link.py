@@ -42,7 +42,7 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
         if board.wait_for(lambda b, n=before: kinds(b)[n:].count("velocity") > 3, 1.0):  # type: ignore[misc]
             break
     assert kinds(board.board)[before:].count("velocity") > 3
-    assert board.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
+    assert board.wait_for(lambda b: kinds(b)[-1:] == ["wheels"], PATIENCE_S)
     link.close("stop")
 
 

@@ -44,7 +44,7 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
     def press(name: str) -> None:
         for active in 20 * (True, False):
             link.call(partial(estop, active, name))
-            time.sleep(0.001)
+            time.sleep(0.001)  # the reader and the pacer take their turns meanwhile
 
     def estop(active: bool, by: str, session: Session, now: float) -> None:
         session.estop(active, now, by=by)

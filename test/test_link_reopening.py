@@ -70,7 +70,7 @@ def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_pat
         listener.wait_for(lambda: ours.state == "disconnected")
         name.symlink_to(second.path)
         listener.wait_for(lambda: ours.state == "nominal")
-        assert second.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
+        assert second.wait_for(lambda b: kinds(b)[-1:] == ["wheels"], PATIENCE_S)
         with second.lock:
             assert "velocity" not in kinds(second.board)
         link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))

@@ -7,7 +7,6 @@ the network does beyond what the driver assumes is named so.
 """
 
 import socket
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -249,7 +248,6 @@ def url(_folder: Path) -> str:
                 try:
                     second.bind(("127.0.0.1", number + 1))
                 except OSError:
-                    time.sleep(0.01)
                     continue
                 return f"udp://127.0.0.1:{number}"
     raise OSError("no two UDP ports in a row are free")

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
 
-PATIENCE_S = 60.0
+PATIENCE_S = 120.0
 """How long an event is awaited before a test gives up; no test asserts how long it took."""
 
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:

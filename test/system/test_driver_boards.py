@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from driver_process import Driver
+from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from plain_board import PARAMETERS
@@ -88,7 +88,7 @@ def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: St
     twist = Twist()
     twist.linear.x = 0.1
     probe.publisher(Twist, "cmd_vel").publish(twist)
-    assert board.wait_for(lambda b: b.commands[-1].values == (7, 0, 0), 20.0)
+    assert board.wait_for(lambda b: b.commands[-1].values == (7, 0, 0), PATIENCE_S)
     assert probe.call(Trigger, "ask").message == "nominal"
     probe.wait_for(
         lambda: {f"{NODE}: Stream"} <= {status.name for one in diagnoses for status in one.status}

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from driver_process import Driver
+from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from probe import Probe
@@ -35,8 +35,10 @@ def test_cmd_vel_reaches_the_board_as_the_manuals_frame(probe: Probe, board: Pty
     twist = Twist()
     twist.linear.x, twist.linear.y, twist.angular.z = 0.3, -0.2, 0.5
     commands.publish(twist)
-    assert board.wait_for(lambda b: obeyed(b, "velocity", 21, -14, 250), 20.0)
-    assert board.wait_for(lambda b: newest(b) == ReceivedCommand(newest(b).tick, "wheels"), 20.0)
+    assert board.wait_for(lambda b: obeyed(b, "velocity", 21, -14, 250), PATIENCE_S)
+    assert board.wait_for(
+        lambda b: newest(b) == ReceivedCommand(newest(b).tick, "wheels"), PATIENCE_S
+    )
 
 
 HELD_UP = """
@@ -44,7 +46,7 @@ import time
 import omnibot_driver.node
 def hold_up(_driver, message):
     print("the executor is held up", flush=True)
-    time.sleep(2.0)
+    time.sleep(2.0)  # a callback that hangs, until the command that waits is too old
 omnibot_driver.node.OmniBotDriver._on_estop_topic = hold_up
 """
 
@@ -70,14 +72,14 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
     with board.lock:
         assert all(c.values == (0, 0, 0) for c in list(board.board.commands)[mark:])
     commands.publish(message)
-    assert board.wait_for(lambda b: newest(b).values != (0, 0, 0), 20.0)
+    assert board.wait_for(lambda b: newest(b).values != (0, 0, 0), PATIENCE_S)
 
 
 def test_a_zero_twist_is_the_stop_frame(probe: Probe, board: PtyBoard) -> None:
     """It is never sent as zeros in mode 1."""
     commands = probe.publisher(Twist, "cmd_vel")
     commands.publish(Twist())
-    assert board.wait_for(lambda b: newest(b).kind == "wheels", 20.0)
+    assert board.wait_for(lambda b: newest(b).kind == "wheels", PATIENCE_S)
     with board.lock:
         assert not obeyed(board.board, "velocity", 0, 0, 0)
 
@@ -86,7 +88,7 @@ def test_wheel_cmd_turns_the_wheels(probe: Probe, board: PtyBoard) -> None:
     """10 rad/s of a 29 mm wheel are 20 LSB."""
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=[10.0, -10.0, 0.0]))
-    assert board.wait_for(lambda b: obeyed(b, "wheels", 20, -20, 0), 20.0)
+    assert board.wait_for(lambda b: obeyed(b, "wheels", 20, -20, 0), PATIENCE_S)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +108,7 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
     commands.publish(Float32MultiArray(data=data))
     driver.wait_for_line(f"wheel_cmd rejected.*{reason}")
     commands.publish(Float32MultiArray(data=[10.0, 0.0, 0.0]))
-    assert board.wait_for(lambda b: obeyed(b, "wheels", 20, 0, 0), 20.0)
+    assert board.wait_for(lambda b: obeyed(b, "wheels", 20, 0, 0), PATIENCE_S)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
@@ -131,7 +133,7 @@ def test_a_huge_twist_is_limited_in_its_own_direction(probe: Probe, board: PtyBo
     twist = Twist()
     twist.linear.x = twist.linear.y = 1e300
     commands.publish(twist)
-    assert board.wait_for(lambda b: obeyed(b, "velocity", 25, 25, 0), 20.0)
+    assert board.wait_for(lambda b: obeyed(b, "velocity", 25, 25, 0), PATIENCE_S)
 
 
 def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoard) -> None:
@@ -139,12 +141,12 @@ def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoar
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop")
     button.publish(Bool(data=True))
-    assert board.wait_for(lambda b: "estop" in [c.kind for c in list(b.commands)[-2:]], 20.0)
+    assert board.wait_for(lambda b: "estop" in [c.kind for c in list(b.commands)[-2:]], PATIENCE_S)
     probe.wait_for(lambda: active and active[-1].data)
     button.publish(Bool(data=False))
     with board.lock:
         count = len(board.board.commands)
-    assert board.wait_for(lambda b: len(b.commands) > count + 10, 20.0)
+    assert board.wait_for(lambda b: len(b.commands) > count + 10, PATIENCE_S)
     with board.lock:
         later = list(board.board.commands)[count + 1 :]
     assert {command.kind for command in later} == {"estop", "wheels"}
@@ -163,7 +165,7 @@ def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
     stamped.twist.linear.x = 0.3
     stamped.header.stamp = probe.node.get_clock().now().to_msg()
     commands.publish(stamped)
-    assert board.wait_for(lambda b: obeyed(b, "velocity", 21, 0, 0), 20.0)
+    assert board.wait_for(lambda b: obeyed(b, "velocity", 21, 0, 0), PATIENCE_S)
 
 
 def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is_taken(
@@ -184,7 +186,7 @@ def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is
     stamped = TwistStamped()
     stamped.twist.linear.x = 0.3
     commands.publish(stamped)
-    assert board.wait_for(lambda b: obeyed(b, "velocity", 21, 0, 0), 20.0)
+    assert board.wait_for(lambda b: obeyed(b, "velocity", 21, 0, 0), PATIENCE_S)
 
 
 def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver) -> None:
@@ -223,7 +225,7 @@ def test_a_goal_is_driven_to_with_the_switch_on_position_and_velocities_are_refu
     goal.pose.position.x = 0.25
     goal.pose.orientation.w = 1.0
     probe.publisher(PoseStamped, "cmd_pose").publish(goal)
-    assert board.wait_for(lambda b: newest(b).kind == "pose", 20.0)
+    assert board.wait_for(lambda b: newest(b).kind == "pose", PATIENCE_S)
     probe.wait_for(lambda: odometry[-1].pose.pose.position.x == pytest.approx(0.25, abs=0.005))
     assert odometry[-1].pose.pose.position.y == pytest.approx(0.0, abs=0.005)
     probe.publisher(Twist, "cmd_vel").publish(Twist())

@@ -63,7 +63,7 @@ def wait_until(predicate: Callable[[], object]) -> None:
     end = time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end, "it did not come about"
-        time.sleep(0.02)
+        time.sleep(0.02)  # neither a process that stops nor a file raises an event
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])

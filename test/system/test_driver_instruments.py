@@ -134,7 +134,7 @@ def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
     robot.probe.wait_for(lambda: robot.status("E-stop").level == b"\x01")
     assert "~/estop" in robot.status("E-stop").message
     robot.probe.call(SetBool, "estop", data=False)
-    assert robot.board.wait_for(lambda b: max(map(abs, b.rim_speeds_mps)) < 0.01, 20.0)
+    assert robot.board.wait_for(lambda b: max(map(abs, b.rim_speeds_mps)) < 0.01, PATIENCE_S)
 
 
 def test_diagnostics_come_with_figures(robot: Robot) -> None:

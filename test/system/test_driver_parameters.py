@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from driver_process import Driver
+from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import Twist
 from probe import Probe
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
@@ -61,7 +61,7 @@ def test_wrong_parameters_end_the_start_with_a_sentence(
 def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -> None:
     """Ignored, they would leave the user with another port than the one that was meant."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
     assert "omnibot_driver cannot start: " in ended.stderr
     assert "Traceback" not in ended.stderr
@@ -74,7 +74,7 @@ def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -
 def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list[str]) -> None:
     """The message is the same on both sides of ``--ros-args``."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *before, *words]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
     assert f"cannot start: unknown argument {' '.join(words)}; parameters are" in ended.stderr
     assert ended.stderr.endswith("like this: --ros-args -p port:=/dev/ttyUSB0\n")
@@ -91,7 +91,7 @@ runpy.run_module("omnibot_driver.driver", run_name="__main__")
 def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
     """Before anything is loaded, with exit code 0."""
     command = [sys.executable, "-c", WITHOUT_ROS, *arguments]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=20.0, check=False)
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert (ended.returncode, ended.stderr) == (0, "")
     assert ended.stdout.startswith("usage: ros2 run omnibot_driver driver ")
     assert "--ros-args -p port:=/dev/ttyUSB0\n" in ended.stdout
@@ -148,7 +148,7 @@ def test_tuning_changes_while_running_and_identity_does_not(
     twist = Twist()
     twist.linear.x = 0.3
     probe.publisher(Twist, "cmd_vel").publish(twist)
-    assert board.wait_for(lambda b: b.commands[-1].values == (30, 0, 0), 20.0)
+    assert board.wait_for(lambda b: b.commands[-1].values == (30, 0, 0), PATIENCE_S)
     text = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value="/dev/ttyUSB1")
     assert "read-only" in set_parameter(probe, "port", text).reason
     for value in (0.0, -1.0, float("nan"), 1e9):
@@ -169,9 +169,9 @@ def test_the_command_that_is_repeated_is_said_in_a_new_scale(
     twist = Twist()
     twist.linear.x = 0.3
     probe.publisher(Twist, "cmd_vel").publish(twist)
-    assert board.wait_for(lambda b: b.commands[-1].values == (21, 0, 0), 20.0)
+    assert board.wait_for(lambda b: b.commands[-1].values == (21, 0, 0), PATIENCE_S)
     assert set_parameter(probe, "linear_scale", real(100.0)).successful
-    assert board.wait_for(lambda b: b.commands[-1].values == (30, 0, 0), 20.0)
+    assert board.wait_for(lambda b: b.commands[-1].values == (30, 0, 0), PATIENCE_S)
 
 
 def test_every_parameter_is_described(

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from driver_process import Driver
+from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from probe import Probe
@@ -135,7 +135,7 @@ def test_odometry_moves_with_the_robot(probe: Probe, board: PtyBoard) -> None:
     assert all(covariance[i, i] > 0 for i in range(6))
     assert covariance[2, 2] > 1e3
     assert message.twist.covariance[0] > 0
-    assert board.wait_for(lambda b: abs(b.truth.vy_mps) < 0.01, 20.0)
+    assert board.wait_for(lambda b: abs(b.truth.vy_mps) < 0.01, PATIENCE_S)
     with board.lock:
         truth = board.board.truth
     probe.wait_for(lambda: odometry[-1].pose.pose.position.y == pytest.approx(truth.y_m, abs=2e-3))

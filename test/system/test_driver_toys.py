@@ -25,7 +25,7 @@ from toys import line_robot, request_robot
 
 from omnibot_driver.simulator.common.serving import ServedBoard
 
-PATIENCE_S: Final = 20.0
+PATIENCE_S: Final = 60.0
 TOYS: Final = f"""
 import sys
 sys.path.insert(0, {str(Path(__file__).parents[1])!r})

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
 import pytest
-from driver_process import Driver
+from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from probe import Probe
@@ -51,7 +51,7 @@ def steer(terminal: PseudoTerminal, board: PtyBoard, said: Sequence[object] = (T
 def wait_for_ticks(board: PtyBoard, ticks: int) -> None:
     """Wait for this many ticks of the board's own time, 10 ms each."""
     until = board.board.tick + ticks
-    assert board.wait_for(lambda b: b.tick >= until, 20.0)
+    assert board.wait_for(lambda b: b.tick >= until, PATIENCE_S)
 
 
 @pytest.fixture
@@ -79,7 +79,7 @@ def test_a_snapshot_in_a_pipe_tells_what_is_so(
 
     probe.wait_for(drive)
     commands.publish(Twist())
-    assert board.wait_for(lambda b: abs(b.truth.vy_mps) < 1e-3, 20.0)
+    assert board.wait_for(lambda b: abs(b.truth.vy_mps) < 1e-3, PATIENCE_S)
     assert main(["--json", "--namespace", driver.namespace]) == 0
     output = capsys.readouterr()
     assert output.err == ""
@@ -103,12 +103,12 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")
     terminal.type(" ")
-    assert board.wait_for(lambda b: any(c.kind == "estop" for c in b.commands), 20.0)
+    assert board.wait_for(lambda b: any(c.kind == "estop" for c in b.commands), PATIENCE_S)
     terminal.wait_for("LATCHED")
     terminal.type("R")
     terminal.wait_for("Release")
     terminal.type("y")
-    assert board.wait_for(stands, 20.0)
+    assert board.wait_for(stands, PATIENCE_S)
     terminal.wait_for("not latched")
     terminal.type("q")
     assert terminal.end() == 0
@@ -124,7 +124,7 @@ def test_who_lets_go_of_the_key_stops_the_robot(
     for _ in range(20):  # the monitor may find the probe later than the driver
         said.clear()
         steer(terminal, board)
-        assert board.wait_for(stands, 20.0)
+        assert board.wait_for(stands, PATIENCE_S)
         wait_for_ticks(board, 60)
         if any(twist.linear.x for twist in said):
             break
@@ -172,7 +172,7 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
     steer(terminal, board, said)
     terminal.process.send_signal(signal.SIGTSTP)
     os.waitid(os.P_PID, terminal.process.pid, os.WSTOPPED)
-    assert board.wait_for(stands, 20.0)
+    assert board.wait_for(stands, PATIENCE_S)
     wait_for_ticks(board, 60)
     before = len(said)
     terminal.type("w" * 20)

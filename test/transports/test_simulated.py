@@ -22,7 +22,7 @@ from omnibot_driver.transports.simulated import (
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 TOY = "toy_lines"
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.transports.udp import UdpPorts
 
-PATIENCE_S = 20.0
+PATIENCE_S = 60.0
 
 
 class Host:
