@@ -12,7 +12,9 @@ import sys
 import threading
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
+
+from driver_nursery import Nursery
 
 PATIENCE_S = 120.0
 """How long an event is awaited before a test gives up; no test asserts how long it took."""
@@ -22,13 +24,14 @@ if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
 
 _namespaces = (f"robot{os.getpid()}_{number}" for number in itertools.count())
 """Of their own also beside another run of the tests that has come by the same ROS domain."""
+_nursery = Nursery()
 
 
 class Driver:
-    """``python -m omnibot_driver.driver`` as a process of its own, in a namespace of its own.
+    """The driver as a process of its own, in a namespace of its own.
 
-    ``before``: Python to be run in that process first; ``namespace``: that of another one;
-    ``more``: further arguments of ROS.
+    ``before``: Python that a new interpreter runs first (without it, the process comes from the
+    nursery); ``namespace``: that of another one; ``more``: further arguments of ROS.
     """
 
     def __init__(
@@ -45,17 +48,19 @@ class Driver:
         given = parameters if port is None else {"port": port, **parameters}
         for name, value in given.items():
             arguments += ["-p", f"{name}:={value}"]
-        program = ["-m", "omnibot_driver.driver"]
+        environment = {**os.environ, "PYTHONUNBUFFERED": "1", "RCUTILS_LOGGING_USE_STDOUT": "1"}
+        self.process: Any
         if before:
             main = "import sys, omnibot_driver.driver as driver; sys.exit(driver.main())"
-            program = ["-c", f"{before}\n{main}"]
-        self.process = subprocess.Popen(
-            [sys.executable, *program, *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1", "RCUTILS_LOGGING_USE_STDOUT": "1"},
-        )
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", f"{before}\n{main}", *arguments],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                env=environment,
+            )
+        else:
+            self.process = _nursery.start(arguments, environment)
         self.lines: list[str] = []
         self._said = threading.Condition()
         self._listener = threading.Thread(target=self._listen)
