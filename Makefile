@@ -28,6 +28,9 @@ NO_VENV = $(PYTHON) cannot create virtual environments: please install its venv 
 # A ROS installation sourced in this shell must not mix with the one in .venv.
 unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
+# Without bytecode every process of the tests would compile the tests and the driver again.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Robots on the network are out of reach unless the user says otherwise.
 ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export ROS_AUTOMATIC_DISCOVERY_RANGE
@@ -42,7 +45,7 @@ demo: $(VENV)/.runtime  ## drive a square on a simulated BOARD, until ctrl-C or 
 	@$(PY) -m omnibot_driver.demo --board $(BOARD)
 
 test: lint $(VENV)/.docs  ## run every check and test
-	$(PY) -m pytest -n 4 --dist loadfile  # four files at a time: most tests wait for real time
+	$(PY) -m pytest -n 4 --dist loadfile --no-loadscope-reorder  # the longest files first: conftest.py
 
 check: lint  ## check formatting, style and types, and run the quick tests (a minute)
 	$(PY) -m pytest -n 2 -q -m "not slow" $(QUICK)

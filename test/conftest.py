@@ -9,6 +9,7 @@ Hypothesis tries the same examples in every run, so what turns red was changed;
 import os
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -31,6 +32,27 @@ ENDS_WITHIN_S = 60.0
 settings.register_profile("exploring", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("same", settings.get_profile("exploring"), derandomize=True)
 settings.load_profile("same")
+
+
+WAITING = ("faults", "system", "tools")
+"""Folders of tests that wait for real time."""
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Workers side by side begin with the files that wait, and end with many short ones.
+
+    Otherwise one worker is busy with a long file when the others have ended.
+    """
+    if not hasattr(config, "workerinput"):
+        return
+    home = Path(__file__).parent
+    slow = (home / "test_board_removed.py", home / "integrity" / "test_integrity.py")
+
+    def rank(item: pytest.Item) -> int:
+        path = item.path
+        return 0 if path in slow else 1 if path.relative_to(home).parts[0] in WAITING else 2
+
+    items.sort(key=rank)
 
 
 def pytest_report_header() -> str:
