@@ -142,9 +142,10 @@ class Keeper:
 
     def _start(self) -> None:
         self._ahead = 0
-        # By its bare name: `pkill omnibot_driver` must not hit the guard.
+        # By its bare name: `pkill -f omnibot_driver` must not hit the guard. Nor by the name of a
+        # folder with a .venv in it: there the interpreter is a link, and needed are built-ins only.
         folder, name = os.path.split(guard.__file__)
-        command = [sys.executable, "-I", "-S", name]
+        command = [os.path.realpath(sys.executable), "-I", "-S", name]
         try:
             self._process = subprocess.Popen(
                 [*command, *map(self._addressed, self.last_words)],

@@ -6,6 +6,7 @@ import ast
 import os
 import signal
 import socket
+import sys
 import threading
 import time
 from pathlib import Path
@@ -109,12 +110,19 @@ def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
     line.hear(LAST_WORDS)
 
 
-def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(line: Line) -> None:
-    """``pkill -9 -f omnibot_driver``, in a hurry, while the robot drives."""
+def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(
+    line: Line, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """``pkill -9 -f omnibot_driver``, in a hurry, while the robot drives; the folder of a clone
+    with its .venv has that name too."""
+    interpreter = tmp_path / "omnibot_driver" / ".venv" / "bin" / "python"
+    interpreter.parent.mkdir(parents=True)
+    interpreter.symlink_to(sys.executable)
+    monkeypatch.setattr(sys, "executable", str(interpreter))
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     started(pid)
-    _interpreter, *arguments = Path(f"/proc/{pid}/cmdline").read_text().split("\0")
+    arguments = Path(f"/proc/{pid}/cmdline").read_text().split("\0")
     name = Path(f"/proc/{pid}/comm").read_text()
     keeper.end(stopped=True)
     assert "guard.py" in arguments
