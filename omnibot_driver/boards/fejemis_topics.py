@@ -28,6 +28,7 @@ from omnibot_driver.core.fejemis import (
     SteeringReading,
 )
 from omnibot_driver.core.fejemis.board import FejemisBoard
+from omnibot_driver.core.fejemis.services import Services
 from omnibot_driver.core.geometry.steered import SteeredKinematics
 from omnibot_driver.core.session import Session
 
@@ -171,7 +172,7 @@ class FejemisTopics:
             answer = Future()
 
             def ask(session: Session, now: float) -> None:
-                cast(FejemisBoard, session.board).ask(job, answer, now)
+                cast(FejemisBoard, session.board).services.ask(job, answer, now)
 
             try:
                 self._link.call(ask)
@@ -192,7 +193,7 @@ class FejemisTopics:
 
     def _on_brush(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         on = bool(request.data)
-        trouble = self._say("brush", lambda board, now: board.set_brush(on, now), needed=on)
+        trouble = self._say("brush", lambda services, now: services.set_brush(on, now), needed=on)
         response.success = not trouble
         sent = f"brush {'on' if on else 'off'} sent; the board does not confirm it"
         response.message = trouble or sent
@@ -203,7 +204,7 @@ class FejemisTopics:
         if not math.isfinite(volts):
             self._warn("lift_cmd rejected: contains NaN or infinity; fix the publishing node")
             return
-        self._try("lift_cmd", lambda board, now: board.lift(volts, now), needed=volts != 0.0)
+        self._try("lift_cmd", lambda services, now: services.lift(volts, now), needed=volts != 0.0)
 
     def _on_led(self, message: ColorRGBA) -> None:
         parts = (message.r, message.g, message.b)
@@ -211,17 +212,15 @@ class FejemisTopics:
             self._warn("led_cmd rejected: contains NaN or infinity; fix the publishing node")
             return
         red, green, blue = (round(255 * max(0.0, min(1.0, part * message.a))) for part in parts)
-        self._try("led_cmd", lambda board, now: board.set_led(red, green, blue, now), needed=False)
+        self._try(
+            "led_cmd", lambda services, now: services.set_led(red, green, blue, now), needed=False
+        )
 
-    def _try(
-        self, what: str, action: Callable[[FejemisBoard, float], None], *, needed: bool
-    ) -> None:
+    def _try(self, what: str, action: Callable[[Services, float], None], *, needed: bool) -> None:
         if trouble := self._say(what, action, needed=needed):
             self._warn(trouble)
 
-    def _say(
-        self, what: str, action: Callable[[FejemisBoard, float], None], *, needed: bool
-    ) -> str:
+    def _say(self, what: str, action: Callable[[Services, float], None], *, needed: bool) -> str:
         """Why it was not said; ``needed``: it moves something, so the robot has to be nominal."""
 
         def say(session: Session, now: float) -> str:
@@ -232,7 +231,7 @@ class FejemisTopics:
             if needed and session.state != "nominal":
                 return f"{what} refused: the robot is paused; call ~/start first"
             try:
-                action(cast(FejemisBoard, session.board), now)
+                action(cast(FejemisBoard, session.board).services, now)
             except (CommandRefused, RequestRefused) as error:
                 return str(error)
             return ""

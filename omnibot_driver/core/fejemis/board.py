@@ -2,9 +2,10 @@
 
 """A Fejemis as a board of the driver: two Teensys as one robot.
 
-Here is what follows from what. Which half is where is in ``ports.py``, what a message is worth in
-``translation.py``, how an order is said in ``encoder.py``, what stops the robot in ``watch.py``,
-whether it obeys in ``obedience.py``, and what keeps both boards talking in ``upkeep.py``.
+Composes the parts, and says requests. Which half is where is in ``ports.py``, what follows from a
+message in ``inbound.py``, what it is worth in ``translation.py``, how an order is said in
+``encoder.py``, what stops the robot in ``watch.py``, whether it obeys in ``obedience.py``, what
+keeps both boards talking in ``upkeep.py``, and what else a user may ask in ``services.py``.
 """
 
 import math
@@ -12,26 +13,23 @@ from typing import Final
 
 from omnibot_driver.core.board import Board, BoardFigures, Mode
 from omnibot_driver.core.commands.stop_proof import StopProof
-from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.fejemis.actuator import PairStream
 from omnibot_driver.core.fejemis.encoder import Encoder
 from omnibot_driver.core.fejemis.front_wheel import relay_text
-from omnibot_driver.core.fejemis.half import Half, keyword_of
+from omnibot_driver.core.fejemis.inbound import Inbound
 from omnibot_driver.core.fejemis.machine import OFF
-from omnibot_driver.core.fejemis.messages import FrontAngle, Heartbeat, Message
 from omnibot_driver.core.fejemis.motion_lines import STOP
 from omnibot_driver.core.fejemis.obedience import Obedience
 from omnibot_driver.core.fejemis.ports import ROLES, Ports
-from omnibot_driver.core.fejemis.readings import Job
+from omnibot_driver.core.fejemis.services import Services
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.shown import own_figures
 from omnibot_driver.core.fejemis.steering import Geometry
 from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
-from omnibot_driver.core.fejemis.watch import Watch
 from omnibot_driver.core.packets import NO_PACKETS, Packets
-from omnibot_driver.core.readings import PausedReading, Reading
+from omnibot_driver.core.readings import Reading
 from omnibot_driver.core.traits import Traits
 
 STOPS_WITHIN_S: Final = 0.5
@@ -39,7 +37,10 @@ STOPS_WITHIN_S: Final = 0.5
 
 
 class FejemisBoard(Board):
-    """One robot. ``settings`` may be replaced at any time."""
+    """One robot. ``settings`` may be replaced at any time.
+
+    ``services``: what only this board has.
+    """
 
     def __init__(self, settings: FejemisSettings) -> None:
         self._settings = settings
@@ -48,16 +49,21 @@ class FejemisBoard(Board):
         self._encoder = Encoder(self, settings)
         self._upkeep = Upkeep(self._ports, settings)
         self._told = Told()
-        self._watch = Watch(self._ports, self._translation.front, self._told)
         self._obedience = Obedience()
+        self._inbound = Inbound(
+            self._ports,
+            self._translation,
+            self._upkeep,
+            self._obedience,
+            self._told,
+            self._angle_told,
+        )
+        self.services = Services(
+            self, self._upkeep, self._obedience, self._translation.odometry, self._told
+        )
         self._actuator: PairStream | None = None
         self.clock = self._translation.stamped
-        self._forget()
-
-    def _forget(self) -> None:
-        self._mode = Mode.UNKNOWN
         self._now = -math.inf
-        self._relay: float | None = None
 
     # What is so
 
@@ -81,7 +87,7 @@ class FejemisBoard(Board):
     @property
     def mode(self) -> Mode:
         """Nominal while both halves talk and the drive board obeys."""
-        return self._mode
+        return self._inbound.mode
 
     @property
     def geometry(self) -> Geometry:
@@ -111,7 +117,7 @@ class FejemisBoard(Board):
             return "power is about to be cut"
         if job := self._upkeep.jobs.at_rest:
             return job
-        return self._ports.trouble or self._upkeep.pending or self._watch.refusal
+        return self._ports.trouble or self._upkeep.pending or self._inbound.watch.refusal
 
     @property
     def advice(self) -> str | None:
@@ -121,55 +127,31 @@ class FejemisBoard(Board):
     @property
     def figures(self) -> BoardFigures:
         """Over all connections."""
-        halves, translation, upkeep = self._ports.halves, self._translation, self._upkeep
-        source, machine = self._obedience.source, upkeep.machine
-        own = own_figures(self._ports, upkeep.polls, upkeep.configurations, translation.front)
+        halves = self._ports.halves
         return BoardFigures(
             rates_hz={"IMU": 100.0, "Odometry": 50.0},
             trouble=self.refusal,
             faults=sum(half.statistics.faults for half in halves),
             discarded_bytes=sum(half.statistics.discarded_bytes for half in halves),
-            own=own
-            | {
-                "Source (rcSource)": "unknown" if source is None else f"{source:g}",
-                "Brush": "on" if machine.brush else "off",
-                "Lift (V)": f"{machine.volts:g}",
-                "Angles refused": str(translation.front.refused),
-                "Poses refused": str(translation.odometry.refused),
-            },
+            own=own_figures(self._ports, self._upkeep, self._translation, self._obedience.source),
         )
 
     # Inbound
 
     def connect(self) -> None:
         """The lines are new: brush and lift are off, and both boards are configured again."""
-        self._forget()
+        self._now = -math.inf
         self._ports.begin(self._settings)
         self._translation.connect()
         self._encoder.begin()
         self._upkeep.begin()
-        self._watch.begin()
+        self._inbound.begin()
         self._obedience.begin()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """The readings that these bytes complete."""
         self._open(now)
-        half = self._ports.halves[channel]
-        for message in half.feed(data, now):
-            if half.restarted:
-                half.restarted = False
-                self._restarted(half, now)
-            self._hear(half, message, now)
-        if half.not_understood(now):
-            self._told.tell(
-                f"many lines from the {self._ports.role(channel)} board are damaged or not"
-                " understood: check the cable, and whether another program asks it for help text",
-                now,
-            )
-        if half.decoder.changed:
-            half.decoder.changed = False
-            ended = "have sums now" if half.decoder.sums else "have no sums any more"
-            self._told.halt(f"the lines of the {half.role} board {ended}; robot stopped", now)
+        self._inbound.receive(data, now, channel)
         self._look(now)
         return self._taken(now)
 
@@ -183,7 +165,7 @@ class FejemisBoard(Board):
 
     def silence(self) -> None:
         """Neither half was heard."""
-        self._mode = Mode.UNKNOWN
+        self._inbound.mode = Mode.UNKNOWN
         for half in self._ports.halves:
             half.subscribe_again()
         self._upkeep.machine.off()
@@ -201,7 +183,7 @@ class FejemisBoard(Board):
 
     def _open(self, now: float) -> None:
         self._now = now
-        self._watch.open(now)
+        self._inbound.watch.open(now)
         self._translation.stamped.begin()
 
     def _taken(self, now: float) -> list[Reading]:
@@ -213,80 +195,11 @@ class FejemisBoard(Board):
         self._upkeep.jobs.done.clear()
         return self._translation.stamped.readings
 
-    def _hear(self, half: Half, message: Message, now: float) -> None:
-        if isinstance(message, Heartbeat):
-            self._heartbeat(half, message, now)
-        if (role := half.role) is None:
-            return
-        if keyword := keyword_of(message):
-            half.note(keyword, now)
-        self._upkeep.hear(role, message, now)
-        if isinstance(message, FrontAngle):
-            if role == "front":
-                self._front_angle(message, now)
-        elif role == "drive":
-            self._translation.odometry.track_m = self.geometry.track_m
-            self._translation.hear_drive(message, half.clock, now)
-        else:
-            self._translation.hear_front(message, now)
-
-    def _heartbeat(self, half: Half, message: Heartbeat, now: float) -> None:
-        if self._ports.identify() and self._ports.swapped:
-            self._told.tell(
-                "the ports are swapped: the drive board is at `front_port`, which works as well",
-                now,
-            )
-        if trouble := self._ports.trouble:
-            self._told.halt(f"{trouble}; robot stopped", now)
-        if half.role != "drive":
-            return
-        self._obedience.hear(message.state)
-        if self._is_stopped(now):
-            was_paused, self._mode = self._mode is Mode.PAUSED, Mode.PAUSED
-            self._upkeep.machine.off()
-            self._translation.add(PausedReading(continues=was_paused), now)
-
-    def _front_angle(self, message: FrontAngle, now: float) -> None:
-        front = self._translation.front
-        if not front.hear(message, now):
-            return
-        self._relay = front.angle_rad
-        self._translation.steering(front.angle_rad, now)
-        if self._actuator is not None and self._actuator.angle_told(front.angle_rad, now):
-            self._told.halt(
-                "the front wheel does not go where it is commanded; robot stopped. Check the servo"
-                " and its power; for reversing see `allow_reverse`",
-                now,
-            )
-
-    def _restarted(self, half: Half, now: float) -> None:
-        if (role := half.role) is None:
-            return
-        self._mode = Mode.UNKNOWN
-        self._upkeep.restarted(role)
-        if role == "drive":
-            self._translation.restarted()
-        else:
-            self._translation.front.begin()
-        self._told.halt(f"the {role} board has restarted; robot stopped", now)
-
     def _look(self, now: float) -> None:
-        machine = self._upkeep.machine
-        if self._watch.look(now, driving=self.driving):
-            machine.off()
-        elif machine.active and now >= self._watch.front_unheard_at:
-            machine.off()
-            self._told.tell(
-                "no data from the front board for 0.25 s; brush and lift switched off", now
-            )
-        if not self._ports.ready:
-            self._mode = Mode.UNKNOWN
-        else:
-            self._mode = Mode.PAUSED if self._is_stopped(now) else Mode.NOMINAL
+        self._inbound.look(now, driving=self.driving)
 
-    def _is_stopped(self, now: float) -> bool:
-        paused = self._mode is Mode.PAUSED
-        return self._ports.ready and self._obedience.stopped(now, was_paused=paused)
+    def _angle_told(self, angle_rad: float, now: float) -> bool:
+        return self._actuator is not None and self._actuator.angle_told(angle_rad, now)
 
     def remark(self, text: str) -> None:
         """Queue a notice that the user gets only once."""
@@ -308,7 +221,7 @@ class FejemisBoard(Board):
             self._obedience.release(self._now)
         elif not self._obedience.estopped:
             self._upkeep.machine.off()
-            self._obedience.latch(running=self._mode is Mode.NOMINAL)
+            self._obedience.latch(running=self.mode is Mode.NOMINAL)
             self._upkeep.jobs.interrupt("the e-stop was latched meanwhile; release it, call again")
 
     def motion(self, drive: bytes, front: bytes) -> Packets:
@@ -360,18 +273,18 @@ class FejemisBoard(Board):
     @property
     def wake_at(self) -> float:
         """When ``due`` or ``elapse`` have something."""
-        if self._relay is not None or self._told.notices or self._upkeep.jobs.done:
+        if self._inbound.relay_rad is not None or self._told.notices or self._upkeep.jobs.done:
             return -math.inf
         wake_at = min(self._upkeep.wake_at, self._obedience.start_at)
         if self._upkeep.machine.active:
-            wake_at = min(wake_at, self._watch.front_unheard_at)
-        return min(wake_at, self._watch.wake_at) if self._mode is Mode.NOMINAL else wake_at
+            wake_at = min(wake_at, self._inbound.watch.front_unheard_at)
+        return min(wake_at, self._inbound.watch.wake_at) if self.mode is Mode.NOMINAL else wake_at
 
     def due(self, now: float) -> Packets:
         """The relayed angle first, then what keeps both talking."""
         packets = NO_PACKETS
-        if self._relay is not None:
-            packets, self._relay = self._ports.line("drive", relay_text(self._relay)), None
+        if (angle_rad := self._inbound.take_relay()) is not None:
+            packets = self._ports.line("drive", relay_text(angle_rad))
         if self._obedience.start_due(now):
             packets += self._ports.line("drive", b"start")
         texts = self._upkeep.due(now, stands=not self.driving)
@@ -379,52 +292,3 @@ class FejemisBoard(Board):
             if texts[role]:
                 packets += self._ports.line(role, *texts[role])
         return packets
-
-    # What only this board has
-
-    def set_brush(self, on: bool, now: float) -> None:
-        """Until it is switched off, or something ends it. Raises RequestRefused."""
-        if on and (reason := self._why_not_turn()):
-            raise RequestRefused(f"brush not switched on: {reason}")
-        self._upkeep.machine.set_brush(on)
-
-    def lift(self, volts: float, now: float) -> None:
-        """For ``command_timeout_s`` at most; positive lifts. Raises CommandRefused."""
-        if volts and (reason := self._why_not_turn()):
-            raise CommandRefused(f"lift_cmd rejected: {reason}")
-        self._upkeep.machine.lift(volts, now, self._settings.command_timeout_s)
-
-    def set_led(self, red: int, green: int, blue: int, now: float) -> None:
-        """Colour of the band, 0..255 each."""
-        red, green, blue = (max(0, min(255, part)) for part in (red, green, blue))
-        self._upkeep.machine.set_colour(red, green, blue)
-
-    def ask(self, job: Job, token: object, now: float) -> None:
-        """Begin a job; a JobDone answers. Raises RequestRefused."""
-        if self._mode is Mode.UNKNOWN:
-            raise RequestRefused(f"{job.value} refused: a board is not heard; check both cables")
-        if self.driving and job is not Job.LOAD:
-            raise RequestRefused(
-                f"{job.value} refused: the robot is commanded; stop the sender, then call again"
-            )
-        if self._translation.odometry.moving and job is not Job.LOAD:
-            raise RequestRefused(f"{job.value} refused: the robot moves; wait until it stands")
-        moves = self.driving or self._translation.odometry.moving
-        self._upkeep.jobs.ask(
-            job,
-            token,
-            now,
-            delay_s=self._settings.power_off_delay_s,
-            wait_s=STOPS_WITHIN_S if moves else 0.0,
-        )
-        if moves:
-            self._told.halt("the configuration is being loaded; robot stopped", now)
-        if job in (Job.LOAD, Job.POWER_OFF):
-            self._upkeep.machine.off()
-
-    def _why_not_turn(self) -> str:
-        if self._obedience.estopped:
-            return "the e-stop is latched; release it first"
-        if self._mode is not Mode.NOMINAL:
-            return f"the board is {self._mode.value}"
-        return ""

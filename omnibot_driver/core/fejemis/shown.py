@@ -3,14 +3,12 @@
 """What only this board has to show in diagnostics, by names for people. Knows no bytes."""
 
 import math
-from collections.abc import Mapping
 from typing import Final
 
-from omnibot_driver.core.fejemis.configuration import Configuration
-from omnibot_driver.core.fejemis.front_wheel import FrontWheel
-from omnibot_driver.core.fejemis.half import Half, Role
-from omnibot_driver.core.fejemis.polls import Polls
+from omnibot_driver.core.fejemis.half import Half
 from omnibot_driver.core.fejemis.ports import ROLES, Ports
+from omnibot_driver.core.fejemis.translation import Translation
+from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
 """How many of the latest lines that a board did not know are shown."""
@@ -18,23 +16,27 @@ SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 
 def own_figures(
-    ports: Ports,
-    polls: Mapping[Role, Polls],
-    configurations: Mapping[Role, Configuration],
-    front: FrontWheel,
+    ports: Ports, upkeep: Upkeep, translation: Translation, source: float | None
 ) -> dict[str, str]:
-    """Version, identity and what was read of each board."""
+    """Version, identity and what was read of each board; ``source``: rcSource."""
+    front, machine = translation.front, upkeep.machine
     own = {"Ports": "swapped" if ports.swapped else "as configured"}
     for role in ROLES:
         name = role.capitalize()
         half = ports.half(role)
         own |= {f"{name} {key}": text for key, text in _of_half(half).items()}
-        own |= {f"{name} {key}": text for key, text in polls[role].told.items()}
-        for key, numbers in configurations[role].told.items():
+        own |= {f"{name} {key}": text for key, text in upkeep.polls[role].told.items()}
+        for key, numbers in upkeep.configurations[role].told.items():
             own[f"{name} {key}"] = " ".join(f"{number:g}" for number in numbers)
     own["Front wheel (deg)"] = f"{math.degrees(front.angle_rad):.1f}"
     own["Front wheel sensor"] = front.fault or "works"
-    return own
+    return own | {
+        "Source (rcSource)": "unknown" if source is None else f"{source:g}",
+        "Brush": "on" if machine.brush else "off",
+        "Lift (V)": f"{machine.volts:g}",
+        "Angles refused": str(front.refused),
+        "Poses refused": str(translation.odometry.refused),
+    }
 
 
 def _of_half(half: Half | None) -> dict[str, str]:

@@ -12,6 +12,7 @@ from math import cos, degrees, pi, radians, sin
 
 from omnibot_driver.simulator.fejemis import wire
 from omnibot_driver.simulator.fejemis.config import WHEELS, DriveConfig
+from omnibot_driver.simulator.fejemis.distances import Distances
 from omnibot_driver.simulator.fejemis.help_text import DRIVE_HELP
 from omnibot_driver.simulator.fejemis.imu import Imu
 from omnibot_driver.simulator.fejemis.settings import WHEEL_BASE_M, FejemisSettings
@@ -19,8 +20,6 @@ from omnibot_driver.simulator.fejemis.teensy import STEP_S, Teensy
 from omnibot_driver.simulator.fejemis.vehicle import Vehicle, wheel_speeds
 
 STOPPED, FREE = -1, 10
-TOF_FAR_M = 8.19
-SONAR_FAR_M = 4.0
 
 
 class DriveTeensy(Teensy[DriveConfig]):
@@ -37,6 +36,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     def __init__(self, settings: FejemisSettings, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
         self.imu = Imu(settings, vehicle)
+        self.distances = Distances(settings, vehicle)
         self.off_at_s: float | None = None
         super().__init__(
             settings,
@@ -60,7 +60,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.vehicle.wanted_radps = (0.0, 0.0)
         self.vehicle.powered = self._booted
         self._reset_pose()
-        self._sonar_m = self._sonar()
+        self.distances.trigger()
         self.imu.boot(self.config)
 
     def started(self) -> None:
@@ -146,9 +146,9 @@ class DriveTeensy(Teensy[DriveConfig]):
             "pose": self._pose,
             "vel": self._velocity,
             "conf": self._wheels,
-            "tofd": lambda: f"tofd {self._tof():.3f}",
-            "tof1": lambda: f"tof1 {self._tof():.3f}",
-            "sr04": lambda: f"sr04 {self._sonar_m:.3f}",
+            "tofd": lambda: f"tofd {self.distances.tof_m:.3f}",
+            "tof1": lambda: f"tof1 {self.distances.tof_m:.3f}",
+            "sr04": lambda: f"sr04 {self.distances.sonar_m:.3f}",
         }
 
     def _heartbeat(self) -> str:
@@ -198,18 +198,6 @@ class DriveTeensy(Teensy[DriveConfig]):
             f" {config.wheel_base_m:.4f} {STEP_S:.4f}"
         )
 
-    def _wall_m(self) -> float:
-        truth = self.vehicle.truth
-        facing = cos(truth.yaw_rad)
-        return (self.settings.front_m - truth.x_m) / facing if facing > 0.1 else float("inf")
-
-    def _tof(self) -> float:
-        return min(TOF_FAR_M, max(0.0, self._wall_m()))
-
-    def _sonar(self) -> float:
-        distance_m = max(0.0, self._wall_m())
-        return distance_m if distance_m < SONAR_FAR_M else 0.0
-
     # What it obeys
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
@@ -228,7 +216,7 @@ class DriveTeensy(Teensy[DriveConfig]):
             "magcal": self._set_magnetometer,
             "enc0": lambda _: self._reset_pose(),
             "confw": self._set_wheels,
-            "hcsr": lambda _: self._trigger_sonar(),
+            "hcsr": lambda _: self.distances.trigger(),
             "log": lambda _: None,
         }
 
@@ -288,9 +276,6 @@ class DriveTeensy(Teensy[DriveConfig]):
             self.config = replace(
                 self.config, radii_m=(left, right), gear=gear, ticks=ticks, wheel_base_m=base_m
             )
-
-    def _trigger_sonar(self) -> None:
-        self._sonar_m = self._sonar()
 
     @property
     def turn_dps(self) -> float:

@@ -53,11 +53,11 @@ def test_no_input_raises_or_keeps_the_session_busy(seed: int) -> None:
                 case 3 | 4 | 5:
                     bench.drive(chance.uniform(-1, 1), chance.uniform(-2, 2))
                 case 6:
-                    bench.board.ask(chance.choice(list(Job)), None, bench.now)
+                    bench.board.services.ask(chance.choice(list(Job)), None, bench.now)
                 case 7:
-                    bench.board.set_brush(True, bench.now)
+                    bench.board.services.set_brush(True, bench.now)
                 case 8:
-                    bench.board.lift(chance.uniform(-20, 20), bench.now)
+                    bench.board.services.lift(chance.uniform(-20, 20), bench.now)
                 case _:
                     channel = chance.choice([DRIVE, FRONT])
                     session.receive(any_line(chance), bench.now, channel)

@@ -3,7 +3,6 @@
 """The way of the robot from poses and wheel speeds, and the stamps of all readings."""
 
 import contextlib
-import itertools
 import math
 import random
 import statistics
@@ -13,16 +12,13 @@ import pytest
 from fejemis_bench import WHEELS, Bench, nominal
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.fejemis.imu import ImuPairing
-from omnibot_driver.core.fejemis.messages import Acceleration, BoardPose, Gyro, WheelSpeeds
+from omnibot_driver.core.fejemis.messages import BoardPose, WheelSpeeds
 from omnibot_driver.core.fejemis.odometry import PoseOdometry
-from omnibot_driver.core.fejemis.teensy_clock import StampedReadings, TeensyClock
 from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
 from omnibot_driver.core.odometry.estimator import Odometry, OdometrySettings
-from omnibot_driver.core.readings import DisplacementReading, ImuReading
+from omnibot_driver.core.readings import DisplacementReading
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
-from omnibot_driver.simulator.fejemis import Firmware
 
 PERIOD_S = 0.02
 TRACK_M = 0.4
@@ -242,152 +238,7 @@ def test_odometry_goes_out_with_every_pose() -> None:
     assert all(abs(twist.vx_mps - 0.3) < 0.02 for twist in twists)
 
 
-# Times
-
-
-def late(chance: random.Random) -> float:
-    """A read comes 0.36 ms late on average, and one in a hundred by up to 20 ms."""
-    stall_s = chance.uniform(0.0, 0.02) if chance.random() < 0.01 else 0.0
-    return 3e-4 + chance.expovariate(1 / 6e-5) + stall_s
-
-
-def within(errors: list[float]) -> float:
-    """Half the narrowest interval that holds 99 % of them."""
-    errors = sorted(errors)
-    most = int(0.99 * len(errors))
-    return min(b - a for a, b in zip(errors, errors[most:], strict=False)) / 2
-
-
-@pytest.mark.parametrize("ppm", [-100.0, 0.0, 100.0])
-@pytest.mark.parametrize("loss", [0.0, 0.03])
-def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
-    """Poses within 0.05 ms, and the IMU, whose lines carry no time, within 0.2 ms.
-
-    Three lines in a hundred are lost where one character in a thousand is.
-    """
-    chance = random.Random(f"{ppm} {loss}")
-    clock, imu = TeensyClock(), ImuPairing("m/s^2")
-    phase_s, start_s = chance.random() * 0.01, chance.random() * 50
-    samples = sorted(
-        [(n * 0.02 + 0.0031, "pose") for n in range(20 * 50)]
-        + [(n * 0.01 + phase_s, "imu") for n in range(20 * 100)]
-    )
-    off: dict[str, list[float]] = {"pose": [], "imu": []}
-    arrived = pose_s = -math.inf
-    for true_s, kind in samples:
-        board_s = start_s + true_s * (1.0 + ppm * 1e-6)
-        arrived = max(arrived, true_s + late(chance))
-        if kind == "pose" and chance.random() >= loss:
-            pose_s = round(board_s, 5)
-            assert clock.see(pose_s, arrived)
-            off["pose"].append(clock.host_s(pose_s) - true_s)
-        elif kind == "imu":
-            reading = None
-            if chance.random() >= loss:
-                imu.gyro(Gyro(0.0, 0.0, 0.0), arrived)
-            if chance.random() >= loss:
-                reading = imu.acceleration(Acceleration(0.0, 0.0, 9.8), arrived)
-            if reading and clock.known:
-                sampled_s = imu.sampled_s(clock.board_s(arrived), pose_s)
-                off["imu"].append(min(arrived, clock.host_s(sampled_s)) - true_s)
-    assert within(off["pose"][200:]) < 5e-5
-    assert within(off["imu"][400:]) < 2e-4
-    assert clock.skew_ppm == pytest.approx(ppm, abs=8.0)
-
-
-def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
-    """A lost digit; but three that agree are those of a board that has restarted."""
-    clock = TeensyClock()
-    assert all(clock.see(100.0 + 0.02 * n, 5.0 + 0.02 * n) for n in range(50))
-    assert not clock.see(10.98, 6.0)
-    assert clock.see(101.02, 6.02)
-    assert not clock.see(0.1, 6.1)
-    assert not clock.see(0.12, 6.12)
-    assert not clock.see(0.14, 6.14)
-    assert clock.see(0.16, 6.16)
-    assert clock.restarted
-
-
-def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
-    """Whatever the clock says."""
-    stamped = StampedReadings()
-    stamped.begin()
-    reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    for stamp_s in (1.0, 0.9, 5.0):
-        stamped.add(reading, stamp_s, 2.0)
-    stamps = stamped.stamps(stamped.readings, 2.0, None)
-    assert stamps == sorted(set(stamps))
-    assert stamps[-1] == 2.0
-
-
-@pytest.mark.parametrize("gyro_first", [True, False])
-def test_a_sample_is_a_gyro_line_and_an_acceleration_line(*, gyro_first: bool) -> None:
-    """In any order; where either is lost there is none, and the next is whole again."""
-    imu = ImuPairing("g")
-
-    def say(now: float, *, gyro: bool = True, acceleration: bool = True) -> list[ImuReading]:
-        lines = [
-            (gyro, lambda: imu.gyro(Gyro(180.0, 0.0, -180.0), now)),
-            (acceleration, lambda: imu.acceleration(Acceleration(0.0, 0.0, 1.0), now)),
-        ]
-        told = [line() for heard, line in lines[:: 1 if gyro_first else -1] if heard]
-        return [reading for reading in told if reading]
-
-    (reading,) = say(1.0)
-    assert reading.angular_velocity == pytest.approx((math.pi, 0.0, -math.pi))
-    assert reading.specific_force == pytest.approx((0.0, 0.0, 9.80665))
-    assert say(1.01, gyro=False) == []
-    assert len(say(1.02)) == 1
-    assert say(1.03, acceleration=False) == []
-    assert say(1.04, acceleration=False) == []
-    assert len(say(1.05)) == 1
-
-
-@pytest.mark.parametrize("sums", [True, False])
-def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
-    """With stamps 10 ms apart."""
-    bench = nominal(Simulated(firmware=Firmware(sums=sums)))
-    bench.events.clear()
-    bench.run(3.0)
-    stamps = [estimate.stamp_s for estimate in bench.imu]
-    assert len(stamps) == pytest.approx(300, abs=2)
-    steps = [b - a for a, b in itertools.pairwise(stamps)]
-    assert max(steps) < 0.0115
-    assert min(steps) > 0.0085
-
-
 def test_the_logarithm_leads_to_the_pose() -> None:
     """The tangents that the odometry tells are those of the plane."""
     way = Pose(0.3, 0.1, 0.7)
     assert roll(log_of(way)).way_to(way).way_m < 1e-12
-
-
-def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """The clock of a board that restarts goes back; theirs is left behind."""
-    clock = TeensyClock()
-    for n in range(20):
-        clock.see(5.0 + 0.02 * n, 100.0 + 1e-4 * n)
-    followed, restarts = [], 0
-    for n in range(10):
-        followed.append(clock.see(10.0 + 0.02 * n, 100.02 + 0.02 * n))
-        restarts += clock.restarted
-    assert followed[-1]
-    assert not restarts
-    assert clock.host_s(10.18) == pytest.approx(100.2, abs=0.01)
-
-
-def test_what_waited_while_the_host_was_stalled_is_no_restart() -> None:
-    """Late lines of the same board come all at once; those of one that has restarted do not."""
-    clock = TeensyClock()
-    for n in range(100):
-        assert clock.see(5.0 + 0.02 * n, 100.0 + 0.02 * n)
-    waited = [clock.see(7.0 + 0.02 * n, 104.0 + 1e-4 * n) for n in range(100)]
-    assert not waited[0]
-    assert waited[-1]
-    assert not clock.restarted
-    assert clock.host_s(9.0) == pytest.approx(104.0, abs=0.01)
-    for n in range(10):
-        clock.see(0.5 + 0.02 * n, 105.0 + 0.02 * n)
-        if clock.restarted:
-            break
-    assert 2 <= n <= 4

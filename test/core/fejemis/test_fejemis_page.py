@@ -171,11 +171,11 @@ def said_by_the_driver() -> set[str]:
         Written.STEERING_GAINS: (1.0, 40.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.15, 0.05),
     }
     bench = nominal(settings=FejemisSettings(written=written))
-    bench.board.set_brush(True, bench.now)
-    bench.board.set_led(255, 128, 0, bench.now)
+    bench.board.services.set_brush(True, bench.now)
+    bench.board.services.set_led(255, 128, 0, bench.now)
     bench.settle()
     for job in Job:
-        bench.board.ask(job, None, bench.now)
+        bench.board.services.ask(job, None, bench.now)
         bench.settle()
         bench.run(6.0 if job is not Job.POWER_OFF else 0.5)
     bench.estop(True)

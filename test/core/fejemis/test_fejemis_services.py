@@ -6,8 +6,6 @@ import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.fejemis.codec import parse
-from omnibot_driver.core.fejemis.configuration import Configuration
 from omnibot_driver.core.fejemis.jobs import whole_seconds
 from omnibot_driver.core.fejemis.readings import (
     BatteryReading,
@@ -19,14 +17,13 @@ from omnibot_driver.core.fejemis.readings import (
     SteeringReading,
 )
 from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
-from omnibot_driver.core.fejemis.steering import Geometry
 from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 
 
 def ask(bench: Bench, job: Job, limit_s: float = 10.0) -> JobDone:
     token = object()
-    bench.board.ask(job, token, bench.now)
+    bench.board.services.ask(job, token, bench.now)
     bench.settle()
     bench.run_until(lambda: any(d.token is token for d in bench.extras(JobDone)), limit_s)
     return next(done for done in bench.extras(JobDone) if done.token is token)
@@ -59,7 +56,7 @@ def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
     bench.drive_on()
     if job is not Job.LOAD:
         with pytest.raises(RequestRefused, match="commanded"):
-            bench.board.ask(job, None, bench.now)
+            bench.board.services.ask(job, None, bench.now)
         return
     assert ask(bench, job).success
     assert bench.robot.standing
@@ -70,9 +67,9 @@ def test_a_job_that_nothing_confirms_fails() -> None:
     bench = nominal()
     bench.hears = {FRONT}
     token = object()
-    bench.board.ask(Job.CALIBRATE_GYRO, token, bench.now)
+    bench.board.services.ask(Job.CALIBRATE_GYRO, token, bench.now)
     with pytest.raises(RequestRefused, match="under way"):
-        bench.board.ask(Job.SAVE, None, bench.now)
+        bench.board.services.ask(Job.SAVE, None, bench.now)
     bench.run(9.0)
     (done,) = bench.extras(JobDone)
     assert not done.success
@@ -83,7 +80,7 @@ def test_a_job_is_answered_when_the_port_is_lost() -> None:
     """At once, whether or not it comes back."""
     bench = nominal()
     token = object()
-    bench.board.ask(Job.CALIBRATE_GYRO, token, bench.now)
+    bench.board.services.ask(Job.CALIBRATE_GYRO, token, bench.now)
     bench.settle()
     bench.close()
     (done,) = bench.extras(JobDone)
@@ -97,7 +94,7 @@ def test_a_robot_that_rolls_is_not_calibrated() -> None:
     bench.drive_on(0.5)
     bench.drive(0.0)
     with pytest.raises(RequestRefused, match="moves"):
-        bench.board.ask(Job.CALIBRATE_GYRO, None, bench.now)
+        bench.board.services.ask(Job.CALIBRATE_GYRO, None, bench.now)
 
 
 def test_a_configuration_is_saved_and_loaded() -> None:
@@ -132,95 +129,6 @@ def test_power_off_cuts_the_power() -> None:
     assert not bench.robot.drive.powered
 
 
-WRITTEN: dict[Written, tuple[float, ...]] = {
-    Written.WHEELS: (0.08, 0.081, 20.0, 48.0, 0.41),
-    Written.STEERING: (0.41, 0.43),
-    Written.FRONT_WHEEL: (2.5, 0.0),
-    Written.INFRARED: (40000.0, 13000.0, 41000.0, 12000.0),
-    Written.MAGNETOMETER: (1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
-    Written.ACCELEROMETER: (0.1, 0.2, 0.3, 1.0, 1.0, 1.0),
-    Written.STEERING_GAINS: (1.0, 40.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.15, 0.05),
-}
-
-
-def test_only_what_the_user_set_is_written() -> None:
-    """All else is read and shown."""
-    bench = nominal()
-    bench.run(3.0)
-    words = {text.split()[0] for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
-    assert not words & {setting.command for setting in Written}
-    assert "setid" not in words
-    own = bench.board.figures.own
-    assert own["Drive conf"] == "0.0775 0.0775 19 68 0.4"
-    assert own["Front confs"] == "0.42 0.4"
-    assert own["Drive ver"].startswith("110")
-    assert own["Front id"] == "front 91"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("sums", [True, False])
-def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restart(
-    *, sums: bool
-) -> None:
-    """On the board whose it is."""
-    from omnibot_driver.simulator.fejemis import Firmware
-
-    bench = nominal(Simulated(firmware=Firmware(sums=sums)), FejemisSettings(written=WRITTEN))
-    bench.run(1.0)
-    for _ in range(2):
-        drive, front = bench.robot.drive.config, bench.robot.front.config
-        assert drive.radii_m == (0.08, 0.081)
-        assert (drive.gear, drive.ticks, drive.wheel_base_m) == (20.0, 48.0, 0.41)
-        assert drive.confs_m == front.confs_m == (0.41, 0.43)
-        assert front.angle_offset_deg == 2.5
-        assert front.ir == (40000.0, 13000.0, 41000.0, 12000.0)
-        assert front.steering[:2] == (1.0, 40.0)
-        assert bench.board.geometry.track_m == 0.41
-        mark = bench.now
-        bench.run(3.0)
-        written = {setting.command for setting in Written}
-        assert not written & {text.split()[0] for text in bench.lines(FRONT, mark)}
-        assert bench.board.advice is None
-        bench.robot.drive.reboot()
-        bench.robot.front.reboot()
-        bench.run(5.0)
-
-
-def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
-    """After some tries."""
-    bench = nominal(settings=FejemisSettings(written={Written.WHEELS: (0.08, -1.0, 1.0, 1.0, 1.0)}))
-    bench.run(6.0)
-    assert any("confw" in text for text in bench.notices)
-
-
-def test_the_order_of_the_steering_geometry_is_found_out() -> None:
-    """The help text has it otherwise than the command; the track in ``conf`` decides."""
-    for turned in (False, True):
-        configuration = Configuration("drive", {})
-        configuration.hear(parse("conf 0.0775 0.0775 19 68 0.4000 0.001"))
-        configuration.hear(parse("confs 0.4000 0.4200" if turned else "confs 0.4200 0.4000"))
-        assert configuration.geometry == Geometry(track_m=0.4, wheelbase_m=0.42)
-
-
-def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
-    """Nothing is understood then but heartbeats."""
-    bench = Bench(settings=FejemisSettings(line_sums="off"))
-    bench.open()
-    bench.run(4.0)
-    assert bench.session.state == "connecting"
-    assert any("contradict" in text for text in bench.notices)
-
-
-def test_boards_with_different_geometries_are_told_of() -> None:
-    """One of them computes with a robot that is not there."""
-    bench = nominal()
-    bench.robot.receive(b"confs 0.4 0.5\n", bench.now, FRONT)
-    bench.session.closed(bench.now)
-    bench.open()
-    bench.run(4.0)
-    assert any("different steering geometries" in text for text in bench.notices)
-
-
 def test_all_sensors_are_told_in_si_units() -> None:
     """Battery, magnetometer, orientation, four ranges, the steered wheel."""
     bench = nominal(Simulated(front_m=0.3))
@@ -251,7 +159,7 @@ def test_a_low_battery_is_told_once_a_minute() -> None:
 def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
     """An offset that is measured under way would be false."""
     bench = nominal()
-    bench.board.ask(job, None, bench.now)
+    bench.board.services.ask(job, None, bench.now)
     bench.settle()
     bench.run(0.2)
     with pytest.raises(CommandRefused, match="under way"):
@@ -266,7 +174,7 @@ def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
 def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: str) -> None:
     """It is answered at once."""
     bench = nominal()
-    bench.board.ask(job, None, bench.now)
+    bench.board.services.ask(job, None, bench.now)
     bench.settle()
     bench.run(0.2)
     if stop == "e-stop":
@@ -285,7 +193,7 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
     bench = nominal()
     bench.drive_on()
     mark = bench.now
-    bench.board.ask(Job.LOAD, None, bench.now)
+    bench.board.services.ask(Job.LOAD, None, bench.now)
     bench.settle()
     bench.run(1.0)
     lines = bench.lines(DRIVE, mark)
@@ -304,22 +212,6 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
     bench.run(4.0)
     bench.drive_on()
     assert not bench.robot.standing
-
-
-def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
-    """The line that writes it may be lost, and while the robot is driven nothing is written."""
-    settings = FejemisSettings(written={Written.STEERING: (0.35, 0.45)})
-    bench = Bench(settings=settings)
-    bench.open()
-    bench.hears = set()
-    bench.board._upkeep.configurations["front"].told["confs"] = 0.5, 0.4
-    assert "being written" in bench.board.refusal
-    bench.hears = {DRIVE, FRONT}
-    bench.run_until(lambda: not bench.board._upkeep.configurations["front"].pending)
-    bench.run(0.5)
-    bench.drive_on()
-    assert not bench.robot.standing
-    assert bench.board._upkeep.configurations["front"].known
 
 
 @pytest.mark.parametrize(

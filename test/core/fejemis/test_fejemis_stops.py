@@ -93,7 +93,7 @@ def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone(
 
 
 def lift_it(bench: Bench, volts: float = 6.0) -> None:
-    bench.board.lift(volts, bench.now)
+    bench.board.services.lift(volts, bench.now)
     bench.settle()
 
 
@@ -136,7 +136,7 @@ ENDS: dict[str, Callable[[Bench], object]] = {
 def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]) -> None:
     """When all is well again they are still off."""
     bench = nominal()
-    bench.board.set_brush(True, bench.now)
+    bench.board.services.set_brush(True, bench.now)
     lift_it(bench)
     bench.run(0.1)
     assert bench.robot.vehicle.brush
@@ -158,21 +158,21 @@ def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
     bench = nominal()
     bench.estop(True)
     with pytest.raises(RequestRefused, match="e-stop"):
-        bench.board.set_brush(True, bench.now)
+        bench.board.services.set_brush(True, bench.now)
     with pytest.raises(CommandRefused, match="e-stop"):
-        bench.board.lift(3.0, bench.now)
-    bench.board.set_brush(False, bench.now)
-    bench.board.lift(0.0, bench.now)
+        bench.board.services.lift(3.0, bench.now)
+    bench.board.services.set_brush(False, bench.now)
+    bench.board.services.lift(0.0, bench.now)
     bench.estop(False)
     bench.ask(Request.PAUSE)
     with pytest.raises(RequestRefused, match="paused"):
-        bench.board.set_brush(True, bench.now)
+        bench.board.services.set_brush(True, bench.now)
 
 
 def test_a_command_that_expires_leaves_the_brush_on() -> None:
     """A robot that sweeps may stand for a while."""
     bench = nominal()
-    bench.board.set_brush(True, bench.now)
+    bench.board.services.set_brush(True, bench.now)
     bench.drive_on()
     bench.run(1.5)
     assert bench.robot.standing
@@ -183,7 +183,7 @@ def test_the_lights_are_given_back_at_the_end() -> None:
     """Where they were changed."""
     bench = nominal()
     assert not any(b"leds" in data for _, data in bench.board.switch_off())
-    bench.board.set_led(300, 128, -5, bench.now)
+    bench.board.services.set_led(300, 128, -5, bench.now)
     bench.settle()
     bench.run(0.5)
     assert bench.robot.front.leds == [(255, 128, 0)] * 12
@@ -194,7 +194,7 @@ def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
     """In each of the three ways."""
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()
-        bench.board.set_brush(True, bench.now)
+        bench.board.services.set_brush(True, bench.now)
         lift_it(bench)
         bench.drive_on(seconds=0.4)
         stop, emergency = bench.board.last_words()
@@ -232,7 +232,7 @@ def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> N
 def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
     """The driver was stalled meanwhile, and a brush that turns is said again each second."""
     bench = nominal()
-    bench.board.set_brush(True, bench.now)
+    bench.board.services.set_brush(True, bench.now)
     bench.settle()
     bench.run(0.5)
     for channel, data in bench.board.last_words()[0]:
@@ -248,7 +248,7 @@ def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
 def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
     """It may have restarted, which shows with its second heartbeat."""
     bench = nominal()
-    bench.board.set_brush(True, bench.now)
+    bench.board.services.set_brush(True, bench.now)
     bench.settle()
     bench.run(0.65)
     bench.speaks = {DRIVE}

@@ -4,8 +4,8 @@
 
 import math
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -13,67 +13,16 @@ from typing import Any, Final
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import Driver
-from geometry_msgs.msg import Twist
+from fejemis_driver import driven, moves_again, robot_of, started
 from nav_msgs.msg import Odometry
 from probe import Probe
 from sensor_msgs.msg import BatteryState, Imu, JointState, MagneticField, Range
 from std_msgs.msg import ColorRGBA, Float32
 from std_srvs.srv import SetBool, Trigger
-from two_ports import DRIVE, FRONT, TwoPorts
-
-from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
+from two_ports import TwoPorts
 
 Start = Callable[..., Any]
 NODE: Final = "omnibot_driver"
-
-
-def robot_of(stack: ExitStack, folder: Path, **settings: Any) -> TwoPorts:
-    board = SimulatedFejemis(FejemisSettings(**settings))
-    return stack.enter_context(TwoPorts(board, folder))
-
-
-@pytest.fixture
-def robot(stack: ExitStack, tmp_path: Path) -> TwoPorts:
-    return robot_of(stack, tmp_path)
-
-
-@pytest.fixture
-def driver(robot: TwoPorts, start_driver: Start) -> Driver:
-    return started(robot, start_driver)
-
-
-def started(robot: TwoPorts, start_driver: Start, **parameters: object) -> Driver:
-    port, front_port = robot.ports
-    driver: Driver = start_driver(port, board="fejemis", front_port=front_port, **parameters)
-    return driver
-
-
-@pytest.fixture
-def probe(driver: Driver, probe_of: Start) -> Probe:
-    probe: Probe = probe_of(driver)
-    probe.wait_for_state("nominal")
-    return probe
-
-
-@contextmanager
-def driven(probe: Probe, robot: TwoPorts, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Commanded ten times a second; begins when it moves."""
-    publisher = probe.publisher(Twist, "cmd_vel")
-    twist = Twist()
-    twist.linear.x, twist.angular.z = vx, yaw
-    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
-    try:
-        robot.wait_until(lambda board: not board.standing)
-        yield
-    finally:
-        probe.remove(timer)
-
-
-def moves_again(probe: Probe, robot: TwoPorts) -> None:
-    """By a fresh command."""
-    with driven(probe, robot):
-        pass
-    robot.stands_for_good()
 
 
 def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> None:
@@ -194,118 +143,6 @@ def test_whatever_ends_the_driver_stops_it(
     if number is signal.SIGSTOP:
         driver.process.send_signal(signal.SIGCONT)
         robot.stands_for_good()
-
-
-@pytest.mark.parametrize(("channel", "name"), [(DRIVE, "drive"), (FRONT, "front")])
-def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
-    robot: TwoPorts, driver: Driver, probe: Probe, channel: int, name: str
-) -> None:
-    """The other half hears it, and the lost one once it is back; the brush stays off."""
-    assert probe.call(SetBool, "brush", data=True).success
-    with driven(probe, robot):
-        robot.unplug(channel)
-        probe.wait_for_state("connecting")
-        driver.wait_for_line(rf"lost.*{name}|{name}.*(lost|missing|not heard)")
-        if channel == FRONT:
-            robot.stands_for_good()
-        else:
-            robot.wait_until(lambda board: not board.vehicle.brush)
-    robot.plug(channel)
-    robot.stands_for_good()
-    probe.wait_for_state("nominal")
-    assert not robot.do(lambda board: board.vehicle.brush)
-    subscriptions = robot.do(lambda board: board.half(name).subscriptions)
-    assert len(subscriptions) > 1
-    moves_again(probe, robot)
-
-
-@pytest.mark.parametrize("name", ["drive", "front"])
-@pytest.mark.parametrize("what", ["restart", "silent"])
-def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
-    robot: TwoPorts, driver: Driver, probe: Probe, name: str, what: str
-) -> None:
-    """The robot obeys again once both halves work."""
-    with driven(probe, robot):
-        robot.do(lambda board: board.befall(name, what))
-        if what != "restart":
-            probe.wait_for_state("connecting")
-            driver.wait_for_line(name)
-            robot.stands_for_good()
-    robot.do(lambda board: board.befall(name, "well"))
-    robot.stands_for_good()
-    probe.wait_for_state("nominal")
-    moves_again(probe, robot)
-
-
-@pytest.mark.parametrize("what", ["sensor-error", "hall-broken"])
-def test_a_broken_angle_sensor_stops_the_robot(
-    robot: TwoPorts, driver: Driver, probe: Probe, what: str
-) -> None:
-    """One sentence says what is wrong with it."""
-    with driven(probe, robot):
-        robot.do(lambda board: board.befall("front", what))
-        robot.stands_for_good()
-    driver.wait_for_line("angle sensor")
-    robot.do(lambda board: board.befall("front", "sensor-well"))
-    moves_again(probe, robot)
-
-
-def test_swapped_ports_are_found_out(
-    stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
-) -> None:
-    """By the ids in the heartbeats; the robot drives as usual."""
-    robot = robot_of(stack, tmp_path, swapped=True)
-    driver = started(robot, start_driver)
-    probe: Probe = probe_of(driver)
-    probe.wait_for_state("nominal")
-    driver.wait_for_line("swapped")
-    moves_again(probe, robot)
-
-
-def test_it_drives_without_sums(
-    stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
-) -> None:
-    """Learnt from the heartbeats: the firmware complains of no line once that is done."""
-    robot = robot_of(stack, tmp_path, firmware=Firmware(sums=False))
-    probe: Probe = probe_of(started(robot, start_driver))
-    probe.wait_for_state("nominal")
-    before = robot.do(lambda board: board.drive.unhandled + board.front.unhandled)
-    moves_again(probe, robot)
-    assert robot.do(lambda board: board.drive.unhandled + board.front.unhandled) == before
-
-
-def test_the_same_port_twice_ends_the_start(robot: TwoPorts, start_driver: Start) -> None:
-    """In one sentence."""
-    driver: Driver = start_driver(robot.ports[0], board="fejemis", front_port=robot.ports[0])
-    driver.wait_for_line("'front_port' must not be .* have a port each")
-    assert driver.end() == 2
-
-
-@pytest.mark.parametrize(
-    ("ids", "wrong"),
-    [((42, 91), "id 42"), ((90, 7), "id 7"), ((90, 90), "both ports lead to a drive board")],
-)
-def test_a_teensy_of_another_kind_is_named_and_nothing_moves(
-    stack: ExitStack,
-    tmp_path: Path,
-    start_driver: Start,
-    probe_of: Start,
-    ids: tuple[int, int],
-    wrong: str,
-) -> None:
-    """By its id."""
-    robot = robot_of(stack, tmp_path, ids=ids)
-    driver = started(robot, start_driver)
-    probe: Probe = probe_of(driver)
-    driver.wait_for_line(wrong)
-    probe.wait_for_state("connecting")
-    publisher = probe.publisher(Twist, "cmd_vel")
-    twist = Twist()
-    twist.linear.x = 0.3
-    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
-    robot.stands_for_good()
-    probe.remove(timer)
-    assert robot.do(lambda board: board.truth.x_m) == 0.0
 
 
 def test_jobs_answer(robot: TwoPorts, probe: Probe) -> None:

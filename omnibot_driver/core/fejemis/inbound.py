@@ -1,0 +1,150 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What follows from each message: which board sent it, what it stops, whether the robot obeys.
+
+Hands a message to whoever it concerns, and keeps the mode. Knows no bytes, and nothing of how
+anything is said to the boards.
+"""
+
+from collections.abc import Callable
+
+from omnibot_driver.core.board import Mode
+from omnibot_driver.core.fejemis.half import Half, keyword_of
+from omnibot_driver.core.fejemis.messages import FrontAngle, Heartbeat, Message
+from omnibot_driver.core.fejemis.obedience import Obedience
+from omnibot_driver.core.fejemis.ports import Ports
+from omnibot_driver.core.fejemis.told import Told
+from omnibot_driver.core.fejemis.translation import Translation
+from omnibot_driver.core.fejemis.upkeep import Upkeep
+from omnibot_driver.core.fejemis.watch import Watch
+from omnibot_driver.core.readings import PausedReading
+
+AngleTold = Callable[[float, float], bool]
+"""(angle in rad, now) -> whether this shows that the front wheel does not follow."""
+
+
+class Inbound:
+    """``mode``: nominal while both halves talk and the drive board obeys.
+
+    ``relay_rad``: an angle of the front wheel that the drive board has not got yet; to be taken.
+    """
+
+    def __init__(
+        self,
+        ports: Ports,
+        translation: Translation,
+        upkeep: Upkeep,
+        obedience: Obedience,
+        told: Told,
+        angle_told: AngleTold,
+    ) -> None:
+        self._ports, self._translation, self._upkeep = ports, translation, upkeep
+        self._obedience, self._told, self._angle_told = obedience, told, angle_told
+        self.watch = Watch(ports, translation.front, told)
+        self.begin()
+
+    def begin(self) -> None:
+        """The lines are new."""
+        self.mode = Mode.UNKNOWN
+        self.relay_rad: float | None = None
+        self.watch.begin()
+
+    def take_relay(self) -> float | None:
+        """The angle that the drive board is to get; once."""
+        angle_rad, self.relay_rad = self.relay_rad, None
+        return angle_rad
+
+    def receive(self, data: bytes, now: float, channel: int) -> None:
+        """Bytes of one port."""
+        half = self._ports.halves[channel]
+        for message in half.feed(data, now):
+            if half.restarted:
+                half.restarted = False
+                self._restarted(half, now)
+            self._hear(half, message, now)
+        if half.not_understood(now):
+            self._told.tell(
+                f"many lines from the {self._ports.role(channel)} board are damaged or not"
+                " understood: check the cable, and whether another program asks it for help text",
+                now,
+            )
+        if half.decoder.changed:
+            half.decoder.changed = False
+            ended = "have sums now" if half.decoder.sums else "have no sums any more"
+            self._told.halt(f"the lines of the {half.role} board {ended}; robot stopped", now)
+
+    def look(self, now: float, *, driving: bool) -> None:
+        """What the time shows. ``driving``: a motion is commanded."""
+        machine = self._upkeep.machine
+        if self.watch.look(now, driving=driving):
+            machine.off()
+        elif machine.active and now >= self.watch.front_unheard_at:
+            machine.off()
+            self._told.tell(
+                "no data from the front board for 0.25 s; brush and lift switched off", now
+            )
+        if not self._ports.ready:
+            self.mode = Mode.UNKNOWN
+        else:
+            self.mode = Mode.PAUSED if self._is_stopped(now) else Mode.NOMINAL
+
+    def _is_stopped(self, now: float) -> bool:
+        paused = self.mode is Mode.PAUSED
+        return self._ports.ready and self._obedience.stopped(now, was_paused=paused)
+
+    def _hear(self, half: Half, message: Message, now: float) -> None:
+        if isinstance(message, Heartbeat):
+            self._heartbeat(half, message, now)
+        if (role := half.role) is None:
+            return
+        if keyword := keyword_of(message):
+            half.note(keyword, now)
+        self._upkeep.hear(role, message, now)
+        if isinstance(message, FrontAngle):
+            if role == "front":
+                self._front_angle(message, now)
+        elif role == "drive":
+            self._translation.odometry.track_m = self._upkeep.geometry.track_m
+            self._translation.hear_drive(message, half.clock, now)
+        else:
+            self._translation.hear_front(message, now)
+
+    def _heartbeat(self, half: Half, message: Heartbeat, now: float) -> None:
+        if self._ports.identify() and self._ports.swapped:
+            self._told.tell(
+                "the ports are swapped: the drive board is at `front_port`, which works as well",
+                now,
+            )
+        if trouble := self._ports.trouble:
+            self._told.halt(f"{trouble}; robot stopped", now)
+        if half.role != "drive":
+            return
+        self._obedience.hear(message.state)
+        if self._is_stopped(now):
+            was_paused, self.mode = self.mode is Mode.PAUSED, Mode.PAUSED
+            self._upkeep.machine.off()
+            self._translation.add(PausedReading(continues=was_paused), now)
+
+    def _front_angle(self, message: FrontAngle, now: float) -> None:
+        front = self._translation.front
+        if not front.hear(message, now):
+            return
+        self.relay_rad = front.angle_rad
+        self._translation.steering(front.angle_rad, now)
+        if self._angle_told(front.angle_rad, now):
+            self._told.halt(
+                "the front wheel does not go where it is commanded; robot stopped. Check the servo"
+                " and its power; for reversing see `allow_reverse`",
+                now,
+            )
+
+    def _restarted(self, half: Half, now: float) -> None:
+        if (role := half.role) is None:
+            return
+        self.mode = Mode.UNKNOWN
+        self._upkeep.restarted(role)
+        if role == "drive":
+            self._translation.restarted()
+        else:
+            self._translation.front.begin()
+        self._told.halt(f"the {role} board has restarted; robot stopped", now)

@@ -1,0 +1,94 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What a user asks of this robot besides motion: brush, lift, LED band, and jobs.
+
+Knows when each may be done; not how it is said, nor what shows that it is done.
+"""
+
+from typing import Final, Protocol
+
+from omnibot_driver.core.board import Mode
+from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.fejemis.obedience import Obedience
+from omnibot_driver.core.fejemis.odometry import PoseOdometry
+from omnibot_driver.core.fejemis.readings import Job
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.fejemis.told import Told
+from omnibot_driver.core.fejemis.upkeep import Upkeep
+
+STOPS_WITHIN_S: Final = 0.5
+"""How long after Stop a configuration is loaded."""
+
+
+class Robot(Protocol):
+    """What the services ask of the two boards."""
+
+    @property
+    def mode(self) -> Mode:
+        """Whether both halves talk and obey."""
+
+    @property
+    def driving(self) -> bool:
+        """Whether a motion is commanded."""
+
+    @property
+    def settings(self) -> FejemisSettings:
+        """For times and delays."""
+
+
+class Services:
+    """One call each."""
+
+    def __init__(
+        self, robot: Robot, upkeep: Upkeep, obedience: Obedience, odometry: PoseOdometry, told: Told
+    ) -> None:
+        self._robot, self._upkeep, self._obedience = robot, upkeep, obedience
+        self._odometry, self._told = odometry, told
+
+    def set_brush(self, on: bool, now: float) -> None:
+        """Until it is switched off, or something ends it. Raises RequestRefused."""
+        if on and (reason := self._why_not_turn()):
+            raise RequestRefused(f"brush not switched on: {reason}")
+        self._upkeep.machine.set_brush(on)
+
+    def lift(self, volts: float, now: float) -> None:
+        """For ``command_timeout_s`` at most; positive lifts. Raises CommandRefused."""
+        if volts and (reason := self._why_not_turn()):
+            raise CommandRefused(f"lift_cmd rejected: {reason}")
+        self._upkeep.machine.lift(volts, now, self._robot.settings.command_timeout_s)
+
+    def set_led(self, red: int, green: int, blue: int, now: float) -> None:
+        """Colour of the band, 0..255 each."""
+        red, green, blue = (max(0, min(255, part)) for part in (red, green, blue))
+        self._upkeep.machine.set_colour(red, green, blue)
+
+    def ask(self, job: Job, token: object, now: float) -> None:
+        """Begin a job; a JobDone answers. Raises RequestRefused."""
+        robot, moving = self._robot, self._odometry.moving
+        if robot.mode is Mode.UNKNOWN:
+            raise RequestRefused(f"{job.value} refused: a board is not heard; check both cables")
+        if robot.driving and job is not Job.LOAD:
+            raise RequestRefused(
+                f"{job.value} refused: the robot is commanded; stop the sender, then call again"
+            )
+        if moving and job is not Job.LOAD:
+            raise RequestRefused(f"{job.value} refused: the robot moves; wait until it stands")
+        moves = robot.driving or moving
+        self._upkeep.jobs.ask(
+            job,
+            token,
+            now,
+            delay_s=robot.settings.power_off_delay_s,
+            wait_s=STOPS_WITHIN_S if moves else 0.0,
+        )
+        if moves:
+            self._told.halt("the configuration is being loaded; robot stopped", now)
+        if job in (Job.LOAD, Job.POWER_OFF):
+            self._upkeep.machine.off()
+
+    def _why_not_turn(self) -> str:
+        if self._obedience.estopped:
+            return "the e-stop is latched; release it first"
+        if self._robot.mode is not Mode.NOMINAL:
+            return f"the board is {self._robot.mode.value}"
+        return ""

@@ -1,0 +1,37 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the drive Teensy's two distance sensors see of a wall across the x axis.
+
+Time of flight measures always, the sonar when it is triggered. Knows the robot's place alone.
+"""
+
+from math import cos
+
+from omnibot_driver.simulator.fejemis.settings import FejemisSettings
+from omnibot_driver.simulator.fejemis.vehicle import Vehicle
+
+TOF_FAR_M = 8.19
+SONAR_FAR_M = 4.0
+
+
+class Distances:
+    """sonar_m: as it was measured last, 0 where it saw nothing."""
+
+    def __init__(self, settings: FejemisSettings, vehicle: Vehicle) -> None:
+        self._settings, self._vehicle = settings, vehicle
+        self.trigger()
+
+    def trigger(self) -> None:
+        """The sonar measures."""
+        distance_m = max(0.0, self._wall_m())
+        self.sonar_m = distance_m if distance_m < SONAR_FAR_M else 0.0
+
+    @property
+    def tof_m(self) -> float:
+        """The range of the sensor where it sees nothing."""
+        return min(TOF_FAR_M, max(0.0, self._wall_m()))
+
+    def _wall_m(self) -> float:
+        truth = self._vehicle.truth
+        facing = cos(truth.yaw_rad)
+        return (self._settings.front_m - truth.x_m) / facing if facing > 0.1 else float("inf")

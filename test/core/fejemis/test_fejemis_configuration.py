@@ -1,0 +1,116 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the boards keep: read from them, written where the user has set it, and read back."""
+
+import pytest
+from fejemis_bench import DRIVE, FRONT, Bench, nominal
+
+from omnibot_driver.core.fejemis.codec import parse
+from omnibot_driver.core.fejemis.configuration import Configuration
+from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
+from omnibot_driver.core.fejemis.steering import Geometry
+from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
+
+WRITTEN: dict[Written, tuple[float, ...]] = {
+    Written.WHEELS: (0.08, 0.081, 20.0, 48.0, 0.41),
+    Written.STEERING: (0.41, 0.43),
+    Written.FRONT_WHEEL: (2.5, 0.0),
+    Written.INFRARED: (40000.0, 13000.0, 41000.0, 12000.0),
+    Written.MAGNETOMETER: (1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+    Written.ACCELEROMETER: (0.1, 0.2, 0.3, 1.0, 1.0, 1.0),
+    Written.STEERING_GAINS: (1.0, 40.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.15, 0.05),
+}
+
+
+def test_only_what_the_user_set_is_written() -> None:
+    """All else is read and shown."""
+    bench = nominal()
+    bench.run(3.0)
+    words = {text.split()[0] for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
+    assert not words & {setting.command for setting in Written}
+    assert "setid" not in words
+    own = bench.board.figures.own
+    assert own["Drive conf"] == "0.0775 0.0775 19 68 0.4"
+    assert own["Front confs"] == "0.42 0.4"
+    assert own["Drive ver"].startswith("110")
+    assert own["Front id"] == "front 91"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sums", [True, False])
+def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restart(
+    *, sums: bool
+) -> None:
+    """On the board whose it is."""
+    from omnibot_driver.simulator.fejemis import Firmware
+
+    bench = nominal(Simulated(firmware=Firmware(sums=sums)), FejemisSettings(written=WRITTEN))
+    bench.run(1.0)
+    for _ in range(2):
+        drive, front = bench.robot.drive.config, bench.robot.front.config
+        assert drive.radii_m == (0.08, 0.081)
+        assert (drive.gear, drive.ticks, drive.wheel_base_m) == (20.0, 48.0, 0.41)
+        assert drive.confs_m == front.confs_m == (0.41, 0.43)
+        assert front.angle_offset_deg == 2.5
+        assert front.ir == (40000.0, 13000.0, 41000.0, 12000.0)
+        assert front.steering[:2] == (1.0, 40.0)
+        assert bench.board.geometry.track_m == 0.41
+        mark = bench.now
+        bench.run(3.0)
+        written = {setting.command for setting in Written}
+        assert not written & {text.split()[0] for text in bench.lines(FRONT, mark)}
+        assert bench.board.advice is None
+        bench.robot.drive.reboot()
+        bench.robot.front.reboot()
+        bench.run(5.0)
+
+
+def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
+    """After some tries."""
+    bench = nominal(settings=FejemisSettings(written={Written.WHEELS: (0.08, -1.0, 1.0, 1.0, 1.0)}))
+    bench.run(6.0)
+    assert any("confw" in text for text in bench.notices)
+
+
+def test_the_order_of_the_steering_geometry_is_found_out() -> None:
+    """The help text has it otherwise than the command; the track in ``conf`` decides."""
+    for turned in (False, True):
+        configuration = Configuration("drive", {})
+        configuration.hear(parse("conf 0.0775 0.0775 19 68 0.4000 0.001"))
+        configuration.hear(parse("confs 0.4000 0.4200" if turned else "confs 0.4200 0.4000"))
+        assert configuration.geometry == Geometry(track_m=0.4, wheelbase_m=0.42)
+
+
+def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
+    """Nothing is understood then but heartbeats."""
+    bench = Bench(settings=FejemisSettings(line_sums="off"))
+    bench.open()
+    bench.run(4.0)
+    assert bench.session.state == "connecting"
+    assert any("contradict" in text for text in bench.notices)
+
+
+def test_boards_with_different_geometries_are_told_of() -> None:
+    """One of them computes with a robot that is not there."""
+    bench = nominal()
+    bench.robot.receive(b"confs 0.4 0.5\n", bench.now, FRONT)
+    bench.session.closed(bench.now)
+    bench.open()
+    bench.run(4.0)
+    assert any("different steering geometries" in text for text in bench.notices)
+
+
+def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
+    """The line that writes it may be lost, and while the robot is driven nothing is written."""
+    settings = FejemisSettings(written={Written.STEERING: (0.35, 0.45)})
+    bench = Bench(settings=settings)
+    bench.open()
+    bench.hears = set()
+    bench.board._upkeep.configurations["front"].told["confs"] = 0.5, 0.4
+    assert "being written" in bench.board.refusal
+    bench.hears = {DRIVE, FRONT}
+    bench.run_until(lambda: not bench.board._upkeep.configurations["front"].pending)
+    bench.run(0.5)
+    bench.drive_on()
+    assert not bench.robot.standing
+    assert bench.board._upkeep.configurations["front"].known

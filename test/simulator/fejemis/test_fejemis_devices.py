@@ -1,0 +1,151 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What hangs on each half of the simulated Fejemis: brush, lift, LEDs, distances, IMU, settings."""
+
+from math import pi
+
+import pytest
+from fejemis_rig import DRIVE, FRONT, Rig
+
+MODULE = "omnibot_driver.simulator.fejemis"
+
+
+def test_brush_and_lift() -> None:
+    """12 s from end to end at 6 V; the voltage ends with its time, or with 0."""
+    rig = Rig().booted()
+    rig.say(FRONT, "brush 1", "motv 6 6")
+    rig.run(1.0)
+    assert rig.board.vehicle.brush
+    assert rig.ask(FRONT, "moti") == ["mot 6.00 0 0 0 0 15000"]
+    rig.run(9.0)
+    assert rig.board.vehicle.lift.height == pytest.approx(0.5, abs=0.01)
+    assert rig.board.vehicle.lift.volts == 0.0
+    rig.say(FRONT, "motv -30 9")
+    rig.run(1.0)
+    assert rig.board.vehicle.lift.volts == -12.0
+    rig.say(FRONT, "motv 0 0", "brush 0")
+    rig.run(0.1)
+    assert rig.board.vehicle.lift.volts == 0.0
+    assert not rig.board.vehicle.brush
+
+
+def test_the_band_and_single_leds() -> None:
+    """0 to 255 of each colour."""
+    rig = Rig().booted()
+    rig.say(FRONT, "ledb 10 20 300", "led 3 1 2 3")
+    rig.run(0.01)
+    leds = rig.board.front.leds
+    assert leds[0] == (10, 20, 255)
+    assert leds[3] == (1, 2, 3)
+    rig.say(FRONT, "leds", "ledon 0")
+    rig.run(0.01)
+    assert rig.board.front.leds[3] == (0, 20, 0)
+    assert not rig.board.front.leds_on
+
+
+def test_distances_to_a_wall() -> None:
+    """Far away: 8.19 m, no echo, and the end of the infrared range."""
+    rig = Rig(front_m=0.5).booted()
+    assert rig.ask(DRIVE, "tofdi") == ["tofd 0.500"]
+    assert rig.ask(FRONT, "iri")[0].split()[:3] == ["irc", "0.500", "0.500"]
+    assert rig.ask(DRIVE, "sr04i") == ["sr04 0.500"]
+    free = Rig().booted()
+    assert free.ask(DRIVE, "tofdi") == ["tofd 8.190"]
+    assert free.ask(FRONT, "iri")[0].split()[1] == "0.990"
+    assert free.ask(DRIVE, "sr04i") == ["sr04 0.000"]
+
+
+def test_the_sonar_measures_when_it_is_triggered() -> None:
+    """``hcsr``; until then it repeats itself."""
+    rig = Rig(front_m=2.0).booted()
+    rig.drive("rc 2 0.5 0", 2.0)
+    assert rig.ask(DRIVE, "sr04i") == ["sr04 2.000"]
+    rig.say(DRIVE, "hcsr")
+    assert 0.9 < float(rig.ask(DRIVE, "sr04i")[0].split()[1]) < 1.2
+
+
+def test_the_gyro_is_calibrated_in_a_second_whether_it_stands_or_not() -> None:
+    """The mean of what it reads becomes its offset."""
+    rig = Rig().booted()
+    rig.say(DRIVE, "gyroc")
+    rig.run(1.2)
+    offsets = [float(number) for number in rig.ask(DRIVE, "gyrooi")[0].split()[1:]]
+    assert offsets == pytest.approx([0.4, -0.3, 0.25], abs=0.02)
+    rig.drive("rc 2 0 10", 3.0)
+    rig.say(DRIVE, "gyroc")
+    rig.run(1.2)
+    assert float(rig.ask(DRIVE, "gyrooi")[0].split()[3]) > 5.0
+
+
+def test_the_accelerometer_is_calibrated_as_level() -> None:
+    """``acccal2``; ``acccal`` sets offsets and scales."""
+    rig = Rig(accel_noise_mps2=0.0).booted()
+    rig.say(DRIVE, "acccal2")
+    rig.run(1.2)
+    numbers = [float(number) for number in rig.ask(DRIVE, "acci")[0].split()[1:]]
+    assert numbers == pytest.approx([0.0, 0.0, 9.80665], abs=1e-3)
+    rig.say(DRIVE, "acccal 0.08 -0.05 0.12 2 1 1")
+    rig.run(0.01)
+    assert rig.ask(DRIVE, "accoi") == ["acco 0.0800 -0.0500 0.1200"]
+
+
+def test_the_yaw_of_the_imu_follows_the_robot() -> None:
+    """A gyro without bias; a bias that is not calibrated away would add to it."""
+    rig = Rig(gyro_bias_dps=(0.0, 0.0, 0.0)).booted()
+    rig.drive("rc 2 0.3 20", 4.0)
+    yaw = float(rig.ask(DRIVE, "imuposei")[0].split()[3])
+    assert (yaw - rig.board.truth.yaw_rad + pi) % (2 * pi) - pi == pytest.approx(0.0, abs=0.01)
+
+
+def test_the_answer_to_confs_has_the_steering_first() -> None:
+    """``confs B F`` sets it, ``confs F B`` is the answer, in both halves."""
+    rig = Rig().booted()
+    for port in (DRIVE, FRONT):
+        rig.say(port, "confs 0.5 0.6")
+        rig.run(0.01)
+        assert rig.ask(port, "confsi") == ["confs 0.6000 0.5000"]
+
+
+def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
+    """``eew`` saves, ``eer`` loads, and so does a restart."""
+    rig = Rig().booted()
+    rig.say(DRIVE, "confw 0.08 0.081 20 64 0.41")
+    rig.run(0.01)
+    assert rig.ask(DRIVE, "confi") == ["conf 0.0800 0.0810 20.000 64 0.4100 0.0010"]
+    rig.say(DRIVE, "eer")
+    rig.run(0.01)
+    assert rig.ask(DRIVE, "confi") == ["conf 0.0775 0.0775 19.000 68 0.4000 0.0010"]
+    rig.say(DRIVE, "confw 0.08 0.081 20 64 0.41", "eew")
+    rig.run(0.01)
+    rig.board.befall("drive", "restart")
+    rig.run(1.0)
+    assert rig.ask(DRIVE, "confi")[0].startswith("conf 0.0800 0.0810")
+
+
+def test_id_zero_erases_the_configuration() -> None:
+    """Nothing is saved until the board has an id again."""
+    rig = Rig().booted()
+    rig.say(DRIVE, "setname cart", "confw 0.08 0.08 20 64 0.41", "eew", "setid 0")
+    rig.run(0.01)
+    assert rig.ask(DRIVE, "idi") == ["id drive 0"]
+    assert rig.ask(DRIVE, "confi")[0].startswith("conf 0.0775")
+    rig.say(DRIVE, "confw 0.08 0.08 20 64 0.41", "eew", "eer")
+    rig.run(0.01)
+    assert rig.ask(DRIVE, "confi")[0].startswith("conf 0.0775")
+    rig.say(DRIVE, "setid 90", "eew")
+    rig.run(0.01)
+    assert rig.board.drive.saved.number == 90
+
+
+def test_gains_of_the_steering_count() -> None:
+    """``cssteer``, in the order of ``cpsteer``; half the gain is slower."""
+    times = []
+    for gain in (43, 10):
+        rig = Rig().booted()
+        rig.say(FRONT, f"cssteer 1 {gain} 0 0 0 1 1 0.16 0.048 0 0 0 0 0 0 1 1000", "rc 2 1 20")
+        rig.run(0.01)
+        assert rig.ask(FRONT, "cpsteeri")[0].split()[2] == str(gain)
+        while rig.board.vehicle.servo.angle_deg < 5.0:
+            rig.run(0.002)
+        times.append(rig.now)
+    assert times[1] > times[0] + 0.1

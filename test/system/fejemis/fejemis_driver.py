@@ -1,0 +1,52 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What tests of the driver with a simulated Fejemis do: start it, and drive."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from driver_process import Driver
+from geometry_msgs.msg import Twist
+from probe import Probe
+from two_ports import TwoPorts
+
+from omnibot_driver.simulator.fejemis import FejemisSettings, SimulatedFejemis
+
+Start = Callable[..., Any]
+NODE: Final = "omnibot_driver"
+
+Start = Callable[..., Any]
+
+
+def robot_of(stack: ExitStack, folder: Path, **settings: Any) -> TwoPorts:
+    board = SimulatedFejemis(FejemisSettings(**settings))
+    return stack.enter_context(TwoPorts(board, folder))
+
+
+def started(robot: TwoPorts, start_driver: Start, **parameters: object) -> Driver:
+    port, front_port = robot.ports
+    driver: Driver = start_driver(port, board="fejemis", front_port=front_port, **parameters)
+    return driver
+
+
+@contextmanager
+def driven(probe: Probe, robot: TwoPorts, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
+    """Commanded ten times a second; begins when it moves."""
+    publisher = probe.publisher(Twist, "cmd_vel")
+    twist = Twist()
+    twist.linear.x, twist.angular.z = vx, yaw
+    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
+    try:
+        robot.wait_until(lambda board: not board.standing)
+        yield
+    finally:
+        probe.remove(timer)
+
+
+def moves_again(probe: Probe, robot: TwoPorts) -> None:
+    """By a fresh command."""
+    with driven(probe, robot):
+        pass
+    robot.stands_for_good()
