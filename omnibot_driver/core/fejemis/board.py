@@ -14,8 +14,8 @@ from typing import Final
 from omnibot_driver.core.board import Board, BoardFigures, Mode
 from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.fejemis.actuator import PairStream
+from omnibot_driver.core.fejemis.angle_relay import AngleRelay
 from omnibot_driver.core.fejemis.encoder import Encoder
-from omnibot_driver.core.fejemis.front_wheel import relay_text
 from omnibot_driver.core.fejemis.inbound import Inbound
 from omnibot_driver.core.fejemis.machine import OFF
 from omnibot_driver.core.fejemis.motion_lines import STOP
@@ -49,6 +49,7 @@ class FejemisBoard(Board):
         self._encoder = Encoder(self, settings)
         self._upkeep = Upkeep(self._ports, settings)
         self._told = Told()
+        self._relay = AngleRelay()
         self._obedience = Obedience()
         self._inbound = Inbound(
             self._ports,
@@ -284,7 +285,8 @@ class FejemisBoard(Board):
         """The relayed angle first, then what keeps both talking."""
         packets = NO_PACKETS
         if (angle_rad := self._inbound.take_relay()) is not None:
-            packets = self._ports.line("drive", relay_text(angle_rad))
+            text = self._relay.text(angle_rad, sums=self.with_sums)
+            packets = self._ports.line("drive", text)
         if self._obedience.start_due(now):
             packets += self._ports.line("drive", b"start")
         texts = self._upkeep.due(now, stands=not self.driving)

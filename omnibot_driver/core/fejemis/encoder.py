@@ -7,12 +7,12 @@ front wheel is to turn, and whether the drive board is held back. Knows geometry
 they are sent.
 """
 
-import math
 from typing import Protocol
 
 from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Order, TurnWheels
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.fejemis.motion_lines import LEAST_MPS, STOP, drive_line, front_line
+from omnibot_driver.core.fejemis.motion_lines import LEAST_MPS, drive_line, front_line
+from omnibot_driver.core.fejemis.plain_lines import plain_drive_line, plain_front_line
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.steering import (
     ACROSS_RAD,
@@ -134,18 +134,8 @@ class Encoder:
             front = front_line(speed, turn, geometry.wheelbase_m)
             drive = drive_line(steered.part * speed, steered.part * turn)
         else:
-            front = _plain(speed, turn)
-            drive = _plain(steered.part * speed, steered.part * turn) if steered.part else STOP
+            front = plain_front_line(speed, turn)
+            drive = plain_drive_line(steered.part * speed, steered.part * turn)
         packets = pair.motion(drive, front)
         self._encoded = packets, steered
         return packets
-
-
-def _plain(speed_mps: float, turn_radps: float) -> bytes:
-    """Without a sum no choice of digits helps, but few of them are damaged more seldom."""
-    return b"rc 2 %s %s" % (_short(speed_mps, 4), _short(math.degrees(turn_radps), 2))
-
-
-def _short(number: float, decimals: int) -> bytes:
-    text = f"{number:.{decimals}f}".rstrip("0").rstrip(".")
-    return (text if text.strip("-") else "0").encode("ascii")

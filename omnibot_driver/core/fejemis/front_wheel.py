@@ -6,11 +6,9 @@ Knows angles, the sensor's bits and times; not what is commanded.
 """
 
 import math
-from functools import lru_cache
 from typing import Final
 
 from omnibot_driver.core.fejemis.messages import FrontAngle
-from omnibot_driver.core.fejemis.outbound import harmless
 
 OLDEST_S: Final = 0.06
 """An angle of more than four lines ago stops the robot."""
@@ -22,8 +20,6 @@ SICK_LINES: Final = 3
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
 """No servo turns the wheel further between two lines."""
-ROUNDED_DEG: Final = 0.25
-"""Largest error of an angle that is rounded to digits whose loss can be detected."""
 BITS: Final = (
     (10, False, "broken Hall element"),
     (9, True, "gain control not settled"),
@@ -110,22 +106,3 @@ def complaints(told: FrontAngle) -> list[str]:
             text for bit, wanted, text in BITS if bool(told.diagnosis >> bit & 1) is not wanted
         ]
     return words
-
-
-def relay_text(angle_rad: float) -> bytes:
-    """``fwl`` for the drive board, in digits of which no two can be lost unseen, where it has some.
-
-    A false angle lasts until the next line, 15 ms later.
-    """
-    return _relay_text(round(100 * math.degrees(angle_rad)))
-
-
-@lru_cache(maxsize=20_000)
-def _relay_text(hundredths: int) -> bytes:
-    for off in range(int(100 * ROUNDED_DEG) + 1):
-        for near in (hundredths + off, hundredths - off):
-            text = f"{near / 100:.2f}"
-            for written in (text, text.replace("0.", ".", 1)):
-                if harmless(written) and abs(100 * float(written) - hundredths) <= off + 0.5:
-                    return b"fwl " + written.encode("ascii")
-    return b"fwl %.2f" % (hundredths / 100)

@@ -11,7 +11,8 @@ import math
 from typing import Final
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.fejemis.numerals import nearest
+from omnibot_driver.core.fejemis.numerals import between, nearest
+from omnibot_driver.core.fejemis.outbound import robust
 
 OFF: Final = (b"motv 0 0", b"brush 0")
 TIMES: Final = 3
@@ -20,6 +21,8 @@ BRUSH_AGAIN_S: Final = 1.0
 """How often ``brush 1`` is repeated while it turns: a line may be lost."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
+LEAST_PART: Final = 0.5
+"""Of a voltage; among the numerals from there on is one whose loss can be detected."""
 LEAST_TIME_S: Final = 0.04
 
 
@@ -116,6 +119,7 @@ def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     if not volts:
         return OFF[0], 0.0
     seconds, time_text = nearest(max(LEAST_TIME_S, longest_s), negative=True, down=True)
-    _, text = nearest(abs(volts), negative=volts < 0.0, down=True)
-    sign = "-" if volts < 0.0 else ""
-    return f"motv {sign}{text} {time_text}".encode("ascii"), seconds
+    most, sign = abs(volts), "-" if volts < 0.0 else ""
+    texts = [text for _, text in between(LEAST_PART * most, most, negative=volts < 0.0)]
+    lines = [f"motv {sign}{text} {time_text}".encode("ascii") for text in reversed(texts)]
+    return next(filter(robust, lines), lines[0]), seconds

@@ -4,13 +4,14 @@
 
 A sum mod 99 does not see two lost characters whose codes add up to 99 or 198 (`0` and `3`, `1` and
 `2`, `.` and `5`, `-` and `6`): a motion line must not have both of a pair, see `motion_lines.py`.
-Spaces at the end of every line choose its sum, against two more kinds of damage:
+Two more kinds of damage depend on the sum, so the digits of a motion line are chosen by that too:
 
 * A lost line end makes one line of two. It passes if the sum of the second, with its prefix, equals
-  what else was lost: so no such sum may be the code of a character of a number.
+  what else was lost: so no such sum may be the code of a character of a number. Other lines with
+  such a sum begin with an empty one, which no board obeys.
 * A lost digit of the sum leaves one that fits the rest only if the right character is lost too.
 
-Without sums nothing of this helps: a damaged number is obeyed until the next line comes.
+Nothing is ever added to a line itself: a board may compare ``stop`` with all of the line.
 """
 
 from functools import lru_cache
@@ -25,8 +26,6 @@ _COMPLEMENTS: Final = tuple(
     for other in sorted(IN_NUMBERS)
     if one <= other and (one + other) % MODULUS == 0
 )
-LONGEST_PADDING: Final = 98
-"""Spaces with which every sum occurs."""
 
 
 @lru_cache(maxsize=1024)
@@ -34,11 +33,8 @@ def line(text: bytes, *, sums: bool) -> bytes:
     """The characters of one line, to its end."""
     if not sums:
         return text + b"\n"
-    for spaces in range(LONGEST_PADDING + 1):
-        padded = text + spaces * b" "
-        if _robust(sum_of(padded)):
-            return with_sum(padded) + b"\n"
-    return with_sum(text) + b"\n"
+    before = b"" if robust(text) else b"\n"
+    return before + with_sum(text) + b"\n"
 
 
 def lines(*texts: bytes, sums: bool) -> bytes:
@@ -55,7 +51,9 @@ def harmless(text: str) -> bool:
     )
 
 
-def _robust(total: int) -> bool:
+def robust(text: bytes) -> bool:
+    """Whether its sum stands for no character of a number that is lost with another."""
+    total = sum_of(text)
     tens, ones = divmod(total, 10)
     as_second = (ord(";") + 2 * ord("0") + tens + ones + total - 1) % MODULUS
     without_tens, without_ones = (total - ones) % MODULUS, (total - tens) % MODULUS

@@ -100,7 +100,9 @@ class Ports:
 
     def both(self, text: bytes) -> Packets:
         """A line to each, behind an empty one, which ends whatever was half said."""
-        return tuple((channel, b"\n" + self._at(channel, text)[1]) for channel in (0, 1))
+        return tuple(
+            (channel, b"\n" + self._at(channel, text)[1].lstrip(b"\n")) for channel in (0, 1)
+        )
 
     def _at(self, channel: int, *texts: bytes) -> tuple[int, bytes]:
         return channel, outbound.lines(*texts, sums=self.halves[channel].sums)

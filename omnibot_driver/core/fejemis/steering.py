@@ -113,7 +113,7 @@ def told_twist(
     speed_mps: float, turn_radps: float, geometry: Geometry, angle_rad: float
 ) -> BodyTwist:
     """Of a body whose drive board gets this command, by the manual's equations."""
-    outer = math.copysign(math.hypot(speed_mps, turn_radps), speed_mps)
+    outer = math.copysign(math.hypot(speed_mps, turn_radps), speed_mps or 1.0)
     return body_twist(outer, geometry, angle_rad)
 
 

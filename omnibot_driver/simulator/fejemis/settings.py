@@ -27,6 +27,8 @@ class Firmware:
     confirms: a command behind ``!`` is confirmed, as in newer siblings.
     shows_source: the heartbeat of drive has the source of the last ``rc``; otherwise 10 or -1 only.
     single_precision: times are float32, so after an hour they have steps of 0.2 ms.
+    exact_words: a command without numbers is known only if its line has nothing else, not even a
+        space, as a sibling compares ``stop``.
     """
 
     sums: bool = True
@@ -39,6 +41,7 @@ class Firmware:
     confirms: bool = False
     shows_source: bool = True
     single_precision: bool = False
+    exact_words: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -23,6 +23,12 @@ C = TypeVar("C", DriveConfig, FrontConfig)
 STEP_S = 0.001
 HEARTBEAT_MS = 400
 LONGEST_NAME = 31
+WITHOUT_NUMBERS = frozenset(
+    {
+        "acccal2", "eer", "eew", "enc0", "gyroc", "hcsr", "help", "leave", "leds", "on", "pds",
+        "start", "stop",
+    }
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,13 +210,16 @@ class Teensy(Generic[C]):
             self.say(self._items[word[:-1]]())
             return
         for name, execute in self._commands.items():  # as strncmp finds them, the longest first
-            if body.startswith(name):
+            if body.startswith(name) and not (self._is_exact(name) and body != name):
                 self.commands.append(Obeyed(self._told_s, body))
                 execute(body[len(name) :])
                 return
         if not body.startswith("#"):
             self.unhandled += 1
             self.say(f"# {self.clock_text(4)} unhandled: '{body}'")
+
+    def _is_exact(self, name: str) -> bool:
+        return self.firmware.exact_words and name in WITHOUT_NUMBERS
 
     def _subscribe(self, rest: str) -> None:
         words = rest.split()

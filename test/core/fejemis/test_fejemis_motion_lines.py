@@ -9,10 +9,10 @@ import re
 
 import pytest
 
-from omnibot_driver.core.fejemis.front_wheel import relay_text
 from omnibot_driver.core.fejemis.machine import lift_line
 from omnibot_driver.core.fejemis.motion_lines import STOP, drive_line, front_line
-from omnibot_driver.core.fejemis.outbound import harmless, line
+from omnibot_driver.core.fejemis.outbound import harmless, line, robust
+from omnibot_driver.core.fejemis.plain_lines import plain_drive_line, plain_front_line
 from omnibot_driver.core.fejemis.sums import sum_of
 
 FRONT_M = 0.42
@@ -77,13 +77,13 @@ def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
 
 
 def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
-    """By the pairs that a sum does not see: the line has none of them."""
+    """By the pairs that a sum does not see, and by its sum: the line has neither."""
     chance = random.Random(7)
     for _ in range(150):
         v = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.3)
         w = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.8)
         for text in (front_line(v, w, FRONT_M), drive_line(v, w)):
-            assert text == STOP or harmless(text[2:].decode()), text
+            assert text == STOP or (harmless(text[2:].decode()) and robust(text)), text
 
 
 def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
@@ -135,11 +135,36 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
                 assert found_s <= 0.5
 
 
-def test_a_relayed_angle_is_near_and_mostly_safe() -> None:
-    """Within a quarter of a degree; where digits cannot be chosen it is exact, and lasts 15 ms."""
-    safe = 0
-    for tenth in range(-900, 901):
-        text = relay_text(math.radians(tenth / 10))
-        assert float(text.split()[1]) == pytest.approx(tenth / 10, abs=0.26)
-        safe += harmless(text[3:].decode())
-    assert safe > 1200
+@pytest.mark.parametrize("text", [b"stop", b"start", b"leave", b"gyroc", b"confsi", STOP])
+@pytest.mark.parametrize("sums", [True, False])
+def test_nothing_is_added_to_a_line(text: bytes, *, sums: bool) -> None:
+    """A sibling's firmware compares `stop` with the whole line; an empty line may come before."""
+    data = line(text, sums=sums).lstrip(b"\n")
+    assert data == (b";%02d" % sum_of(text) if sums else b"") + text + b"\n"
+
+
+def plain(data: bytes) -> list[tuple[float, ...]]:
+    """What a board without sums takes out of these bytes."""
+    return motions(data.replace(b";", b"?"))
+
+
+def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
+    """A lost space or source moves the numbers by a place, and then it stands."""
+    for speed, turn in ((0.25, 0.0), (0.25, 0.5), (0.0, 0.6), (1.25, -1.0), (-0.3, 0.2)):
+        text = plain_drive_line(speed, turn)
+        rim = math.hypot(speed, turn)
+        assert plain(text) == [(2.0, pytest.approx(math.copysign(rim, speed), abs=6e-4), 0.0)]
+        number = text.split()[2]
+        data = text + b"\n"
+        for lost in range(len(data)):
+            for _, v, w in plain(without(data, (lost,))):
+                faster = math.hypot(v, math.radians(w)) > rim + 1e-3
+                at = data.index(number)
+                assert not faster or at <= lost < at + len(number), (text, lost)
+
+
+def test_without_sums_the_front_board_gets_both_numbers() -> None:
+    """It takes the angle from their ratio."""
+    assert plain_front_line(0.25, 0.5) == b"rc 2 0.25 28.65"
+    assert plain_front_line(0.0, -0.5) == b"rc 2 0 -28.65"
+    assert plain_drive_line(0.0004, 0.0) == STOP

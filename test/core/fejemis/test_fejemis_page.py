@@ -10,9 +10,9 @@ import pytest
 from fejemis_bench import DRIVE, FRONT, nominal
 from test_fejemis_lines import GOLDEN
 
+from omnibot_driver.core.fejemis.angle_relay import AngleRelay
 from omnibot_driver.core.fejemis.codec import parse
 from omnibot_driver.core.fejemis.configuration import ASKED as CONFIGURED
-from omnibot_driver.core.fejemis.front_wheel import relay_text
 from omnibot_driver.core.fejemis.half import STREAMS
 from omnibot_driver.core.fejemis.machine import lift_line
 from omnibot_driver.core.fejemis.motion_lines import STOP
@@ -183,7 +183,10 @@ def said_by_the_driver() -> set[str]:
     for packets in (bench.board.start(), bench.board.switch_off()):
         bench.written += [(bench.now, channel, data) for channel, data in packets]
     said = {text for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
-    said |= {relay_text(math.radians(10.4)).decode(), lift_line(6.0, 0.5)[0].decode()}
+    said |= {
+        AngleRelay().text(math.radians(10.4), sums=True).decode(),
+        lift_line(6.0, 0.5)[0].decode(),
+    }
     return said
 
 

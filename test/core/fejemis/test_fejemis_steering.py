@@ -34,7 +34,7 @@ angles = st.floats(-math.pi / 2, math.pi / 2)
 def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
     """Speed and turn rate of the body, word by word from the manual, Turning control."""
     b, f = 0.4, 0.5
-    v2 = math.copysign(math.hypot(v, w), v)
+    v2 = math.hypot(v, w) * (-1.0 if v < 0.0 else 1.0)
     if theta_rad == 0.0:
         return v2, 0.0
     d = f / math.tan(abs(theta_rad)) + b / 2

@@ -45,6 +45,15 @@ def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) 
     assert not bench.robot.standing
 
 
+def test_the_stop_of_an_estop_is_a_word_alone() -> None:
+    """With its sum, as the hosts send it: a sibling's firmware knows no `stop` with spaces."""
+    bench = nominal()
+    mark = bench.now
+    bench.estop(True)
+    said = [data for at, to, data in bench.written if at >= mark and to == DRIVE]
+    assert b"\n;59stop\n" in b"".join(said)
+
+
 def test_a_lost_start_after_an_estop_is_said_again() -> None:
     """Until the heartbeat shows that drive obeys."""
     bench = nominal()

@@ -237,3 +237,13 @@ def test_three_lost_characters_leave_a_valid_command() -> None:
     rig.say(DRIVE, f";{wire.sum_of(whole):02d}{cut}")
     rig.run(0.01)
     assert rig.board.drive.reference[0] == 1.459
+
+
+@pytest.mark.parametrize("exact", [True, False])
+def test_a_word_with_a_space_behind_it_is_unknown_to_some_firmware(*, exact: bool) -> None:
+    """A sibling compares `stop` with the whole line."""
+    rig = Rig(firmware=Firmware(sums=False, exact_words=exact)).booted()
+    rig.ask(DRIVE, "stop ")
+    assert rig.board.drive.source == (10 if exact else -1)
+    rig.ask(DRIVE, "stop")
+    assert rig.board.drive.source == -1

@@ -1,0 +1,105 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The angle of the front wheel on its way to the drive board, with characters lost."""
+
+import itertools
+import math
+import random
+
+import pytest
+from test_fejemis_motion_lines import motions, without
+
+from omnibot_driver.core.fejemis.angle_relay import ACROSS, AngleRelay, heard_instead
+from omnibot_driver.core.fejemis.outbound import line, robust
+
+EVERY = [tenths / 10 for tenths in range(-900, 901)]
+BEHIND = line(b"rc 2 .299 28.6", sums=True)
+
+
+def relayed(angle_deg: float) -> bytes:
+    return AngleRelay().text(math.radians(angle_deg), sums=True)
+
+
+def angles(data: bytes) -> set[float]:
+    return {angle_deg for (angle_deg,) in motions(data, b"fwl", 1)}
+
+
+def has_a_six_to_the_right(angle_deg: float) -> bool:
+    """However it is rounded by half a degree: -60° to -69°, -6.25° and -16.25° and so on."""
+    return -69.5 < angle_deg < -59.5 or (angle_deg < 0.0 and 6.0 < -angle_deg % 10 < 6.5)
+
+
+def test_every_angle_is_told_within_half_a_degree() -> None:
+    """Most are told to a tenth."""
+    off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
+    assert max(off) < 0.51
+    assert sum(each < 0.01 for each in off) > 0.6 * len(off)
+    assert sum(each < 0.26 for each in off) > 0.85 * len(off)
+
+
+def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
+    """Of all angles: within 0.6°; or, of those with a 6 to the right, less than 10° left."""
+    across = 0
+    for angle_deg in EVERY:
+        text = relayed(angle_deg)
+        assert robust(text), text
+        told = float(text[4:])
+        instead = list(heard_instead(text[4:].decode()))
+        if any(abs(other - told) > 0.6 for other in instead):
+            across += 1
+            assert has_a_six_to_the_right(angle_deg), text
+            assert all(0.0 <= other < ACROSS for other in instead), text
+    assert across / len(EVERY) < 0.08
+
+
+@pytest.mark.parametrize("angle_deg", [0.0, 5.5, 12.5, 35.5, 55.5, 90.0, -5.5, -30.4, -58.3])
+def test_an_angle_stays_within_a_degree_whichever_two_characters_are_lost(
+    angle_deg: float,
+) -> None:
+    """Of the line with its sum and its end, to the most lenient reader."""
+    data = line(relayed(angle_deg), sums=True)
+    for count in (1, 2):
+        for lost in itertools.combinations(range(len(data)), count):
+            for other in angles(without(data + BEHIND, lost)):
+                assert other == pytest.approx(angle_deg, abs=1.2), (data, lost)
+
+
+def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
+    """However many decimals or zeros: each has a minus sign and a 6, whose loss no sum sees."""
+    assert (ord("-") + ord("6")) % 99 == 0
+    for angle_deg in range(-69, -59):
+        assert {"-", "6"} <= {*f"{angle_deg}"}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
+    """Few lines pass; docs/boards/fejemis.md has them."""
+    chance = random.Random(seed)
+    passed = total = 0
+    for _ in range(3):
+        angle_deg = chance.uniform(-59.0, 90.0)
+        data = line(relayed(angle_deg), sums=True)
+        for lost in itertools.combinations(range(len(data)), 3):
+            total += 1
+            heard = angles(without(data + BEHIND, lost))
+            passed += any(abs(other - angle_deg) > 1.2 for other in heard)
+    assert passed / total < 0.01
+
+
+def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
+    """Whole degrees, of which any loss leaves a smaller number."""
+    for angle_deg in range(-90, 91):
+        text = AngleRelay().text(math.radians(angle_deg), sums=False)
+        assert text == b"fwl %d" % angle_deg
+        for count in range(1, 4):
+            for lost in itertools.combinations(range(len(text)), count):
+                assert all(abs(other) <= 90.0 for other in angles(without(text + b"\n", lost)))
+
+
+@pytest.mark.parametrize("angle_deg", [0.3, -6.25, 45.5, -64.9])
+def test_without_sums_the_mean_of_what_is_told_is_the_angle(angle_deg: float) -> None:
+    """What was rounded off is told later."""
+    relay = AngleRelay()
+    told = [float(relay.text(math.radians(angle_deg), sums=False)[4:]) for _ in range(200)]
+    assert sum(told) / len(told) == pytest.approx(angle_deg, abs=0.01)
+    assert all(abs(each - angle_deg) < 1.0 for each in told)
