@@ -2,8 +2,10 @@
 
 """What the boards keep: read from them, and written only where the user has set it.
 
-What was written is read back; it is written again until it is there, and after each restart. Knows
-which line asks for what, and which numbers answer.
+What was written is read back; it is written again until it is there, and after each restart. A
+number is believed that was read twice alike, one reading after the other: one in 99 damaged answers
+passes its sum, and the geometry is computed with what is read. Knows which line asks for what, and
+which numbers answer.
 """
 
 import math
@@ -39,11 +41,13 @@ DIGIT: Final = 6e-4
 
 
 class Configuration:
-    """Of one board. ``told``: its numbers as they were read, by what they are."""
+    """Of one board. ``told``: its numbers as they were read twice, by what they are."""
 
     def __init__(self, role: Role, written: Mapping[Written, tuple[float, ...]]) -> None:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
+        self._once: dict[str, tuple[float, ...]] = {}
+        """The last reading of each."""
         self.turned = False
         """``confs`` is sent in the order in which it is written, not in that of the help text."""
         self.written = written
@@ -52,6 +56,7 @@ class Configuration:
     def begin(self) -> None:
         """The board is new, or has loaded another configuration: read all, write what is set."""
         self.told.clear()
+        self._once.clear()
         self._next_at = -math.inf
         self._tries = 0
         self._new = True
@@ -94,7 +99,11 @@ class Configuration:
         if unwritten and not stands:
             return list(missing)
         self._tries += 1
-        texts = [text_of(setting, self.written[setting]) for setting in unwritten]
+        texts = [
+            text_of(setting, self.written[setting])
+            for setting in unwritten
+            if not self._agrees(setting, self._once)
+        ]
         asked = [_ASKS[setting] for setting in unwritten]
         return [*texts, *dict.fromkeys([*missing, *asked])]
 
@@ -102,25 +111,21 @@ class Configuration:
         """What the board tells of it."""
         match message:
             case WheelConfiguration():
-                self.told["conf"] = (
-                    message.left_radius_m,
-                    message.right_radius_m,
-                    message.gear,
-                    message.ticks_per_revolution,
-                    message.track_m,
-                )
+                key, numbers = "conf", message.numbers
             case SteeringConfiguration():
-                self.told["confs"] = message.first_m, message.second_m
+                key, numbers = "confs", (message.first_m, message.second_m)
             case FrontWheelOffset():
-                self.told["fwo"] = message.offset_deg, float(message.inverted)
-            case Infrared() if message.calibration:
-                self.told["ir"] = message.calibration
+                key, numbers = "fwo", (message.offset_deg, float(message.inverted))
             case Infrared():
-                self.told.setdefault("ir", ())
+                key, numbers = "ir", message.calibration
             case Status() if message.keyword in _SHOWN:
-                self.told[message.keyword] = message.numbers
+                key, numbers = message.keyword, message.numbers
             case _:
                 return
+        before, self._once[key] = self._once.get(key), numbers
+        if numbers != before:
+            return
+        self.told[key] = numbers
         if "conf" in self.told and "confs" in self.told:  # which also tells the track
             track_m, told = self.told["conf"][4], self.told["confs"]
             self.turned = abs(told[0] - track_m) < DIGIT < abs(told[1] - track_m)
@@ -142,11 +147,11 @@ class Configuration:
         return [
             setting
             for setting in ON[self.role]
-            if setting in self.written and not self._is_there(setting)
+            if setting in self.written and not self._agrees(setting, self.told)
         ]
 
-    def _is_there(self, setting: Written) -> bool:
-        told = self.told.get(_KEY[_ASKS[setting]])
+    def _agrees(self, setting: Written, readings: Mapping[str, tuple[float, ...]]) -> bool:
+        told = readings.get(_KEY[_ASKS[setting]])
         wanted = self.written[setting]
         if told is None:
             return False

@@ -123,6 +123,17 @@ class WheelConfiguration:
     track_m: float
     period_s: float
 
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Without the period, which cannot be written."""
+        return (
+            self.left_radius_m,
+            self.right_radius_m,
+            self.gear,
+            self.ticks_per_revolution,
+            self.track_m,
+        )
+
 
 @value(frozen=True, slots=True)
 class SteeringConfiguration:

@@ -76,9 +76,39 @@ def test_the_order_of_the_steering_geometry_is_found_out() -> None:
     """The help text has it otherwise than the command; the track in ``conf`` decides."""
     for turned in (False, True):
         configuration = Configuration("drive", {})
-        configuration.hear(parse("conf 0.0775 0.0775 19 68 0.4000 0.001"))
-        configuration.hear(parse("confs 0.4000 0.4200" if turned else "confs 0.4200 0.4000"))
+        for _ in range(2):
+            configuration.hear(parse("conf 0.0775 0.0775 19 68 0.4000 0.001"))
+            configuration.hear(parse("confs 0.4000 0.4200" if turned else "confs 0.4200 0.4000"))
         assert configuration.geometry == Geometry(track_m=0.4, wheelbase_m=0.42)
+
+
+def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
+    """One in 99 damaged answers passes its sum."""
+    configuration = Configuration("drive", {})
+    for text in ("confs 0.4200 0.4000", "confs 4.2 0.4000", "confs 0.4200 0.4000"):
+        configuration.hear(parse(text))
+        assert configuration.geometry is None
+    configuration.hear(parse("confs 0.4200 0.4000"))
+    assert configuration.geometry == Geometry(track_m=0.4, wheelbase_m=0.42)
+    configuration.hear(parse("confs 4.2 0.4000"))
+    assert configuration.geometry == Geometry(track_m=0.4, wheelbase_m=0.42)
+
+
+def test_what_was_read_once_is_asked_for_again() -> None:
+    """A quarter of a second later; then no more."""
+    bench = nominal()
+    bench.run(2.0)
+    asked = bench.lines(DRIVE).count("confsi")
+    assert asked == 2
+    assert bench.board._upkeep.configurations["drive"].known
+
+
+def test_what_was_written_and_read_once_is_not_written_again() -> None:
+    """Only asked for."""
+    bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.41, 0.43)}))
+    bench.run(2.0)
+    assert bench.lines(FRONT).count("confs 0.41 0.43") == 1
+    assert bench.board._upkeep.configurations["front"].known
 
 
 def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:

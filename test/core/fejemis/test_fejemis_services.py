@@ -6,7 +6,8 @@ import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.fejemis.jobs import whole_seconds
+from omnibot_driver.core.fejemis.jobs import Jobs, whole_seconds
+from omnibot_driver.core.fejemis.messages import Status
 from omnibot_driver.core.fejemis.readings import (
     BatteryReading,
     Job,
@@ -38,6 +39,20 @@ def test_the_gyro_is_calibrated_by_the_board() -> None:
     bench.events.clear()
     bench.run(0.5)
     assert bench.imu[-1].angular_velocity[2] == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_calibration_is_done_when_its_offsets_were_read_twice_alike() -> None:
+    """A damaged answer that passes its sum is no proof."""
+    jobs = Jobs()
+    jobs.ask(Job.CALIBRATE_GYRO, None, 0.0)
+    jobs.due(0.0)
+    for at, numbers in ((0.1, 1.0), (0.5, 1.0), (2.0, 9.0), (2.4, 1.0)):
+        jobs.hear("drive", Status("gyroo", (numbers, 0.0, 0.0)), at)
+        jobs.due(at)
+        assert not jobs.done
+    for at in (2.8, 3.2):
+        jobs.hear("drive", Status("gyroo", (2.0, 0.0, 0.0)), at)
+    assert jobs.done[0].success
 
 
 def test_the_accelerometer_is_calibrated_by_the_board() -> None:
