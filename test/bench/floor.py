@@ -3,8 +3,10 @@
 """The floor: the smallest program that does the same without looking at what it does.
 
 ``measurements PORT NAMESPACE`` publishes an Imu for every IMU frame, an Odometry and a JointState
-for every delta, trusting the first byte it reads to begin a frame; ``commands PORT NAMESPACE``
+for every delta, trusting the second byte of what looks like a frame; ``commands PORT NAMESPACE``
 writes a frame for every cmd_vel. Each fills in one number, by which a message is known again.
+``bare PORT NAMESPACE`` has the topics and services of the driver, and does nothing: its memory is
+what ROS takes.
 """
 
 import os
@@ -33,17 +35,18 @@ def measurements(port: int, node: Node) -> None:
     joint = JointState(name=names, position=[0.0] * 3, velocity=[0.0] * 3)
     number = struct.Struct(">h").unpack_from
     termios.tcflush(port, termios.TCIFLUSH)
+    begun = b""
     while data := os.read(port, 4096):
-        at = 0
-        while at < len(data):
-            kind = data[at + 1]
+        at, data = 0, begun + data
+        while at + 1 < len(data) and at + LENGTHS.get(kind := data[at + 1], 1) <= len(data):
             if kind == IMU:
                 imu.linear_acceleration.x = float(number(data, at + 2)[0])
                 imus.publish(imu)
             elif kind == DELTA:
                 odometries.publish(odometry)
                 joints.publish(joint)
-            at += LENGTHS[kind]
+            at += LENGTHS.get(kind, 1)  # no frame: the first read began within one
+        begun = data[at:]
 
 
 def commands(port: int, node: Node) -> None:
@@ -57,13 +60,41 @@ def commands(port: int, node: Node) -> None:
     rclpy.spin(node)
 
 
+def bare(_port: int, node: Node) -> None:
+    """What the driver talks through, and nothing behind it."""
+    from diagnostic_msgs.msg import DiagnosticArray  # the other floors do without these
+    from rclpy.executors import SingleThreadedExecutor
+    from std_msgs.msg import Bool, Float32MultiArray, String
+    from std_srvs.srv import SetBool, Trigger
+
+    outputs = {
+        "imu/data_raw": Imu,
+        "odom": Odometry,
+        "joint_states": JointState,
+        "~/state": String,
+        "~/estop_active": Bool,
+        "/diagnostics": DiagnosticArray,
+    }
+    for topic, kind in outputs.items():
+        node.create_publisher(kind, topic, 10)
+    for topic, kind in {"cmd_vel": Twist, "wheel_cmd": Float32MultiArray, "estop": Bool}.items():
+        node.create_subscription(kind, topic, lambda _message: None, 10)
+    for name in ("estop", "pause", "start", "reset", "reset_odometry", "calibrate_gyro"):
+        kind = SetBool if name in ("estop", "pause") else Trigger
+        node.create_service(kind, f"~/{name}", lambda _request, response: response)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    executor.spin()
+
+
 def main() -> None:
     """Until the line hangs up, or it is killed."""
     what, path, namespace = sys.argv[1:]
     port = os.open(path, os.O_RDWR | os.O_NOCTTY)
     rclpy.init()
-    node = Node("floor", namespace=namespace, start_parameter_services=False, enable_rosout=False)
-    {"measurements": measurements, "commands": commands}[what](port, node)
+    quiet = {"start_parameter_services": False, "enable_rosout": False}
+    node = Node("floor", namespace=namespace, **({} if what == "bare" else quiet))
+    {"measurements": measurements, "commands": commands, "bare": bare}[what](port, node)
 
 
 if __name__ == "__main__":

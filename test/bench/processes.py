@@ -60,8 +60,13 @@ class Program:
     @property
     def resident_mb(self) -> float:
         """Resident memory of the process itself."""
-        pages = int(Path(f"/proc/{self.process.pid}/statm").read_text().split()[1])
-        return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+        return memory_mb(self.process.pid)[0]
+
+    @property
+    def children(self) -> list[int]:
+        """Their process ids."""
+        tasks = Path(f"/proc/{self.process.pid}/task").iterdir()
+        return [int(pid) for task in tasks for pid in (task / "children").read_text().split()]
 
 
 def driver(path: str, namespace: str, before: str = "", **environment: str) -> Program:
@@ -89,6 +94,13 @@ def ear(*namespaces: str) -> Program:
     program = Program(str(HERE / "ear.py"), *namespaces)
     program.line()
     return program
+
+
+def memory_mb(pid: int) -> tuple[float, float]:
+    """Resident memory of a process, and its proportional share of it."""
+    rows = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
+    kb = {row.split()[0]: float(row.split()[1]) for row in rows[1:]}
+    return kb["Rss:"] * 1.024e-3, kb["Pss:"] * 1.024e-3
 
 
 def _busy_s(pid: int) -> float:

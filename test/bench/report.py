@@ -19,13 +19,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "integrity"))  # its generato
 
 import core
 import system
+from adapters import ADAPTERS
 from ratios import Figure, table
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "performance.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 OTHERS = {"lois_ecu": "lois_ecu_bench", "mart": "mart_bench", "fejemis": "fejemis_bench"}
 """By the name of the board: the module that measures it."""
-SCALES = (1, 2, 4, 8, 16)
+SCALES = (1, 2, 4, 8)
 
 
 def say(what: str) -> None:
@@ -35,25 +36,28 @@ def say(what: str) -> None:
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
     """All figures with a floor, and the sections behind their table."""
-    windows = 2 if quick else 12
-    say("latency and processor time")
-    figures, node_memory = system.measurements(windows)
-    figures.append(system.commands(windows))
+    windows = 2 if quick else 6
+    figures: list[Figure] = []
+    for adapter in ADAPTERS:
+        say(f"latency, processor time, commands: {adapter}")
+        measured, node_memory = system.measurements(adapter, windows)
+        figures += [*measured, system.commands(adapter, windows)]
     say("start")
-    figures += [system.starts(1 if quick else 5), system.imports(2 if quick else 7)]
+    figures += [system.starts(1 if quick else 3), system.imports(2 if quick else 5)]
     say("decoding")
-    figures += core.decoding(1 if quick else 7)
+    figures += core.decoding(1 if quick else 5)
     say("split")
-    sections = ["", "Processor time of the driver by stage:", "", *system.split(5 if quick else 30)]
+    sections = ["", "Processor time of the driver by stage:", "", *system.split(5 if quick else 20)]
     say("step by step")
-    sections += ["", "From the floor to the driver, by ratios:", "", *system.steps(windows // 2)]
+    sections += ["", "From the floor to the driver, by ratios:", "", *system.steps(windows)]
     sections += ["", core.cold(200 if quick else 2000)]
     say("many drivers")
-    scale = system.scale(SCALES[:2] if quick else SCALES, 3 if quick else 15)
+    scale = system.scale(SCALES[:2] if quick else SCALES, 3 if quick else 10)
     sections += ["", "Drivers side by side on this machine, each with a board:", "", *scale]
     say("linearity")
     sections += ["", "Time to decode, by the length of the stream:", "", *core.linearity()]
     say("memory")
+    sections += ["", "Memory of the processes:", "", *system.memory()]
     sections += ["", f"{core.memory(0.1 if quick else 1.0)} {node_memory}"]
     return figures, sections
 

@@ -2,25 +2,39 @@
 
 """Boards that say the nominal stream on pseudo-terminals, each at a moment of its own in the tick.
 
-They take turns within the 10 ms, so their readers are measured in alternation. Every IMU frame
-carries a number in its first word; nothing else of a board is simulated.
+They take turns within the 10 ms, so their readers are measured in alternation; all have the same
+kind of adapter. Every IMU frame carries a number in its first word; nothing else of a board is
+simulated.
 """
 
+import heapq
 import os
 import select
 import struct
 import threading
 import time
 import tty
+from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
+from itertools import count
+from operator import itemgetter
 from random import Random
 from typing import Self
 
+from adapters import Adapter, Handed, pieces
+
 TICK_S = 0.01
+IMU_BYTES = 14
+DELTA_BYTES = 9
+POSE_BYTES = 15
 TURN = 4000
 """The number goes up and down between 0 and this."""
 NOISE = 997
 """Readings of noise, used over and over."""
+
+
+_IMU, _DELTA, _POSE = (struct.Struct(form) for form in (">BB6h", ">BB3hB", ">BB3fB"))
 
 
 def number_of(tick: int) -> int:
@@ -28,13 +42,34 @@ def number_of(tick: int) -> int:
     return TURN - abs(TURN - tick % (2 * TURN))
 
 
+def tick_bytes(tick: int, noise: list[list[int]]) -> bytes:
+    """What the board sends in this tick: an IMU frame, often a delta, sometimes a pose."""
+    u, v, w, x, y = noise[tick % NOISE]
+    data = _IMU.pack(0xFF, 0xFA, number_of(tick), 30 * x, 16384 + 8 * y, u, v, w)
+    if tick % 4 == 3:
+        data += _DELTA.pack(0xFF, 0xFB, 0, 0, 0, tick // 4 % 256)
+    if tick % 20 == 19:
+        data += _POSE.pack(0xFF, 0xFC, 0.0, 0.0, 0.0, tick // 20 % 256)
+    return data
+
+
+def imu_ends() -> Iterator[int]:
+    """After how many bytes of the line each tick's IMU frame is complete."""
+    begun = 0
+    for tick in count():
+        yield begun + IMU_BYTES
+        begun += IMU_BYTES + DELTA_BYTES * (tick % 4 == 3) + POSE_BYTES * (tick % 20 == 19)
+
+
 class Stage:
-    """``said[n]``: for board n, when each tick was written; ``heard[n]``: reads of what came back.
+    """``said[n]``: for board n, when the last byte of each tick's IMU frame was handed over, in the
+    order of ticks; ``heard[n]``: reads of what came back.
 
     ``paths``: the terminals. Times are of the steady clock, in s.
     """
 
-    def __init__(self, boards: int) -> None:
+    def __init__(self, boards: int, adapter: Adapter = pieces) -> None:
+        self._adapter = adapter
         self.said: list[list[float]] = [[] for _ in range(boards)]
         self.heard: list[list[tuple[float, bytes]]] = [[] for _ in range(boards)]
         self._ends = [os.openpty() for _ in range(boards)]
@@ -61,22 +96,29 @@ class Stage:
     def _say(self) -> None:
         random = Random(1)
         noise = [[round(random.gauss(0, 6.5)) for _ in range(5)] for _ in range(NOISE)]
-        imu, delta, pose = (struct.Struct(form) for form in (">BB6h", ">BB3hB", ">BB3fB"))
-        boards = len(self._ends)
-        tick, at = 0, time.monotonic()
-        while not self._ending.is_set():
-            u, v, w, x, y = noise[tick % NOISE]
-            data = imu.pack(0xFF, 0xFA, number_of(tick), 30 * x, 16384 + 8 * y, u, v, w)
-            if tick % 4 == 3:
-                data += delta.pack(0xFF, 0xFB, 0, 0, 0, tick // 4 % 256)
-            if tick % 20 == 19:
-                data += pose.pack(0xFF, 0xFC, 0.0, 0.0, 0.0, tick // 20 % 256)
-            for board, (near, _) in enumerate(self._ends):
-                time.sleep(max(0.0, at + board * TICK_S / boards - time.monotonic()))
-                self.said[board].append(time.monotonic())
-                with suppress(BlockingIOError):  # it is not read yet
-                    os.write(near, data)
-            tick, at = tick + 1, at + TICK_S
+        begun, boards = time.monotonic(), len(self._ends)
+
+        def ticks(board: int) -> Iterator[Handed]:
+            for tick in count():
+                yield begun + (tick + board / boards) * TICK_S, tick_bytes(tick, noise)
+
+        lines = (
+            map(partial(_of_board, board), self._adapter(ticks(board), Random(board)))
+            for board in range(boards)
+        )
+        ends = [imu_ends() for _ in range(boards)]
+        end, sent = [next(each) for each in ends], [0] * boards
+        for at, board, data in heapq.merge(*lines, key=itemgetter(0)):
+            if self._ending.is_set():
+                return
+            time.sleep(max(0.0, at - time.monotonic()))
+            now = time.monotonic()
+            sent[board] += len(data)
+            while end[board] <= sent[board]:
+                self.said[board].append(now)
+                end[board] = next(ends[board])
+            with suppress(BlockingIOError):  # it is not read yet
+                os.write(self._ends[board][0], data)
 
     def _hear(self) -> None:
         poll = select.poll()
@@ -86,3 +128,8 @@ class Stage:
         while not self._ending.is_set():
             for near, _ in poll.poll(100):
                 self.heard[boards[near]].append((time.monotonic(), os.read(near, 4096)))
+
+
+def _of_board(board: int, handed: Handed) -> tuple[float, int, bytes]:
+    at, data = handed
+    return at, board, data

@@ -31,6 +31,7 @@ from omnibot_driver.core.omnibot import DeltaFrame, FrameDecoder, ImuFrame
 from omnibot_driver.core.session import Session
 from omnibot_driver.messages import MessageSettings, turned, unturned
 
+LENGTHS = {0xFA: 14, 0xFB: 9, 0xFC: 15}
 MPS2_PER_COUNT = 9.80665 / 16384
 AT_REST = (Pose(), BodyTwist(0.0, 0.0, 0.0), Covariance(), Pose(), BodyTwist(0.0, 0.0, 0.0))
 Estimates = list[ImuEstimate | OdometryEstimate]
@@ -57,6 +58,7 @@ class Relay:
             run=True,
         )
         self._session.opened(time.monotonic())
+        self._begun = b""
 
     def publish(self, estimates: Estimates) -> None:
         """Publish each message on its topic, with its own stamp."""
@@ -70,18 +72,18 @@ class Relay:
                 self._joints.publish(self._make.joint_state(self._wheels, stamp_ns))
 
     def trust(self, data: bytes) -> None:
-        """The first byte begins a frame; its first word is all that is looked at."""
+        """What looks like a frame is one; its first word is all that is looked at."""
         estimates: Estimates = []
-        at = 0
-        while at < len(data):
-            kind = data[at + 1]
+        at, data = 0, self._begun + data
+        while at + 1 < len(data) and at + LENGTHS.get(kind := data[at + 1], 1) <= len(data):
             if kind == 0xFA:
                 word = int.from_bytes(data[at + 2 : at + 4], "big", signed=True)
                 force = (word * MPS2_PER_COUNT, 0.0, 0.0)
                 estimates.append(ImuEstimate(0.0, force, (0.0, 0.0, 0.0)))
             elif kind == 0xFB:
                 estimates.append(OdometryEstimate(0.0, *AT_REST))
-            at += {0xFA: 14, 0xFB: 9, 0xFC: 15}[kind]
+            at += LENGTHS.get(kind, 1)
+        self._begun = data[at:]
         self.publish(estimates)
 
     def decode(self, data: bytes) -> None:

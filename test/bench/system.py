@@ -16,26 +16,36 @@ from itertools import pairwise
 from pathlib import Path
 from statistics import median, quantiles
 from tempfile import TemporaryDirectory
+from typing import Final
 
-from processes import HERE, Program, driver, ear, floor, step
+from adapters import ADAPTERS
+from processes import HERE, Program, driver, ear, floor, memory_mb, step
 from ratios import Figure, alternate
 from stage import TICK_S, Stage, number_of
 from steps import STEPS
 
-WINDOW_S = 8.0
+WINDOW_S = 6.0
+COMMANDS_S = 3.0
 SETTLING_S = 5.0
+GOALS: Final[dict[str, tuple[float | None, ...]]] = {
+    "pieces of 1 to 16 bytes": (1.0, 1.0, 1.0, 1.0),
+    "1 ms timer": (None, None, None, None),
+    "16 ms timer": (None, 1.25, None, None),
+    "whole ticks": (1.10, 1.25, 1.5, 1.10),
+}
+"""By adapter: of latency (median, 99th percentile), processor time, and cmd_vel."""
 MPS2_PER_COUNT = 9.80665 / 16384
 
 
-def measurements(windows: int) -> tuple[list[Figure], str]:
+def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
     """Measure the way from wire to callback, processor time, and the driver's memory."""
-    with Stage(2) as stage, ExitStack() as stack:
+    with Stage(2, ADAPTERS[adapter]) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear("ours", "floor"))
         programs = [
             stack.enter_context(driver(stage.paths[0], "ours")),
             stack.enter_context(floor("measurements", stage.paths[1], "floor")),
         ]
-        time.sleep(2 * SETTLING_S)
+        time.sleep(SETTLING_S)
         marks = [time.monotonic()]
         busy = [[program.busy_s for program in programs]]
         resident_mb = [programs[0].resident_mb]
@@ -51,25 +61,48 @@ def measurements(windows: int) -> tuple[list[Figure], str]:
         [[us for at, us in each if start <= at < end] for each in late]
         for start, end in pairwise(marks)
     ]
+    median_goal, p99_goal, busy_goal, _ = GOALS[adapter]
     figures = [
-        Figure(f"IMU frame to callback, {name}", "µs", *zip(*values, strict=True), goal=goal)
-        for name, goal, of in (("median", 1.10, median), ("99th percentile", 1.25, _p99))
+        Figure(
+            f"{adapter}: IMU frame to callback, {name}",
+            "µs",
+            *zip(*values, strict=True),
+            goal=goal,
+        )
+        for name, goal, of in (("median", median_goal, median), ("99th percentile", p99_goal, _p99))
         if (values := [[of(each) for each in window] for window in windowed])
     ]
     spent = [
         [1e3 * (after - before) / (end - start) for before, after in zip(*pair, strict=True)]
         for *pair, start, end in zip(busy, busy[1:], marks, marks[1:], strict=False)
     ]
-    name = "processor time per second of stream"
-    figures.append(Figure(name, "ms", *zip(*spent, strict=True), goal=1.5))
+    name = f"{adapter}: processor time per second of stream"
+    figures.append(Figure(name, "ms", *zip(*spent, strict=True), goal=busy_goal))
     delivered = [sum(map(len, column)) for column in zip(*windowed, strict=True)]
     minutes = (marks[-1] - marks[0]) / 60
     memory = (
         f"Node: resident {resident_mb[0]:.1f} MB at first, {resident_mb[-1]:.1f} MB after"
-        f" {minutes:.1f} minutes of stream, in which {delivered[0]:,} IMU frames came through"
+        f" {minutes:.1f} minutes of {adapter}, in which {delivered[0]:,} IMU frames came through"
         f" (floor: {delivered[1]:,}) of {100 * (marks[-1] - marks[0]):,.0f}."
     )
     return figures, memory
+
+
+def memory() -> list[str]:
+    """Rows of a table: driver and guard, beside a bare node with the same topics and services."""
+    with Stage(2) as stage, ExitStack() as stack:
+        stack.enter_context(ear("ours"))
+        ours = stack.enter_context(driver(stage.paths[0], "ours"))
+        bare = stack.enter_context(floor("bare", stage.paths[1], "floor"))
+        time.sleep(2 * SETTLING_S)
+        (guard,) = ours.children
+        mine, its, least = (memory_mb(pid) for pid in (ours.process.pid, guard, bare.process.pid))
+    rows = ["| process | resident | proportional | to the bare node |", "|---|---|---|---|"]
+    for name, (resident, share) in (("bare node", least), ("driver", mine), ("guard", its)):
+        ratios = f"{resident / least[0]:.2f}, {share / least[1]:.2f}"
+        cells = f"{resident:.1f} MB | {share:.1f} MB | {ratios}"
+        rows.append(f"| {name} | {cells} |")
+    return rows
 
 
 def steps(windows: int) -> list[str]:
@@ -107,19 +140,20 @@ def steps(windows: int) -> list[str]:
     return rows
 
 
-def commands(windows: int) -> Figure:
+def commands(adapter: str, windows: int) -> Figure:
     """Measure the time from a published cmd_vel to bytes on the board's side."""
-    with Stage(2) as stage, ExitStack() as stack:
+    with Stage(2, ADAPTERS[adapter]) as stage, ExitStack() as stack:
         stack.enter_context(driver(stage.paths[0], "ours"))
         stack.enter_context(floor("commands", stage.paths[1], "floor"))
         time.sleep(SETTLING_S)
-        seconds = str(windows * WINDOW_S / 2)
+        seconds = str(windows * COMMANDS_S)
         hand = stack.enter_context(Program(str(HERE / "hand.py"), seconds, "ours", "floor"))
         sent = hand.result()
     late = [_command_latencies(*each) for each in zip(sent, stage.heard, strict=True)]
     size = min(map(len, late)) // windows
     parts = [[median(each[n * size : (n + 1) * size]) for n in range(windows)] for each in late]
-    return Figure("cmd_vel to the board's side, median", "µs", *parts, goal=1.10)
+    name = f"{adapter}: cmd_vel to the board's side, median"
+    return Figure(name, "µs", *parts, goal=GOALS[adapter][3])
 
 
 def imports(times: int) -> Figure:

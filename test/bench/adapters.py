@@ -1,0 +1,70 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How a USB adapter hands over what the line brings: whole, in pieces, in packets behind a timer.
+
+Knows the pace of the line and times; not what the bytes are. Times in seconds.
+"""
+
+from collections.abc import Callable, Iterator
+from random import Random
+from typing import Final
+
+BYTE_S: Final = 10 / 115200
+LARGEST_PIECE: Final = 16
+PACKET: Final = 62
+"""What an FTDI's packet holds."""
+DRIFT: Final = 1.0002
+"""The adapter's clock against the board's: in 8 s its packets end at every moment of a tick."""
+
+Handed = tuple[float, bytes]
+"""When it is handed over, and what."""
+Ticks = Iterator[tuple[float, bytes]]
+Adapter = Callable[[Ticks, Random], Iterator[Handed]]
+
+
+def whole(ticks: Ticks, _random: Random) -> Iterator[Handed]:
+    """All of a tick, as soon as it begins: the fastest stimulus there is."""
+    yield from ticks
+
+
+def pieces(ticks: Ticks, random: Random) -> Iterator[Handed]:
+    """1 to 16 bytes at the pace of the line, as CDC, CH340 and CP210x adapters do."""
+    for at, data in ticks:
+        start = 0
+        while start < len(data):
+            end = min(len(data), start + random.randint(1, LARGEST_PIECE))
+            yield at + end * BYTE_S, data[start:end]
+            start = end
+
+
+def packets(timer_s: float) -> Adapter:
+    """62 bytes, or what there is when the latency timer runs out, as FTDI's adapters do."""
+
+    def handed(ticks: Ticks, random: Random) -> Iterator[Handed]:
+        held, out = bytearray(), -1.0
+        for at, data in ticks:
+            if out < 0.0:
+                out = at + random.uniform(0.0, timer_s)
+            for number, byte in enumerate(data, 1):
+                arrived = at + number * BYTE_S
+                while out < arrived:
+                    if held:
+                        yield out, bytes(held)
+                        held.clear()
+                    out += timer_s * DRIFT
+                held.append(byte)
+                if len(held) == PACKET:
+                    yield arrived, bytes(held)
+                    held.clear()
+                    out = arrived + timer_s
+
+    return handed
+
+
+ADAPTERS: Final[dict[str, Adapter]] = {
+    "pieces of 1 to 16 bytes": pieces,
+    "1 ms timer": packets(0.001),
+    "16 ms timer": packets(0.016),
+    "whole ticks": whole,
+}
+PIECES: Final = "pieces of 1 to 16 bytes"
