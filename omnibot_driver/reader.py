@@ -136,27 +136,33 @@ class Reader:
                 if not data:
                     continue
                 now = time.monotonic()
-                measured = self._session.hear(data, now, channel)
-                claimed = bool(measured) and self._outbox.claim()
-                if measured and not claimed:
-                    self._outbox.put(partial(self._deliver, measured))
-            if claimed:
-                try:
-                    self._deliver(measured)
-                finally:
-                    self._outbox.release()
-            elif measured:
-                self._outbox.deliver()
-            with self._lock:
                 self._wait_s = self.reconnect_interval_s
                 self.received_bytes += len(data)
                 self._count(port, now)
-                stopped = self._shared.heed_stall()
-                if self._session.process(now) or stopped:
-                    self._shared.settle()
+                measured = self._session.hear(data, now, channel)
+                if not measured:
+                    self._process(now)
+                elif not (claimed := self._outbox.claim()):
+                    self._outbox.put(partial(self._deliver, measured))
+            if measured:
+                if claimed:
+                    try:
+                        self._deliver(measured)
+                    finally:
+                        self._outbox.release()
                 else:
-                    self._shared.tell_guard()
+                    self._outbox.deliver()
+                with self._lock:
+                    self._process(now)
             self._outbox.deliver()
+
+    def _process(self, now: float) -> None:
+        """With the lock held: what comes of the bytes, but for what was measured at once."""
+        stopped = self._shared.heed_stall()
+        if self._session.process(now) or stopped:
+            self._shared.settle()
+        else:
+            self._shared.tell_guard()
 
     def _count(self, port: Transport, now: float) -> None:
         """With the lock held: what the kernel lost, now and then."""

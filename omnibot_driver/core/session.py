@@ -199,8 +199,6 @@ class Session:
     def process(self, now: float) -> bool:
         """What comes of the bytes that were heard last. False: nothing to write or to tell."""
         last, self._last = self._last, None
-        if last is None:
-            return True
         if (
             now < self._reporter.news_at
             and now < self._board.wake_at
@@ -209,6 +207,8 @@ class Session:
             and self._mode_manager.at_rest
         ):
             return False
+        if last is None:
+            return True
         if self._measurement.undigested:
             measured = self._measurement.flush()
             refused = self._measurement.refused_displacements

@@ -103,13 +103,14 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
     assert ways[0] == ways[1]
 
 
+@pytest.mark.parametrize("chunker", ["whole bursts", "1-8 bytes", "single bytes", "FTDI"])
 @pytest.mark.parametrize("fault", ["none, starting anywhere", "1 byte in 100 lost"])
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_readings_come_out_alike(
-    scenario: str, fault: str, monkeypatch: pytest.MonkeyPatch
+    scenario: str, fault: str, chunker: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The end of each read and the mode are alike, too, with any requests in between."""
-    chunks = chunks_of(scenario, fault, "whole bursts", 2)
+    chunks = chunks_of(scenario, fault, chunker, 2)
 
     def told() -> list[object]:
         tested = OmniBot(OmniBotSettings())
@@ -127,6 +128,7 @@ def test_readings_come_out_alike(
 
     quick = told()
     monkeypatch.setattr(board, "take_single", lambda *_: None)
+    monkeypatch.setattr(board, "is_begun", lambda *_: False)
     assert quick == told()
 
 

@@ -27,7 +27,13 @@ from omnibot_driver.core.omnibot.modes import Happening
 from omnibot_driver.core.omnibot.outbound import transmission
 from omnibot_driver.core.omnibot.schedule import TICK_S, Schedule
 from omnibot_driver.core.omnibot.settings import OmniBotSettings
-from omnibot_driver.core.omnibot.single_imu import take_single
+from omnibot_driver.core.omnibot.single_imu import (
+    Piece,
+    is_begun,
+    joined,
+    take_pieces,
+    take_single,
+)
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.packets import NO_PACKETS, Packets, packed
 from omnibot_driver.core.readings import Reading, SampleBoundary
@@ -106,6 +112,8 @@ class OmniBot:
             self._schedule,
         )
         self._decoder.statistics = self._statistics
+        self._pieces: list[Piece] = []
+        """The beginning of an IMU frame, if it came by itself."""
         self._translation.connect()
         self._modes = self._translation.modes
 
@@ -117,9 +125,12 @@ class OmniBot:
     @property
     def edge(self) -> SampleBoundary | None:
         """The boundary by the IMU frame in hand, complete or begun, and the bytes after it."""
-        if self._decoder.at_rest:
+        if self._pieces:
+            begun: bytes | None = joined(self._pieces)
+        elif self._decoder.at_rest:
             return self._nothing_begun
-        begun = self._decoder.begun
+        else:
+            begun = self._decoder.begun
         if begun is None:
             return None
         byte_s = 10 / self._settings.baudrate
@@ -128,7 +139,7 @@ class OmniBot:
             ahead, after = 1, len(begun) - frames.IMU_LENGTH
             if after < 0:
                 return SampleBoundary(1, -after * byte_s, (-after - 1) * byte_s, cut=True)
-        elif not self._decoder.fresh:
+        elif self._pieces or not self._decoder.fresh:
             return None
         return SampleBoundary(ahead, 0.0, (frames.IMU_LENGTH - 1 - after) * byte_s)
 
@@ -153,15 +164,32 @@ class OmniBot:
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """The readings that these bytes complete, in the order of the line."""
-        if single := take_single(data, now, self._decoder, self._translation):
+        pieces, line = self._pieces, (self._decoder, self._translation)
+        single = take_pieces(pieces, data, now, *line) if pieces else take_single(data, now, *line)
+        if single:
+            pieces.clear()
             return [single]
+        if len(data) < frames.IMU_LENGTH and is_begun(pieces, data, now, *line):
+            pieces.append((data, now))
+            return []
+        before = self._decode_pieces() if pieces else []
         found = self._decoder.feed(data, now)
-        return self._translation.readings(found, self._decoder.skipped, now)
+        return before + self._translation.readings(found, self._decoder.skipped, now)
+
+    def _decode_pieces(self) -> list[Reading]:
+        """The pieces that waited for the rest of a frame, one by one."""
+        pieces, self._pieces = self._pieces, []
+        readings: list[Reading] = []
+        for data, now in pieces:
+            found = self._decoder.feed(data, now)
+            readings += self._translation.readings(found, self._decoder.skipped, now)
+        return readings
 
     def flush(self, now: float) -> list[Reading]:
         """The line is closed: what was held is all there will be."""
+        readings = self._decode_pieces()
         found = self._decoder.flush(now)
-        return self._translation.readings(found, self._decoder.skipped, now)
+        return readings + self._translation.readings(found, self._decoder.skipped, now)
 
     def silence(self) -> None:
         """Forget the mode, as the board has been silent for too long."""

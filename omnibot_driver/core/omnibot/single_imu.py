@@ -5,6 +5,9 @@
 It is decoder and translation in one, for a read that neither has anything to decide about. It says
 what they would say and leaves them in the state that they would be in: a test holds one against the
 other. It knows no other frame, and no evidence but that of a calm frame in its place.
+
+An adapter may deliver the frame in pieces. They wait here, and are decoded at once with the last
+one. If anything but the end of this frame follows, each piece is decoded as it came.
 """
 
 import struct
@@ -13,8 +16,9 @@ from typing import Any, Final
 from omnibot_driver.core.omnibot.cost_model import Context
 from omnibot_driver.core.omnibot.decoder import FrameDecoder
 from omnibot_driver.core.omnibot.fast_path import UnfrozenImu
-from omnibot_driver.core.omnibot.frames import IMU_HEADER, IMU_LENGTH, ImuFrame
+from omnibot_driver.core.omnibot.frames import IMU_HEADER, IMU_LENGTH, LENT, ImuFrame
 from omnibot_driver.core.omnibot.gaps import LATE_S
+from omnibot_driver.core.omnibot.late_reads import GAP_S
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.readings import ImuReading
 
@@ -22,13 +26,62 @@ _WORDS: Final = struct.Struct(">H6h").unpack
 _HEADER: Final = int.from_bytes(IMU_HEADER, "big")
 
 
+Piece = tuple[bytes, float]
+"""Bytes, and when they came."""
+
+
+def is_begun(
+    pieces: list[Piece], data: bytes, now: float, decoder: FrameDecoder, translation: Translation
+) -> bool:
+    """Whether these bytes, which follow the pieces, go on with the IMU frame that is due.
+
+    Not where they complete it, or where a pause between them is evidence.
+    """
+    if pieces:
+        data = joined(pieces) + data
+        prompt = now - pieces[0][1] < GAP_S
+    else:
+        prompt = (
+            translation.singles_to_come > 0
+            and decoder.at_rest
+            and now - decoder.last_arrival_s <= LATE_S
+        )
+    return prompt and 0 < len(data) < IMU_LENGTH and IMU_HEADER.startswith(data[:2])
+
+
+def joined(pieces: list[Piece]) -> bytes:
+    """All their bytes."""
+    return b"".join([piece for piece, _ in pieces])
+
+
+def take_pieces(
+    pieces: list[Piece], data: bytes, now: float, decoder: FrameDecoder, translation: Translation
+) -> ImuReading | None:
+    """``take_single`` of a frame of which the pieces are the first part, and ``data`` the rest.
+
+    A last byte that may be the next header's needs a closer look.
+    """
+    first, came_at = pieces[0]
+    if data[-1] in LENT or now - came_at >= GAP_S:
+        return None
+    reading = take_single(joined(pieces) + data, came_at, decoder, translation, first=len(first))
+    if reading is not None:
+        decoder.last_arrival_s = translation.heard_s = now
+    return reading
+
+
 def take_single(
-    data: bytes, now: float, decoder: FrameDecoder, translation: Translation
+    data: bytes,
+    now: float,
+    decoder: FrameDecoder,
+    translation: Translation,
+    *,
+    first: int = IMU_LENGTH,
 ) -> ImuReading | None:
     """The reading of these bytes, if they are one calm IMU frame and one was due.
 
     None, and nothing is changed, where anything else is to be considered. The frame came as a
-    whole, so its last byte is its own.
+    whole, so its last byte is its own. ``first``: how many of its bytes came now.
     """
     pause_s = now - decoder.last_arrival_s
     if (
@@ -72,7 +125,7 @@ def take_single(
     decoder.last_arrival_s = translation.heard_s = now
     decoder.statistics.frames += 1
     if not decoder.pauses.certain:
-        decoder.pauses.stood_between(pause_s, IMU_LENGTH)
+        decoder.pauses.stood_between(pause_s, first)
     translation.singles_to_come -= 1
     scale = translation.settings.imu
     return ImuReading(scale.specific_force(accel), scale.angular_velocity(gyro))
