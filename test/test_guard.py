@@ -11,6 +11,7 @@ import threading
 import time
 from pathlib import Path
 
+import pytest
 from guarded_line import (
     LAST_WORDS,
     LATCHED_WORDS,

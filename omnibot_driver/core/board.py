@@ -157,6 +157,10 @@ class Board(Protocol):
         """The readings that follow from elapsed time; called when ``wake_at`` has come."""
         return []
 
+    def leave(self) -> None:
+        """The driver ends: from now on ``due`` has nothing that is not needed for a stop."""
+        return
+
     def reset_odometry(self) -> None:
         """Begin the frame of the OdometryReadings at the robot's present pose."""
 

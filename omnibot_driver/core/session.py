@@ -304,6 +304,7 @@ class Session:
     def leave(self, now: float) -> None:
         """Begin the shutdown: refuse everything, and repeat Stop."""
         self._interlocks.leaving = True
+        self._board.leave()
         self._commands.halt(now)
 
     def fall_silent(self, now: float) -> bool:

@@ -52,6 +52,7 @@ class LoisEcuBoard(Board):
         self._ecu = LoisConversation(settings)
         self._once: Packets = NO_PACKETS
         self._rolled = Pose()
+        self._leaving = False
         self._connect()
 
     def _connect(self) -> None:
@@ -183,11 +184,19 @@ class LoisEcuBoard(Board):
     def wake_at(self) -> float:
         """The time of the next ``due`` or ``elapse``."""
         odometry_at = self._odometry_at if self.mode is Mode.NOMINAL else math.inf
+        if self._leaving:
+            return odometry_at
         once_at = -math.inf if self._once else math.inf
         return min(self._ecu.wake_at, odometry_at, once_at, self._reset_at_s)
 
+    def leave(self) -> None:
+        """Nothing is set any more, so that Stop is the last line."""
+        self._leaving = True
+
     def due(self, now: float) -> Packets:
         """Settings, and what clears up after a Stop."""
+        if self._leaving:
+            return NO_PACKETS
         once, self._once = self._once, NO_PACKETS
         data = self._ecu.due(now)
         if now >= self._reset_at_s:

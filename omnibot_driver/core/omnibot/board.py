@@ -209,6 +209,9 @@ class OmniBot:
     def reset_odometry(self) -> None:
         """No effect: the board has no such request."""
 
+    def leave(self) -> None:
+        """No effect: whatever goes out is a command."""
+
     def actuator(self, proof: StopProof) -> SetpointStream:
         """The stream of repeated frames."""
         return SetpointStream(self._encoder, proof)

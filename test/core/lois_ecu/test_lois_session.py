@@ -8,7 +8,7 @@ from lois_bench import FIRMWARE, Bench, configure, told
 from lois_drives import HOST_GAINS
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.lois_ecu import RecordKind, Setting, Stream
+from omnibot_driver.core.lois_ecu import RecordKind, SetDuty, Setting, Stream, encode_command
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordFailed, RecordReading
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
@@ -175,3 +175,17 @@ def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> No
         bench.settle()
     bench.run(2.0)
     assert bench.odometry[-1].pose.x_m == pytest.approx(bench.robot.way_m, abs=0.15)
+
+
+@FIRMWARE
+def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
+    """Settings are said again for some seconds after the port was opened: not behind the Stop."""
+    bench = Bench(firmware)
+    bench.close()
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.drive_on(0.3, 0.3)
+    bench.written.clear()
+    bench.session.leave(bench.now)
+    bench.run(2.0)
+    assert {data for _, data in bench.written} == {encode_command(SetDuty(0, 0))}
