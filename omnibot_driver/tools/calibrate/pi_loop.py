@@ -2,9 +2,10 @@
 
 """A wheel under a sampled band-limited PI controller, as a step of its set-point shows it.
 
-G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)) from error in RPM to duty in percent, worked out once
-in each control period. The speed is that of the last tick of the encoder, in whole RPM. Vectorised
-over gains. Knows a plant and gains; it does not know how either was found.
+G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)) from error in RPM to duty in percent, by the trapezoidal
+rule with coefficients for steps of ``NOMINAL_S``, however long the control period is. The speed is
+that of the last tick of the encoder, in whole RPM. Vectorised over gains. Knows a plant and gains;
+it does not know how either was found.
 """
 
 from dataclasses import dataclass
@@ -18,6 +19,8 @@ from omnibot_driver.tools.calibrate.tick_fit import Plant
 Array = NDArray[np.float64]
 
 STEP_S: Final = 0.001
+NOMINAL_S: Final = 0.2
+"""Step of the controller by the manual, for which the board works its coefficients out."""
 STALE_S: Final = 0.5
 MOST_PERCENT: Final = 100.0
 PHASE_POINTS: Final = 600
@@ -25,7 +28,7 @@ PHASE_POINTS: Final = 600
 
 @dataclass(frozen=True, slots=True)
 class PiGains:
-    """Gains of a PI controller: scalars, or arrays of the same shape."""
+    """Gains as they are written to the board: scalars, or arrays of the same shape."""
 
     kp: Array | float
     tn_s: Array | float
@@ -34,42 +37,73 @@ class PiGains:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """The control loop of a wheel. ``dead_s``: time until a duty shows in the speed."""
+    """The control loop of a wheel. ``dead_s``: time until a duty shows in the speed.
+
+    ``feed_forward``: percent for each RPM; ``low_pass``: of the set-point, 0..1 for each step.
+    """
 
     period_s: float
     ticks_per_revolution: int
     dead_s: float = 0.0
     whole_rpm: bool = True
+    nominal_s: float = NOMINAL_S
+    feed_forward: float = 0.0
+    low_pass: float = 1.0
+
+    @property
+    def stretch(self) -> float:
+        """A written time constant acts as one that is shorter by this factor."""
+        return self.nominal_s / self.period_s
 
 
-def answer(plant: Plant, gains: PiGains, loop: Loop, target_rpm: float, seconds: float) -> Array:
-    """Speed in RPM from standstill, (samples of STEP_S, *shape of the gains)."""
-    kp, tn_s, td_s = np.broadcast_arrays(
-        *(np.asarray(gain, dtype=np.float64) for gain in (gains.kp, gains.tn_s, gains.td_s))
+def answer(
+    plant: Plant,
+    gains: PiGains,
+    loop: Loop,
+    target_rpm: float,
+    seconds: float,
+    *,
+    dead_s: Array | None = None,
+) -> Array:
+    """Speed in RPM from standstill, (samples of STEP_S, *shape of the gains).
+
+    ``dead_s``: several dead times in place of the loop's, of a shape that goes with the gains'.
+    """
+    every = np.broadcast_arrays(
+        *(np.asarray(gain, dtype=np.float64) for gain in (gains.kp, gains.tn_s, gains.td_s)),
+        np.asarray(loop.dead_s if dead_s is None else dead_s, dtype=np.float64),
     )
-    shape = kp.shape
+    shape = every[0].shape
+    kp, tn_s, td_s, late_s = (one.ravel() for one in every)
     count, period = round(seconds / STEP_S), round(loop.period_s / STEP_S)
-    dead = round(loop.dead_s / STEP_S)
-    duties = np.zeros((count + dead + 1, *shape))
-    told = np.zeros((count, *shape))
+    dead, lanes = np.rint(late_s / STEP_S).astype(int), np.arange(len(kp))
+    duties = np.zeros((count + int(dead.max()) + 1, len(kp)))
+    told = np.zeros((count, len(kp)))
     first = 1 - np.exp(-STEP_S / max(plant.slow_s, STEP_S))
     second = 1 - np.exp(-STEP_S / plant.fast_s) if plant.fast_s > STEP_S else 1.0
-    lagged, rpm, ticks, ticked_s = (np.zeros(shape) for _ in range(4))
-    seen, summed, output, duty = (np.zeros(shape) for _ in range(4))
-    per_rpm = loop.ticks_per_revolution / 60
-    gain, lag = loop.period_s / np.maximum(tn_s, 1e-3), loop.period_s / (td_s + loop.period_s)
+    lagged, rpm, ticks, ticked_s = (np.zeros(len(kp)) for _ in range(4))
+    seen, duty, wished = (np.zeros(len(kp)) for _ in range(3))
+    errors, outputs = [np.zeros(len(kp))] * 2, [np.zeros(len(kp))] * 2
+    per_rpm, half_s = loop.ticks_per_revolution / 60, loop.nominal_s / 2
+    tn_s = np.maximum(tn_s, 1e-3)
     for step in range(count):
         now_s = step * STEP_S
         if step % period == 0:
             seen = np.where(now_s - ticked_s > STALE_S, 0.0, seen)
-            error = target_rpm - (np.floor(seen) if loop.whole_rpm else seen)
-            wanted = kp * (error + summed + error * gain)
-            output = output + (wanted - output) * lag
-            free = (np.abs(output) < MOST_PERCENT) | (output * error < 0)
-            summed = np.where(free, summed + error * gain, summed)
-            output = np.clip(output, -MOST_PERCENT, MOST_PERCENT)
-            duty = np.floor(np.maximum(output, 0.0))
-        duties[step + dead] = duty
+            wished = wished + loop.low_pass * (target_rpm - wished)
+            error = wished - (np.floor(seen) if loop.whole_rpm else seen)
+            weighed = (tn_s + half_s) * error + 2 * half_s * errors[0] - (tn_s - half_s) * errors[1]
+            kept = 2 * td_s * outputs[0] - (td_s - half_s) * outputs[1]
+            output = (kp * half_s / tn_s * weighed + kept) / (td_s + half_s)
+            free = np.abs(output) < MOST_PERCENT
+            outputs = [
+                np.where(free, new, old)
+                for new, old in zip((output, outputs[0]), outputs, strict=True)
+            ]
+            errors = [error, errors[0]]
+            power = np.where(output * wished < 0, 0.0, output) + loop.feed_forward * wished
+            duty = np.floor(np.clip(power, 0.0, MOST_PERCENT))
+        duties[step + dead, lanes] = duty
         final = plant.rpm_per_percent * np.maximum(duties[step] - plant.dead_zone_percent, 0.0)
         lagged = lagged + (final - lagged) * second
         rpm = rpm + (lagged - rpm) * first
@@ -80,7 +114,7 @@ def answer(plant: Plant, gains: PiGains, loop: Loop, target_rpm: float, seconds:
         at_s = now_s + STEP_S - (ticks - np.floor(ticks)) / rate
         seen = np.where(passed, 1.0 / (per_rpm * np.maximum(at_s - ticked_s, 1e-6)), seen)
         ticked_s = np.where(passed, at_s, ticked_s)
-    return told
+    return told.reshape((count, *shape))
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +147,8 @@ def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
 def phase_margin_deg(plant: Plant, gains: PiGains, loop: Loop, rpm: float) -> Array:
     """Phase margin of the open loop: distance from -180 degrees where its gain is 1.
 
-    Half a control period passes until an order counts, and half a tick until a speed is seen.
+    Half a control period passes until an order counts, and a tick until a speed is seen: it is the
+    mean over one, and half of one old.
     """
     kp, tn_s, td_s = np.broadcast_arrays(
         *(
@@ -121,12 +156,13 @@ def phase_margin_deg(plant: Plant, gains: PiGains, loop: Loop, rpm: float) -> Ar
             for gain in (gains.kp, gains.tn_s, gains.td_s)
         )
     )
-    omega = np.geomspace(1e-2, np.pi / loop.period_s, PHASE_POINTS)
+    omega = np.geomspace(1e-2, 0.999 * np.pi / loop.period_s, PHASE_POINTS)
+    late_s = loop.dead_s + loop.period_s / 2 + 60.0 / (rpm * loop.ticks_per_revolution)
+    sampled = 2j * np.tan(omega * loop.period_s / 2) / loop.nominal_s
+    controller = kp * (1 + sampled * tn_s) / (sampled * tn_s * (1 + sampled * td_s))
     s = 1j * omega
-    late_s = loop.dead_s + loop.period_s / 2 + 30.0 / (rpm * loop.ticks_per_revolution)
-    open_loop = (kp * (1 + s * tn_s) / (s * tn_s * (1 + s * td_s)) * plant.rpm_per_percent) / (
-        (1 + s * plant.slow_s) * (1 + s * plant.fast_s)
-    )
+    open_loop = controller * plant.rpm_per_percent
+    open_loop = open_loop / ((1 + s * plant.slow_s) * (1 + s * plant.fast_s))
     phase = np.unwrap(np.angle(open_loop), axis=-1) - omega * late_s
     above = np.abs(open_loop) >= 1.0
     place = np.where(above.any(axis=-1), PHASE_POINTS - 1 - np.argmax(above[..., ::-1], axis=-1), 0)

@@ -111,7 +111,7 @@ def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[W
     starts = bench.record("duty_cmd", [FULL_PERCENT] * 2, arguments.records)
     fits = {side: fit(starts[side], ticks) for side in SIDES}
     plants = {side: _plant(fits[side], corrections[side]) for side in SIDES}
-    loops = dict.fromkeys(SIDES, loop)
+    loops = {side: _with_set_point(loop, bench.robot.parameters, side) for side in SIDES}
     tuned: dict[str, Tuned] = {}
     shown: Records = {}
     made: dict[str, list[Steps]] = {side: [] for side in SIDES}
@@ -121,7 +121,8 @@ def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[W
         shown = bench.steps([tuned[side].target_rpm for side in SIDES])
         for side in SIDES:
             made[side].append((tuned[side].gains, tuned[side].target_rpm, shown[side]))
-            loops[side] = replace(loop, dead_s=dead_time_s(plants[side], loop, made[side]))
+            dead_s = dead_time_s(plants[side], loops[side], made[side])
+            loops[side] = replace(loops[side], dead_s=dead_s)
     return [
         WheelTuned(
             side,
@@ -135,6 +136,16 @@ def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[W
         )
         for side in SIDES
     ]
+
+
+def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loop:
+    """The loop with what the user has set of its set-point's way."""
+    forward, low_pass = parameters.get(f"{side}_feed_forward"), parameters.get("low_pass")
+    return replace(
+        loop,
+        feed_forward=0.0 if forward is None else float(forward),
+        low_pass=1.0 if low_pass is None else float(low_pass),
+    )
 
 
 def _encoders(bench: _Bench) -> dict[str, Levels]:

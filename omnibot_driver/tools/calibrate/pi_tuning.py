@@ -3,14 +3,15 @@
 """Gains of a band-limited PI controller for a plant: its slowest pole is compensated, then the gain
 is as high as the goals allow.
 
-Tn is the plant's slow time constant. Kp, and Td where a phase margin is wanted, are those with
+Tn acts as the plant's slow time constant: it is written longer, as the board's coefficients are for
+longer steps than it makes. Kp, and Td where a phase margin is wanted, are those with
 which a step is over soonest (the time until it stays in its band, and the integral of its error),
 of all that overshoot by the goal at most. The dead time of a plant is found afterwards, from a step
 that was made with such gains.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -35,8 +36,8 @@ DEAD_S: Final = np.arange(0.0, 0.101, 0.005)
 FIRST_TICKS: Final = (0.1, 0.3, 0.5, 0.7, 0.9)
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
-TDS: Final = (0.0, 0.5, 1.0)
-"""Of the control period."""
+TDS: Final = (0.25, 0.5, 1.0)
+"""Of the step that the coefficients are for. With 0 a swing from step to step never dies out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,13 +69,13 @@ class Tuned:
 def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
     """Raises ToolError where no gain keeps to the goals."""
     target = target_of(plant, goals)
-    tds = [0.0] if goals.phase_margin_deg is None else [part * loop.period_s for part in TDS]
+    tds = [0.0] if goals.phase_margin_deg is None else [part * loop.nominal_s for part in TDS]
     low, high = 0.02, 5.0
     best: tuple[float, float] | None = None
-    scale = 1.0 / plant.rpm_per_percent
+    scale, tn_s = 1.0 / plant.rpm_per_percent, plant.slow_s * loop.stretch
     for _ in range(ROUNDS):
         kps, used = np.meshgrid(scale * np.geomspace(low, high, CANDIDATES), tds, indexing="ij")
-        gains = PiGains(kps, plant.slow_s, used)
+        gains = PiGains(kps, tn_s, used)
         found = traits(answer(plant, gains, loop, target, SECONDS), target, goals.band)
         # Up to the first gain that overshoots too much: far above it, saturation hides it again.
         tame = np.logical_and.accumulate(found.overshoot <= goals.overshoot, axis=0)
@@ -94,7 +95,7 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
             f"no gain keeps a step to {target:.0f} RPM within {goals.overshoot:.0%} of overshoot"
             f" and a band of {goals.band:.0%}: allow more, or another destination"
         )
-    return told(plant, PiGains(best[0], plant.slow_s, best[1]), loop, goals)
+    return told(plant, PiGains(best[0], tn_s, best[1]), loop, goals)
 
 
 def target_of(plant: Plant, goals: Goals) -> float:
@@ -128,9 +129,10 @@ def dead_time_s(plant: Plant, loop: Loop, made: Sequence[Steps]) -> float:
     costs = np.zeros(len(DEAD_S))
     for gains, target_rpm, records in made:
         shown = [response(record, loop.ticks_per_revolution) for record in records]
-        for place, dead_s in enumerate(DEAD_S):
-            told_rpm = answer(plant, gains, replace(loop, dead_s=dead_s), target_rpm, OVER_S + 1.0)
-            ticks = np.cumsum(told_rpm) * STEP_S * loop.ticks_per_revolution / 60
+        told_rpm = answer(plant, gains, loop, target_rpm, OVER_S + 1.0, dead_s=DEAD_S)
+        for place, ticks in enumerate(
+            np.cumsum(told_rpm, axis=0).T * STEP_S * loop.ticks_per_revolution / 60
+        ):
             models = [_recorded(ticks, first, loop.ticks_per_revolution) for first in FIRST_TICKS]
             costs[place] += sum(min(_unlike(one, model) for model in models) for one in shown)
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)

@@ -4,7 +4,8 @@
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_step.py 20
 
-About two minutes for each robot. The overshoot is that of the true speed, on a robot with the gains
+About two minutes for each robot; a second number is the robot to begin with. The overshoot is that
+of the true speed, on a robot with the gains
 found and with marks in their places.
 """
 
@@ -62,9 +63,9 @@ def true_overshoots(motors: Motors, wheels: Sequence[WheelTuned], folder: Path) 
     return list(rpm.max(axis=0) / comes_to - 1.0)
 
 
-def main(robots: int) -> None:
+def main(robots: int, first: int = 0) -> None:
     """Print a row for each wheel."""
-    for seed in range(robots):
+    for seed in range(first, first + robots):
         motors = random_motors(seed)
         with tempfile.TemporaryDirectory() as name:
             wheels = calibrated(motors, Path(name), seed)
@@ -81,4 +82,4 @@ def main(robots: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(*map(int, sys.argv[1:]))

@@ -1,0 +1,267 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Least squares of a plant over the times between ticks of several starts. Pure calculation.
+
+Knows the way of a plant, marks and noise; it does not know which order is the right one, nor files.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular, toeplitz
+from scipy.optimize import least_squares
+from scipy.sparse import csr_matrix
+
+from omnibot_driver.tools.calibrate.tick_marks import Marks
+
+Column = NDArray[np.float64]
+
+SIGMA: Final = 0.1
+"""Relative noise of one time over marks whose places are not known."""
+SHARPEST: Final = 0.002
+"""Least relative noise of one time; the board tells it in steps of 0.1 ms."""
+SHORTEST_S: Final = 0.005
+LONGEST_S: Final = 5.0
+"""Of the sum of both time constants."""
+GRID: Final = 1500
+STARTS_S: Final = (0.1, 0.5)
+"""Of the sum of both time constants."""
+RATIOS: Final = (0.15, 0.4, 0.8)
+"""Of the fast one to the slow one; at 1 the search would stand still."""
+LATEST_S: Final = 2.0
+"""From the start to the first mark."""
+MOST_OFF: Final = 0.4
+"""Ticks that a mark may be off its place."""
+LAGS: Final = 60
+"""Ticks, over which the load is correlated."""
+FEWEST_RECORDS: Final = 6
+"""With fewer, their scatter tells nothing of the errors."""
+
+
+def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
+    """Way of a plant of unit final speed after a step at 0, in units of speed times seconds."""
+    slow = np.exp(-times_s / slow_s)
+    if fast_s < 1e-4 * slow_s:
+        return np.asarray(times_s - slow_s * (1 - slow))
+    if abs(slow_s - fast_s) < 1e-3 * slow_s:
+        return np.asarray(times_s - 2 * slow_s + (2 * slow_s + times_s) * slow)
+    fast = np.exp(-times_s / fast_s)
+    rest = (slow_s**2 * slow - fast_s**2 * fast) / (slow_s - fast_s)
+    return np.asarray(times_s - slow_s - fast_s + rest)
+
+
+def constants(values: Column, order: int) -> tuple[float, float]:
+    """Slow and fast, from their sum and their ratio, in which there is one optimum."""
+    total = math.exp(values[1])
+    ratio = float(values[2]) if order == 2 else 0.0
+    return total / (1 + ratio), total * ratio / (1 + ratio)
+
+
+class Search:
+    """``intervals``: times between ticks in s, by record.
+
+    Values are the logarithms of the rate in ticks a second and of the sum of both time constants,
+    then for a second order their ratio, then when in s each record's first mark was passed, then,
+    where marks are searched, their places in ticks. (A time, as just after the start a place says
+    little: the way grows with its cube.)
+    """
+
+    def __init__(self, intervals: Sequence[Column], order: int = 2) -> None:
+        self.order = order
+        self._lengths = [len(one) for one in intervals]
+        self._measured = np.concatenate(intervals)
+        self._rate = 1.0 / float(np.median([np.median(one[len(one) // 2 :]) for one in intervals]))
+        self._counts = [np.arange(length + 1) for length in self._lengths]
+        self._marks = 0
+        self._first_marks = [0] * len(intervals)
+        self._off = np.zeros(1)
+        self._sigma = SIGMA
+        self._whitener: Column | None = None
+
+    def roughly(self) -> Column:
+        """Values of a second order, with even marks and independent noise."""
+        records = len(self._lengths)
+        starts = []
+        for total_s in STARTS_S:
+            begins_s = [(0.5 * total_s**2 / self._rate) ** (1 / 3)] * records
+            starts.append(np.array([math.log(self._rate), math.log(total_s), 0.3, *begins_s]))
+        return self._best(starts)
+
+    def closely(self, values: Column) -> Column:
+        """Search on from several ratios of both time constants, as there are local optima."""
+        return self._best([np.array([*values[:2], ratio, *values[3:]]) for ratio in RATIOS])
+
+    def first_order(self, values: Column) -> Column:
+        """Search on with a single lag from values of a second order; ``order`` is 1 from now on."""
+        self.order = 1
+        return self._best([np.array([*values[:2], *values[3:]])])
+
+    def off(self, values: Column) -> list[Column]:
+        """How much longer each time was than with even marks, as a part of it, by record."""
+        off = self._measured / self._told(values, np.zeros(1)) - 1.0
+        return np.split(off, np.cumsum(self._lengths)[:-1])
+
+    def with_marks(self, marks: Marks, values: Column) -> Column:
+        """Search the places of the marks too, and use them from now on; the other values."""
+        self._marks, own = len(marks.steps), len(values)
+        self._first_marks = [marks.first(row) for row in self.off(values)]
+        values = np.concatenate((values, marks.places))
+        self._sigma = max(SHARPEST, 1.4826 * float(np.median(np.abs(self._relative(values)))))
+        values = self._best([values])
+        self._marks, self._off = 0, values[own:]
+        return np.asarray(values[:own])
+
+    def correlate(self, values: Column) -> None:
+        """From now on weigh what these values leave by its correlation.
+
+        Where the places of the marks are not known, it is theirs; else that of the load.
+        """
+        rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
+        lags = LAGS if len(self._off) > 1 else 1
+        self._whitener = _whitener(_correlation(rows, lags), max(self._lengths))
+
+    def left(self, values: Column) -> Column:
+        """What these values do not explain, relative, whitened, without outliers."""
+        left = self._residuals(values) * self._sigma
+        spread = 1.4826 * float(np.median(np.abs(left)))
+        return np.asarray(left[np.abs(left) < 5 * max(spread, 1e-3)])
+
+    def covariance(self, values: Column) -> Column:
+        """Of the first values, without those of single records.
+
+        By what is left of all times, or by how records differ, whichever is more: a load changes
+        slowly.
+        """
+        own = 1 + self.order
+        found = self._search(values)
+        jacobian = np.asarray(found.jac.todense())
+        inverse = np.linalg.pinv(jacobian.T @ jacobian)
+        rms = float(np.sqrt(np.mean(self.left(values) ** 2))) / self._sigma
+        covariance = (inverse * rms**2)[:own, :own]
+        records = len(self._lengths)
+        if records < FEWEST_RECORDS:
+            return np.asarray(covariance)
+        ends = np.cumsum(self._lengths)[:-1]
+        pulls = np.array(
+            [
+                rows.T @ np.clip(left, -5 * rms, 5 * rms)
+                for rows, left in zip(
+                    np.split(jacobian, ends), np.split(self._residuals(values), ends), strict=True
+                )
+            ]
+        )
+        scatter = (inverse @ (pulls.T @ pulls) @ inverse)[:own, :own] * records / (records - 1)
+        grown = np.sqrt(np.maximum(np.diag(scatter) / np.diag(covariance), 1.0))
+        return np.asarray(covariance * np.outer(grown, grown))
+
+    def _best(self, starts: Sequence[Column]) -> Column:
+        found = min((self._search(start) for start in starts), key=_cost)
+        return np.asarray(found.x)
+
+    def _search(self, start: Column) -> Any:
+        rate, records = self._rate, len(self._lengths)
+        ratio = self.order - 1
+        low = [math.log(rate / 2), math.log(SHORTEST_S), *[0.02] * ratio, *[0.0] * records]
+        high = [math.log(2 * rate), math.log(LONGEST_S), *[1.0] * ratio, *[LATEST_S] * records]
+        low += [-MOST_OFF] * self._marks
+        high += [MOST_OFF] * self._marks
+        return least_squares(
+            self._residuals,
+            start,
+            bounds=(low, high),
+            loss="soft_l1",
+            x_scale=0.1,
+            tr_solver="lsmr",  # without a decomposition, for which BLAS takes threads
+            jac_sparsity=self._sparsity(),
+            max_nfev=40,
+            ftol=1e-7,
+            xtol=1e-6,
+        )
+
+    def _sparsity(self) -> csr_matrix:
+        """Which times depend on which values."""
+        own, records, times = 1 + self.order, len(self._lengths), len(self._measured)
+        pattern = np.zeros((times, own + records + self._marks))
+        pattern[:, :own] = 1.0
+        row = np.arange(times)
+        pattern[row, own + np.repeat(np.arange(records), self._lengths)] = 1.0
+        if self._marks:
+            marks = np.concatenate(
+                [
+                    one + count[:-1]
+                    for one, count in zip(self._first_marks, self._counts, strict=True)
+                ]
+            )
+            for end in (0, 1):
+                pattern[row, own + records + (marks + end) % self._marks] = 1.0
+        return csr_matrix(pattern)
+
+    def _relative(self, values: Column) -> Column:
+        return np.asarray(self._measured / self._told(values) - 1.0)
+
+    def _residuals(self, values: Column) -> Column:
+        found = self._relative(values) / self._sigma
+        if self._whitener is None:
+            return found
+        rows = np.split(found, np.cumsum(self._lengths)[:-1])
+        return np.concatenate([self._whitener[: len(row), : len(row)] @ row for row in rows])
+
+    def _told(self, values: Column, off: Column | None = None) -> Column:
+        """The times between marks, record after record. ``off``: places of the marks, where they
+        are not among the values."""
+        order, records = self.order, len(self._lengths)
+        rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)
+        last_s = (max(self._lengths) + 5) / rate + 2 * (slow_s + fast_s)
+        grid_s = last_s * np.linspace(0.0, 1.0, GRID) ** 2  # denser where it starts
+        way = rate * turned(grid_s, slow_s, fast_s)
+        begins_s = values[1 + order : 1 + order + records]
+        if off is None:
+            off = values[1 + order + records :] if self._marks else self._off
+        told = []
+        for begin_s, first, count in zip(begins_s, self._first_marks, self._counts, strict=True):
+            marks = off[(first + count) % len(off)]
+            places = rate * turned(np.array([begin_s]), slow_s, fast_s) + count + marks - marks[0]
+            told.append(np.diff(np.interp(places, way, grid_s)))
+        return np.asarray(np.maximum(np.concatenate(told), 1e-6))
+
+
+def _cost(found: Any) -> float:
+    return float(found.cost)
+
+
+def _correlation(rows: Sequence[Column], lags: int) -> Column:
+    """Correlation of each with the next ones, robust, and fading with the lag.
+
+    With one lag: -0.5 where marks are off their places, 0 where the times are measured badly.
+    """
+    every = np.concatenate(rows)
+    spread = 3 * 1.4826 * float(np.median(np.abs(every)))
+    rows = [np.clip(row, -spread, spread) for row in rows]
+    lags = min(lags, min(map(len, rows)) - 1)
+    products = np.array(
+        [
+            sum(float(np.dot(row[lag:], row[: len(row) - lag])) for row in rows)
+            for lag in range(lags + 1)
+        ]
+    )
+    found = products / max(products[0], 1e-12)
+    if lags == 1:
+        found[1] = np.clip(found[1], -0.499, 0.0)
+        return np.asarray(found)
+    return np.asarray(found * (1.0 - np.arange(lags + 1) / (lags + 1)))
+
+
+def _whitener(correlation: Column, length: int) -> Column:
+    """Whiten residuals with correlated neighbours: the inverse of the Cholesky factor.
+
+    Its beginning is that of a shorter row.
+    """
+    column = np.zeros(length)
+    column[: len(correlation)] = correlation[:length]
+    matrix = toeplitz(column)
+    matrix[np.diag_indices(length)] += 1e-4
+    factor = cholesky(matrix, lower=True)
+    return np.asarray(solve_triangular(factor, np.eye(length), lower=True))
