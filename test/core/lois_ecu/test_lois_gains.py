@@ -31,7 +31,7 @@ def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
     """In the log, and as long as it is so in the diagnostics."""
     bench = opened(LoisEcuSettings())
     (sentence,) = told(bench)
-    assert "0.2 to 0.9 m off in 5 m: run calibrate step" in sentence
+    assert "in a few drives 0.2 to 2 m: run calibrate step" in sentence
     assert bench.session.board.figures.own["Gains"].startswith(
         "left_kp, left_tn, left_td, right_kp"
     )
