@@ -85,12 +85,6 @@ def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
     return scores
 
 
-def add(total: Scores, more: Scores) -> None:
-    """Add these counts to the total."""
-    for key, score in more.items():
-        total.setdefault(key, Score()).__iadd__(score)
-
-
 def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
     """The sum of all."""
     total = Score()

@@ -8,16 +8,15 @@ whole lines did not bring. Odometry goes on from what is left, so it is judged b
 where the whole lines had it.
 """
 
-import os
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import partial
-from multiprocessing import Pool
 from random import Random
 from typing import Final
 
+import pieces
 from carriage import FAULTS, Fault
 
 from omnibot_driver.boards import check_all, load
@@ -114,22 +113,11 @@ def play(stream: Stream) -> Iterator[Event]:
 
 
 def damaged(stream: Stream, fault: Fault, random: Random) -> Stream:
-    """The same, less the bytes that are lost, with those that are added."""
-    result: Stream = [{} for _ in stream]
-    for channel in (0, 1):
-        whole = b"".join(both[channel] for both in stream)
-        ends, at = [], 0
-        for both in stream:
-            at += len(both[channel])
-            ends.append(at)
-        pieces, number = [bytearray() for _ in stream], 0
-        for origin in fault(len(whole), random):
-            while origin >= 0 and origin >= ends[number]:
-                number += 1
-            pieces[number].append(whole[origin] if origin >= 0 else random.randrange(256))
-        for both, piece in zip(result, pieces, strict=True):
-            both[channel] = bytes(piece)
-    return result
+    """Both lines, each damaged by itself."""
+    drive, front = (
+        pieces.damaged([both[channel] for both in stream], fault, random) for channel in (0, 1)
+    )
+    return [{0: ours, 1: other} for ours, other in zip(drive, front, strict=True)]
 
 
 def value_of(event: Event) -> str | None:
@@ -181,11 +169,7 @@ def one(seconds: float, job: tuple[bool, int]) -> dict[tuple[str, bool], Score]:
 def measure(seconds: float, seeds: range) -> tuple[list[str], bool]:
     """Rows of the table, and whether every bound holds."""
     jobs = [(sums, seed) for seed in seeds for sums in SUMS]
-    total: dict[tuple[str, bool], Score] = {}
-    with Pool(os.cpu_count()) as pool:
-        for scores in pool.imap_unordered(partial(one, seconds), jobs):
-            for key, found in scores.items():
-                total.setdefault(key, Score()).__iadd__(found)
+    total = pieces.scores_of(partial(one, seconds), jobs)
     lines = [
         f"{len(seeds)} drives of {seconds:g} s, with sums and without:",
         "",

@@ -6,15 +6,14 @@ The simulated board, which shares no code with the driver, drives in curves; the
 decoder makes of the undamaged line. A report is wrong that was not sent there, in its order.
 """
 
-import os
 from collections import Counter
 from dataclasses import dataclass, fields
 from functools import partial
-from multiprocessing import Pool
 from random import Random
 from typing import Final
 
-from carriage import FAULTS, Fault
+from carriage import FAULTS
+from pieces import damaged, scores_of
 
 from omnibot_driver.core.lois_ecu import LoisDecoder
 from omnibot_driver.core.lois_ecu.messages import Report
@@ -73,21 +72,6 @@ def decode(stream: Stream) -> tuple[list[Report], int]:
     return found, decoder.statistics.lines
 
 
-def damaged(stream: Stream, fault: Fault, random: Random) -> Stream:
-    """The same, less the bytes that are lost, with those that are added."""
-    whole = b"".join(stream)
-    ends, at = [], 0
-    for data in stream:
-        at += len(data)
-        ends.append(at)
-    pieces, number = [bytearray() for _ in stream], 0
-    for origin in fault(len(whole), random):
-        while origin >= 0 and origin >= ends[number]:
-            number += 1
-        pieces[number].append(whole[origin] if origin >= 0 else random.randrange(256))
-    return [bytes(piece) for piece in pieces]
-
-
 def score(truth: list[Report], lines: int, stream: Stream) -> Score:
     """In order: a report that comes out was sent after the one before it, or it is wrong."""
     found, lines_out = decode(stream)
@@ -124,11 +108,7 @@ def one(seconds: float, job: tuple[Firmware, int]) -> dict[tuple[str, str], Scor
 def measure(seconds: float, seeds: range) -> tuple[list[str], bool]:
     """Rows of the table, and whether every bound holds."""
     jobs = [(firmware, seed) for seed in seeds for firmware in QUIRKS]
-    total: dict[tuple[str, str], Score] = {}
-    with Pool(os.cpu_count()) as pool:
-        for scores in pool.imap_unordered(partial(one, seconds), jobs):
-            for key, found in scores.items():
-                total.setdefault(key, Score()).__iadd__(found)
+    total = scores_of(partial(one, seconds), jobs)
     lines = [
         f"{len(seeds)} streams of {seconds:g} s of each firmware:",
         "",

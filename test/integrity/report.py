@@ -15,9 +15,10 @@ from importlib import import_module
 from multiprocessing import Pool
 from pathlib import Path
 
-from bounds import BOUNDS, Scores, add, chunkings, over_chunkers, over_scenarios, run
+from bounds import BOUNDS, Scores, chunkings, over_chunkers, over_scenarios, run
 from carriage import FAULTS
 from judge import Score
+from pieces import add
 from truth import SCENARIOS, WITH_TEXTS
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "integrity.md"

@@ -8,10 +8,11 @@ from multiprocessing import get_context
 from random import Random
 
 import pytest
-from bounds import BOUNDS, Scores, add, chunkings, over_scenarios
+from bounds import BOUNDS, Scores, chunkings, over_scenarios
 from carriage import CHUNKERS, FAULTS, receive
 from judge import judge
 from parsers import plain
+from pieces import add
 from report import one
 from truth import SCENARIOS, generate
 

@@ -1,0 +1,50 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the reports of all boards share: damage to a line in pieces, and scores that add up.
+
+Knows bytes only as bytes, and scores only as what ``+=`` adds.
+"""
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from multiprocessing import Pool
+from random import Random
+from typing import Any, TypeVar
+
+from carriage import Fault
+
+Key = TypeVar("Key")
+Job = TypeVar("Job")
+
+
+def damaged(pieces: Sequence[bytes], fault: Fault, random: Random) -> list[bytes]:
+    """The same pieces without the bytes that are lost, and with those that are added."""
+    whole = b"".join(pieces)
+    ends, at = [], 0
+    for piece in pieces:
+        at += len(piece)
+        ends.append(at)
+    result, number = [bytearray() for _ in pieces], 0
+    for origin in fault(len(whole), random):
+        while origin >= 0 and origin >= ends[number]:
+            number += 1
+        result[number].append(whole[origin] if origin >= 0 else random.randrange(256))
+    return [bytes(piece) for piece in result]
+
+
+def add(total: dict[Key, Any], more: Mapping[Key, Any]) -> None:
+    """Add these scores to those of the same keys."""
+    for key, score in more.items():
+        if key in total:
+            total[key] += score
+        else:
+            total[key] = score
+
+
+def scores_of(one: Callable[[Job], Mapping[Key, Any]], jobs: Iterable[Job]) -> dict[Key, Any]:
+    """The sums of all jobs, which run side by side on all cores."""
+    total: dict[Key, Any] = {}
+    with Pool(os.cpu_count()) as pool:
+        for scores in pool.imap_unordered(one, jobs):
+            add(total, scores)
+    return total
