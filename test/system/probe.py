@@ -3,10 +3,12 @@
 """Another ROS process's view of one driver."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Self
 
 from driver_process import PATIENCE_S
+from geometry_msgs.msg import Twist
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -89,6 +91,18 @@ class Probe:
         publisher = self.node.create_publisher(kind, topic, qos)
         self.wait_for_graph(publisher.get_subscription_count)
         return publisher
+
+    @contextmanager
+    def commanding(self, vx: float, yaw_rate: float = 0.0) -> Iterator[None]:
+        """Publishes this on ``cmd_vel`` ten times a second meanwhile."""
+        publisher = self.publisher(Twist, "cmd_vel")
+        twist = Twist()
+        twist.linear.x, twist.angular.z = vx, yaw_rate
+        timer = self.node.create_timer(0.1, lambda: publisher.publish(twist))
+        try:
+            yield
+        finally:
+            self.remove(timer)
 
     def wait_for_graph(self, predicate: Callable[[], object]) -> None:
         """Until the predicate, which is asked now and then, holds."""

@@ -16,7 +16,6 @@ from typing import Any, Final
 
 import pytest
 from driver_process import Driver
-from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from probe import Probe
 from std_msgs.msg import Float32MultiArray, UInt8MultiArray
@@ -78,15 +77,9 @@ def start_toy(start_driver: Start, toy: Toy, **parameters: object) -> Driver:
 @contextmanager
 def driven(probe: Probe, toy: Toy) -> Iterator[None]:
     """Commanded ten times a second as long as the robot is watched."""
-    publisher = probe.publisher(Twist, "cmd_vel")
-    twist = Twist()
-    twist.linear.x = 0.2
-    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
-    try:
+    with probe.commanding(0.2):
         toy.wait_for(lambda robot: not robot.stands)
         yield
-    finally:
-        probe.remove(timer)
 
 
 def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: Toy) -> None:

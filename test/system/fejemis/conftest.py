@@ -5,16 +5,12 @@
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import pytest
 from driver_process import Driver
 from fejemis_driver import robot_of, started
-from probe import Probe
 from two_ports import TwoPorts
-
-Start = Callable[..., Any]
-NODE: Final = "omnibot_driver"
 
 Start = Callable[..., Any]
 
@@ -27,10 +23,3 @@ def robot(stack: ExitStack, tmp_path: Path) -> TwoPorts:
 @pytest.fixture
 def driver(robot: TwoPorts, start_driver: Start) -> Driver:
     return started(robot, start_driver)
-
-
-@pytest.fixture
-def probe(driver: Driver, probe_of: Start) -> Probe:
-    probe: Probe = probe_of(driver)
-    probe.wait_for_state("nominal")
-    return probe

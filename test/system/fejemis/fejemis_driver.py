@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from driver_process import Driver
-from geometry_msgs.msg import Twist
 from probe import Probe
 from two_ports import TwoPorts
 
@@ -16,8 +15,6 @@ from omnibot_driver.simulator.fejemis import FejemisSettings, SimulatedFejemis
 
 Start = Callable[..., Any]
 NODE: Final = "omnibot_driver"
-
-Start = Callable[..., Any]
 
 
 def robot_of(stack: ExitStack, folder: Path, **settings: Any) -> TwoPorts:
@@ -34,15 +31,9 @@ def started(robot: TwoPorts, start_driver: Start, **parameters: object) -> Drive
 @contextmanager
 def driven(probe: Probe, robot: TwoPorts, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
     """Commanded ten times a second; begins when it moves."""
-    publisher = probe.publisher(Twist, "cmd_vel")
-    twist = Twist()
-    twist.linear.x, twist.angular.z = vx, yaw
-    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
-    try:
+    with probe.commanding(vx, yaw):
         robot.wait_until(lambda board: not board.standing)
         yield
-    finally:
-        probe.remove(timer)
 
 
 def moves_again(probe: Probe, robot: TwoPorts) -> None:

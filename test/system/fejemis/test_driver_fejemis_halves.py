@@ -10,7 +10,6 @@ from typing import Any, Final
 import pytest
 from driver_process import Driver
 from fejemis_driver import driven, moves_again, robot_of, started
-from geometry_msgs.msg import Twist
 from probe import Probe
 from std_srvs.srv import SetBool
 from two_ports import DRIVE, FRONT, TwoPorts
@@ -124,10 +123,6 @@ def test_a_teensy_of_another_kind_is_named_and_nothing_moves(
     probe: Probe = probe_of(driver)
     driver.wait_for_line(wrong)
     probe.wait_for_state("connecting")
-    publisher = probe.publisher(Twist, "cmd_vel")
-    twist = Twist()
-    twist.linear.x = 0.3
-    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
-    robot.stands_for_good()
-    probe.remove(timer)
+    with probe.commanding(0.3):
+        robot.stands_for_good()
     assert robot.do(lambda board: board.truth.x_m) == 0.0

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 from driver_process import Driver
 from lois_ecu_rig import Ecu, ecu_of
-from probe import Probe
 
 from omnibot_driver.simulator.lois_ecu import QUIRKS
 
@@ -25,10 +24,3 @@ def ecu(request: pytest.FixtureRequest, stack: ExitStack) -> Ecu:
 def driver(ecu: Ecu, start_driver: Start) -> Driver:
     started: Driver = start_driver(ecu.path, board="lois_ecu")
     return started
-
-
-@pytest.fixture
-def probe(driver: Driver, probe_of: Start) -> Probe:
-    probe: Probe = probe_of(driver)
-    probe.wait_for_state("nominal")
-    return probe

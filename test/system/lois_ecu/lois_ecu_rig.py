@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any, Final
 
-from geometry_msgs.msg import Twist
 from probe import Probe
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
@@ -59,15 +58,9 @@ def ecu_of(firmware: Any, stack: ExitStack, **settings: Any) -> Ecu:
 @contextmanager
 def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
     """Commanded ten times a second; begins when it moves."""
-    publisher = probe.publisher(Twist, "cmd_vel")
-    twist = Twist()
-    twist.linear.x, twist.angular.z = vx, yaw
-    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
-    try:
+    with probe.commanding(vx, yaw):
         ecu.wait_for(lambda board: not board.standing)
         yield
-    finally:
-        probe.remove(timer)
 
 
 def set_parameter(probe: Probe, name: str, value: str) -> None:

@@ -111,6 +111,17 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
     probe.remove(timer)
 
 
+def recorded(robot: Any) -> Path:
+    """A busy machine may stop the robot, and the tool then says that the user should call again."""
+    for _ in range(10):
+        try:
+            return Path(robot.record("record_rpm", "wheel_cmd", [3.0, 3.0]))
+        except ToolError as error:
+            if "call again" not in str(error):
+                raise
+    raise AssertionError("no record was made in ten calls")
+
+
 def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
     start_driver: Start, stack: ExitStack, tmp_path: Path
 ) -> None:
@@ -126,7 +137,7 @@ def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
     )
     driver.wait_for_line("state: nominal")
     with Interruption() as interruption, connect(driver.namespace, [], interruption) as robot:
-        path = robot.record("record_rpm", "wheel_cmd", [3.0, 3.0])
+        path = recorded(robot)
         ecu.stands_for_good()
         found = read(path)
         assert [len(found[side]) for side in ("left", "right")] == [40, 40]

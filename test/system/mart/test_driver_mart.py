@@ -75,25 +75,12 @@ def driver(mart: Mart, start_driver: Start, tmp_path: Path) -> Driver:
     return started
 
 
-@pytest.fixture
-def probe(driver: Driver, probe_of: Start) -> Probe:
-    probe: Probe = probe_of(driver)
-    probe.wait_for_state("nominal")
-    return probe
-
-
 @contextmanager
 def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[None]:
     """Commanded ten times a second; begins when it moves."""
-    publisher = probe.publisher(Twist, "cmd_vel")
-    twist = Twist()
-    twist.linear.x, twist.angular.z = vx, yaw_rate
-    timer = probe.node.create_timer(0.1, lambda: publisher.publish(twist))
-    try:
+    with probe.commanding(vx, yaw_rate):
         mart.wait_for(lambda board: board.server.chassis.moving)
         yield
-    finally:
-        probe.remove(timer)
 
 
 def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
