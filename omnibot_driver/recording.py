@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What came in over a wire once: ``replay://bag?speed=10``, read from a rosbag2.
+"""Recorded bytes of a port in place of a port: ``replay://bag?speed=10`` reads a rosbag2.
 
 Knows the URL and the library rosbags, which reads bags without ROS. Must not know when the bytes
-are wanted, nor what they mean.
+are needed, nor what they mean.
 """
 
 import math

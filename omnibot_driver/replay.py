@@ -66,7 +66,7 @@ class Replay:
         self._thread.start()
 
     def call(self, action: Callable[[Session, float], T]) -> T:
-        """Do something with the session, at the time that the recording has come to."""
+        """Call this action with the session and the present time of the recording."""
         try:
             with self._lock:
                 try:

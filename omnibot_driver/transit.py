@@ -58,9 +58,10 @@ class Arrival:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """``total_s`` since it was sent, of which it ``waited_s`` to be taken from our own queue.
+    """How old a message is: ``total_s`` since it was sent, ``waited_s`` of it in our own queue.
 
-    ``sent_ns``: by our time of day; two possible times while too little is known of its sender.
+    ``sent_ns``: when it was sent, by our time of day. There are two possible times until enough
+    messages of its sender have come.
     """
 
     total_s: float

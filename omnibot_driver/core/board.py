@@ -176,7 +176,7 @@ class Board(Protocol):
         """The bytes that wake a board in any state, end a partial command and stop the wheels."""
 
     def start(self) -> Packets:
-        """Run, whatever it did before; harmless to repeat."""
+        """Make the board run, whatever its mode is; harmless to repeat."""
         return NO_PACKETS
 
     def pause(self) -> Packets:

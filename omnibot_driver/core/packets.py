@@ -22,5 +22,5 @@ def packed(data: bytes, channel: int = 0) -> Packets:
 
 
 def joined(packets: Packets) -> bytes:
-    """The bytes of packets that share a channel of bytes."""
+    """The bytes of all packets, one after the other; for boards of one channel."""
     return b"".join([data for _, data in packets])

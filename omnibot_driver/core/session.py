@@ -279,7 +279,7 @@ class Session:
         self._task.begin(name, token, limit_s, now)
 
     def task_is_current(self, token: object) -> bool:
-        """Whether the one with this token is under way, and was not given up."""
+        """Whether the task with this token still runs and was not given up."""
         return self._task.is_current(token)
 
     def end_task(self, token: object, success: bool, message: str) -> None:

@@ -65,9 +65,9 @@ class Findings:
 class Rig:
     """Context manager. The driver's port is a symbolic link, as udev makes them.
 
-    ``kind``: of board, with these ``settings`` of its own; ``before``: Python for the driver's
-    process; ``grace_s`` and ``ends_within_s``: how long after
-    it has to Stop may reach the robot, and a driver may take to end.
+    ``kind``: of the board, which gets these ``settings``; ``before``: Python for the driver's
+    process; ``grace_s``: how late Stop may reach the robot; ``ends_within_s``: how long a driver
+    may take to end.
     """
 
     def __init__(

@@ -24,7 +24,7 @@ class Items:
 
 
 def is_motion(mode: int, words: Words) -> bool:
-    """Zeros in mode 01 too: where the board's switch stands on position they are a goal."""
+    """Zeros in mode 01 are motion too: with the board's switch on position they are a goal."""
     return mode == 0x01 or (mode == 0x02 and any(words))
 
 

@@ -2,8 +2,8 @@
 
 """A super client of a discovery server: ends when it has found all drivers of a fleet.
 
-``python fleet_observer.py COUNT PREFIX``. A process of its own: in the one that has been a client
-of a server, Fast DDS finds nothing without it any more.
+``python fleet_observer.py COUNT PREFIX``. It is a process of its own, because Fast
+DDS finds nothing without a server in a process that has been a client of one.
 """
 
 import sys

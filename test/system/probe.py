@@ -94,7 +94,7 @@ class Probe:
 
     @contextmanager
     def commanding(self, vx: float, yaw_rate: float = 0.0) -> Iterator[None]:
-        """Publishes this on ``cmd_vel`` ten times a second meanwhile."""
+        """Publish this velocity on ``cmd_vel`` ten times a second inside the context."""
         publisher = self.publisher(Twist, "cmd_vel")
         twist = Twist()
         twist.linear.x, twist.angular.z = vx, yaw_rate

@@ -2,7 +2,7 @@
 
 """What a board is ordered to do, in SI units and the board's own axes; values only.
 
-An order has passed every check and limit. How a board says it, is its actuator's business.
+An order has passed every check and limit. The actuator of a board encodes it.
 """
 
 from typing import Final

@@ -156,7 +156,7 @@ def measure(data: bytes | bytearray, at: int) -> int:
 
 
 def length_begun(data: bytes | bytearray, at: int) -> int:
-    """Length in bytes of the frame that this whole header begins; NO_FRAME if it is none."""
+    """The length in bytes of the frame that begins with this header, or NO_FRAME."""
     return _LENGTH_BY_TYPE.get(data[at + 1], NO_FRAME)
 
 
@@ -176,7 +176,7 @@ def _measure_paused(data: bytes | bytearray, at: int) -> int:
 
 
 def decode_measured(data: bytes | bytearray, pose_byte_order: ByteOrder = "big") -> Frame:
-    """The frame that these bytes are; their length must be what ``measure`` told."""
+    """Decode one frame, from as many bytes as ``measure`` returned."""
     if data[0] == _TEXT_BEGIN:
         return PausedFrame(int(data[len(_PAUSED_WORD) :]))
     if data[1] == IMU_HEADER[1]:

@@ -3,9 +3,9 @@
 """The board's modes as a table: what S, P, R and what is heard do from each of them.
 
 Source: the manual's "Operation State Machine" and "System state command". The board never says
-which mode it is in, so the mode is a belief and only what is *heard* makes it a better one: a
-letter that was sent changes nothing, except that after R all belief is void. P toggles, so it is
-allowed only where the outcome is known.
+which mode it is in, so the driver concludes it from what it *hears*. A letter that was sent proves
+nothing: the board may have missed it. After R the mode is unknown. P toggles, so it is allowed
+only where the outcome is known.
 """
 
 from enum import Enum

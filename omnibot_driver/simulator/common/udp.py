@@ -36,7 +36,7 @@ class UdpSocket:
         return datagrams
 
     def send(self, data: bytes) -> int:
-        """Give a datagram to the driver; 0 where there is none, or no room."""
+        """Send a datagram to the driver; returns 0 if there is no driver, or no room."""
         if self._peer is None:
             return 0
         try:

@@ -2,8 +2,8 @@
 
 """What an IMU at rest says: its biases, its noise, and which way is up. Pure.
 
-A single rest cannot tell an accelerometer's bias from a tilt, nor a tilt of the sensor from one of
-the floor; only along gravity, whose length is known, is the bias seen.
+A single rest does not separate an accelerometer's bias from a tilt, nor a tilt of the sensor from
+one of the floor. Only along gravity, whose length is known, the bias is visible.
 """
 
 from collections.abc import Callable

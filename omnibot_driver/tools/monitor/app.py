@@ -121,7 +121,7 @@ class Monitor(App[None]):
         yield Footer()
 
     def on_mount(self) -> None:
-        """Begin to show, and to heed signals."""
+        """Begin to draw, and to handle signals."""
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             loop.add_signal_handler(number, self.exit)

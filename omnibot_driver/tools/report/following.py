@@ -91,7 +91,7 @@ def _sampled(series: Series) -> Series:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """How a command was followed: after ``lag_s``, with a ``gain`` on each axis (NaN: not told)."""
+    """How a command was followed: after ``lag_s``, with a ``gain`` on each axis (NaN: unknown)."""
 
     lag_s: float
     gains: Array

@@ -171,7 +171,7 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """The robot stands until a newer goal, which is in the frame as it lies then."""
+    """The robot stands until a newer goal comes, which uses the board's frame of that time."""
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)
     event(bench)

@@ -28,7 +28,7 @@ flips = st.sampled_from([IMU, DELTA, POSE]).flatmap(
 
 
 class Drive:
-    """A second of curves on a board that has driven before, and then a flip on the way."""
+    """A second of curves on a board that has driven before; then a bit flips."""
 
     def __init__(self, frame: str = "earth") -> None:
         start = BoardPose(3000.0, -2000.0, 700.0)

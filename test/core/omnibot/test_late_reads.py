@@ -33,8 +33,10 @@ def arrivals(ticks: Sequence[bytes]) -> tuple[bytes, list[float]]:
 def stopped(
     ticks: Sequence[bytes], place: int, stop_s: float, *, most: int = 4096, piece: int = 1
 ) -> Reads:
-    """Read as pieces come; once, after ``place`` bytes, nothing is read for this time. Then all
-    that is there, but no more than ``most`` bytes at once, each read 20 µs after the one before."""
+    """A reader takes pieces as they come, and stops once for ``stop_s``, after ``place`` bytes.
+
+    It then reads all that has come, at most ``most`` bytes at once, one read every 20 µs.
+    """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
     while at < len(data):

@@ -34,7 +34,7 @@ def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> N
 
 
 def test_between_near_bounds_the_middle_is_taken() -> None:
-    """0.8 ms above and 0.1 ms below, where 0.1 ms is granted to late reads."""
+    """The bounds are 0.8 ms above and 0.1 ms below; late reads may explain 0.1 ms."""
     _, late_s = followed(0.0, lambda _: 0.8e-3, lambda _: -0.1e-3)
     assert late_s == pytest.approx(0.3e-3, abs=0.05e-3)
 
@@ -66,7 +66,7 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """Reads that were all late for some seconds, by less than can be seen at once."""
+    """All reads were late for some seconds, each by too little to be noticed."""
     _, late_s = followed(
         0.0,
         lambda tick: 0.9e-3 if tick in late else 0.0,
