@@ -10,9 +10,8 @@ import json
 import sys
 import time
 
-import rclpy
 from geometry_msgs.msg import Twist
-from rclpy.node import Node
+from publishers import connected
 
 PERIOD_S = 0.0247
 """No multiple of the board's tick: every moment between two of its readings is met."""
@@ -23,12 +22,7 @@ LSB_PER_MPS = 70.0
 def main() -> None:
     """Alternate: at any moment each has waited as long as the other."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
-    rclpy.init()
-    node = Node("hand", start_parameter_services=False, enable_rosout=False)
-    publishers = [node.create_publisher(Twist, f"{name}/cmd_vel", 1) for name in namespaces]
-    while any(publisher.get_subscription_count() == 0 for publisher in publishers):
-        time.sleep(0.01)
-    time.sleep(1.0)
+    publishers = connected(namespaces)
     sent: list[list[tuple[float, int]]] = [[] for _ in namespaces]
     at = begun = time.monotonic()
     speed = 0

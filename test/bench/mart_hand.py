@@ -10,9 +10,8 @@ import json
 import sys
 import time
 
-import rclpy
 from geometry_msgs.msg import Twist
-from rclpy.node import Node
+from publishers import connected
 
 SPEEDS = (0.15, 0.35, 0.2, 0.4, 0.15, 0.3, 0.0, 0.0)
 """m/s; at the end the robot stands long enough to start anew."""
@@ -23,12 +22,7 @@ AHEAD_S = 3.0
 def main() -> None:
     """Both hear each speed at the same time, but for the one that is first."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
-    rclpy.init()
-    node = Node("hand", start_parameter_services=False, enable_rosout=False)
-    publishers = [node.create_publisher(Twist, f"{name}/cmd_vel", 1) for name in namespaces]
-    while any(publisher.get_subscription_count() == 0 for publisher in publishers):
-        time.sleep(0.01)
-    time.sleep(1.0)
+    publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]
     begun, number = time.monotonic(), 0
     while time.monotonic() < begun + seconds:

@@ -1,0 +1,22 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Publishers of ``cmd_vel`` for the hands, which are processes of their own."""
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import rclpy
+from geometry_msgs.msg import Twist
+from rclpy.node import Node
+
+
+def connected(namespaces: Sequence[str]) -> list[Any]:
+    """One publisher for each namespace, a second after all have subscribers. Begins ROS."""
+    rclpy.init()
+    node = Node("hand", start_parameter_services=False, enable_rosout=False)
+    publishers = [node.create_publisher(Twist, f"{name}/cmd_vel", 1) for name in namespaces]
+    while any(publisher.get_subscription_count() == 0 for publisher in publishers):
+        time.sleep(0.01)  # a subscriber raises no event without an executor
+    time.sleep(1.0)  # the subscribers find the publishers, too
+    return publishers
