@@ -9,6 +9,8 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
+from omnibot_driver.boards import PROFILES
+
 OVERRIDES = {
     "port": (str, "Serial device or pyserial URL of the board"),
     "front_port": (str, "Serial device of the front board, for a robot that has one (fejemis)"),
@@ -51,6 +53,7 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "board",
                 default_value="omnibot",
+                choices=list(PROFILES),  # launch starts the driver without a file that is missing
                 description="Motor board of the robot, for which params_file is chosen.",
             ),
             DeclareLaunchArgument(

@@ -5,8 +5,10 @@ over odometry and compass where the board has one.
 
 The filter publishes odom to base_link, so the driver does not. The description is needed: it says
 how the sensors are mounted, OmniBot's IMU upside down. Takes the arguments of driver.launch.py and
-description.launch.py.
+description.launch.py. A board without parameters for the filter is refused.
 """
+
+from pathlib import Path
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription
@@ -16,6 +18,10 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
+from omnibot_driver.boards import PROFILES
+
+CONFIG = Path(__file__).parents[1] / "config"
+FILTERED = [name for name in PROFILES if (CONFIG / f"ekf_{name}.yaml").is_file()]
 FRAMES = {
     "map_frame": "map",
     "odom_frame": "odom",
@@ -48,6 +54,7 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "board",
                 default_value="omnibot",
+                choices=["omnibot", *FILTERED],
                 description="Motor board of the robot, for which ekf_params_file is chosen.",
             ),
             DeclareLaunchArgument(

@@ -8,11 +8,13 @@ Where launch is not installed, only what can be read off the files is checked.
 import ast
 import json
 import os
+import runpy
 import subprocess
 import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
@@ -143,6 +145,38 @@ def test_the_driver_has_every_parameter_that_is_offered() -> None:
     )
     assert {"port"} < set(offered)
     assert all(boards.owners_of(name) for name in offered)
+
+
+class Stub(ModuleType):
+    """A module of launch whose every name makes a note of how it was called."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return lambda *words, **options: SimpleNamespace(kind=name, words=words, options=options)
+
+
+@pytest.mark.parametrize(("file", "parameters_of"), [("driver", "{}.yaml"), ("ekf", "ekf_{}.yaml")])
+def test_a_board_without_a_parameter_file_is_refused(
+    file: str, parameters_of: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """launch itself warns of a file that is missing, and starts the node without parameters."""
+    for module in ("launch", "launch_ros"):
+        for part in (
+            *("", ".actions", ".conditions", ".launch_description_sources"),
+            *(".parameter_descriptions", ".substitutions"),
+        ):
+            monkeypatch.setitem(sys.modules, module + part, Stub(module + part))
+    started = runpy.run_path(str(ROOT / f"launch/{file}.launch.py"))["generate_launch_description"]
+    (argument,) = (
+        action.options
+        for action in started().words[0]
+        if action.kind == "DeclareLaunchArgument" and action.words == ("board",)
+    )
+    usual = argument["default_value"]
+    assert {usual} < set(argument["choices"]) <= set(boards.PROFILES)
+    for board in set(argument["choices"]) - {usual}:
+        assert (ROOT / "config" / parameters_of.format(board)).is_file(), board
 
 
 @needs_launch
