@@ -93,7 +93,7 @@ class Conversation:
         self._copies_until_s: dict[Form, float] = {}
         self._answers: dict[Word, tuple[str, float]] = {}
         self.trip_s = 0.0
-        self._disturbed_s = -math.inf
+        self._disturbed_s = self._doubled_s = -math.inf
 
     def may_ask(self, word: Word, now: float) -> bool:
         """Whether nothing is asked, and no late reply can be taken for its own."""
@@ -117,6 +117,10 @@ class Conversation:
     def disturbed(self, now: float) -> bool:
         """Whether the network has shown lately that it loses, doubles or delays datagrams."""
         return now < self._disturbed_s + DISTURBED_S
+
+    def doubles(self, now: float) -> bool:
+        """Whether replies have come lately that nothing was asked for: copies, or late ones."""
+        return now < self._doubled_s + DISTURBED_S
 
     def owes(self, form: Form, now: float) -> None:
         """A reply of this form may still be on its way."""
@@ -144,9 +148,7 @@ class Conversation:
         if self.pending is None:
             return None
         word = self.pending.word
-        until_s = self.pending.sent_s + word.takes_s + 2 * self.delay_s
-        for form in word.forms:
-            self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
+        self._owes_until(word, self.pending.sent_s)
         self.pending = None
         return word
 
@@ -167,9 +169,10 @@ class Conversation:
         if pending is None or isinstance(reply, Other) or not _matches(reply, pending, now):
             self.discarded += 1
             if isinstance(reply, Ok):
-                self._owed_until_s.pop(reply.form, None)
+                if not self._has_come(reply, now):
+                    self._owed_until_s.pop(reply.form, None)
                 if reply.form is not Form.NAME:
-                    self._disturbed_s = now
+                    self._disturbed_s = self._doubled_s = now
             return None
         self.pending = None
         took_s = now - pending.sent_s
@@ -177,22 +180,37 @@ class Conversation:
             self.trip_s += SMOOTHING * (took_s - self.trip_s)
         if pending.word in PRESSING and isinstance(reply, Ok) and took_s > SLOW_S:
             self._disturbed_s = now
-        doubtful = self._is_copy(pending.word, reply, now) or self._owed(pending.word, now)
+        owed = self._owed(pending.word, now)
+        doubtful = self._is_copy(pending, reply, now) or owed
         from_s = pending.sent_s
         if doubtful or self.disturbed(now):
             from_s = min(from_s, now - self.delay_s)  # an answer to a question before
         when = Moment(now - took_s / 2, from_s, now, doubtful)
         return Answer(pending.request, reply, took_s, when)
 
-    def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
-        """Whether another command was answered alike just now; its reply may have come twice."""
+    def _is_copy(self, pending: Pending, reply: Ok | Fail, now: float) -> bool:
+        """Whether another command was answered alike just now; its reply may have come twice. The
+        command's own reply is then still to come, unless it would be the same as before.
+        """
         if not isinstance(reply, Ok):
             return False
+        word = pending.word
+        before, _ = self._answers.pop(word, ("", 0.0))
+        is_copy = self._has_come(reply, now)
         self._answers[word] = reply.text, now + self.delay_s
-        return any(
-            other is not word and text == reply.text and until_s > now
-            for other, (text, until_s) in self._answers.items()
-        )
+        as_before = word in PRESSING and reply.text == before
+        if is_copy and word.kind is Kind.QUERY and not as_before:
+            self._owes_until(word, pending.sent_s)
+        return is_copy
+
+    def _has_come(self, reply: Ok, now: float) -> bool:
+        return any(text == reply.text and until_s > now for text, until_s in self._answers.values())
+
+    def _owes_until(self, word: Word, sent_s: float) -> None:
+        """The reply to this may still come."""
+        until_s = sent_s + word.takes_s + 2 * self.delay_s
+        for form in word.forms:
+            self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
 
     def _patience_s(self, word: Word) -> float:
         """Queries are short of patience: what drives is not to be blind for long."""

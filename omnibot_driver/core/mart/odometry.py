@@ -22,6 +22,8 @@ ACCELERATION_MPS2, ACCELERATION_RADPS2 = 1.0, 3.0
 """Of a robot that is not heard."""
 FASTER_MPS, FASTER_RADPS = 0.1, 0.2
 """A robot may be faster than its last counts tell by this."""
+STARTS_MPS, STARTS_RADPS = 0.3, 0.6
+"""A robot that starts may be so fast before its speed is counted."""
 BLIND_RADPS: Final = 1.5
 """A robot of which nothing is heard turns no faster."""
 SPEED_STDDEV_MPS, SPEED_STDDEV_RADPS = 0.02, 0.03
@@ -73,6 +75,10 @@ class MartOdometry(Reckoning):
         )
         if self.on_the_spot:
             errors += self.doubt.turn(self.spun_rad, self.told_rad)
+        if len(self._track) < 2:
+            errors += anywhere(STARTS_MPS * ahead_s, STARTS_RADPS * ahead_s)
+        if self.wheel.maybe:
+            errors += anywhere(*self.maybe)
         return errors
 
     def _speed_variances(self, ahead_s: float, blind_since_s: float | None) -> tuple[float, float]:

@@ -32,6 +32,8 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.TURNING: TURNING,
 }
 """By state, the most pressing first. In all others the command port is busy."""
+SONARS, SONARS_APART_S = (SFC, SRC), 0.4
+"""Both report the same where nothing is near. A copy of one reply is not to be the other's."""
 
 
 class Polls:
@@ -55,6 +57,10 @@ class Polls:
     def asked(self, word: Word, now: float) -> None:
         """Note that the query was sent."""
         self._asked_s[word] = now
+        if word in SONARS:
+            for each in SONARS:
+                earliest_s = now + SONARS_APART_S - STILL[each]
+                self._asked_s[each] = max(self._asked_s.get(each, earliest_s), earliest_s)
 
     def press(self, word: Word) -> None:
         """Make the query due at once."""

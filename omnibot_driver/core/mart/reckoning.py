@@ -118,6 +118,8 @@ class Reckoning:
         if self.on_the_spot:
             self._finish_turn()
         self.doubt.end()
+        way_m, turn_rad = self.maybe
+        self.doubt.add(way_m**2, turn_rad**2)
         self.motion = Motion.NONE
         self.wheel.rest()
         self.slowing_since_s = None
@@ -161,14 +163,23 @@ class Reckoning:
         if step.lost:
             self.doubt.add((BLIND_MPS * step.seconds) ** 2, ANY_RAD**2)
         if step.unsure:
-            turn_rad = 2 * step.wheel_m / settings.track_m if self.on_the_spot else 0.0
-            self.doubt.add(step.wheel_m**2, turn_rad**2)
+            self.doubt.add(step.wheel_m**2, self._rim_rad(step.wheel_m) ** 2)
         if not step.seconds or (step.lost and not step.wheel_m):
             return NOTHING_MEASURED
         turn_rad = self._turn_rad(step.wheel_m, when.at_s, step.seconds)
         way_m = 0.0 if self.on_the_spot else step.wheel_m - turn_rad * settings.track_m / 2
         self._move(way_m, turn_rad, step.seconds, step.wheel_m)
         return DisplacementReading(way_m, 0.0, turn_rad, "body", max(step.seconds, LEAST_S), 0)
+
+    @property
+    def maybe(self) -> tuple[float, float]:
+        """In m and rad, what a motion has done that may not have begun."""
+        wheel_m = self.wheel.maybe * self._settings.metres_per_count
+        return wheel_m, self._rim_rad(wheel_m)
+
+    def _rim_rad(self, wheel_m: float) -> float:
+        """The turn on the spot that takes the wheel so far; zero in other motions."""
+        return 2 * wheel_m / self._settings.track_m if self.on_the_spot else 0.0
 
     @property
     def on_the_spot(self) -> bool:

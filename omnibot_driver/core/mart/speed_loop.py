@@ -33,6 +33,8 @@ HOLD_AFTER_S: Final = 1.0
 NEW_RADPS: Final = 0.03
 UNEQUAL: Final = 0.04
 """Of two motors, where nothing but what is commanded tells of a turn."""
+MOST_UNEQUAL: Final = 2 * UNEQUAL
+"""A larger difference that was learned is not believed."""
 COPIED, MISSED, SLOW_TRIP_S = 0.1, 0.5, 0.03
 """How probable it is that a change came twice on a slow network, or did not come."""
 LONGEST_STEP_S: Final = 0.2
@@ -106,9 +108,9 @@ class SpeedLoop:
 
     @property
     def left_over_right(self) -> float:
-        """Of the wheels' speeds, by the units and the learned gains of both motors."""
-        right = self._right.units * self._right.gain
-        return self._left.units * self._left.gain / right if right else 1.0
+        """Of the wheels' speeds, by the units and the balance of both motors."""
+        right = self._right.units
+        return self._left.units * self.balance / right if right else 1.0
 
     @property
     def bend(self) -> float:
@@ -117,8 +119,11 @@ class SpeedLoop:
 
     @property
     def balance(self) -> float:
-        """The left motor's gain over the right one's."""
-        return self._left.gain / self._right.gain
+        """The left motor's gain over the right one's, as far as it is believed: what was learned
+        while a change of the units was lost or came twice includes that change.
+        """
+        ratio = self._left.gain / self._right.gain
+        return min(1.0 + MOST_UNEQUAL, max(1.0 - MOST_UNEQUAL, ratio))
 
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
         """Speeds of right and left in m/s. None goes back: the inner one stands at most."""

@@ -51,12 +51,15 @@ class Stopping:
         self.began_s = now
         self.result: Ok | Fail | None = None
         """The reply of the motion itself, where there was one."""
+        self.began: bool | None = None
+        """Whether the motion had begun; None where the replies do not tell."""
         self.wake_at = now
         self.last_port = 0
         """How often the stop port was used as the last resort."""
         self._delay_s = delay_s
         self._said_s = now
         self._sure_from_s = started_s + delay_s
+        self._own_from_s = started_s + 2 * delay_s
         self._unsure_until_s = -math.inf
         self._owed = owed > 0
         self._rounds = 0
@@ -104,6 +107,11 @@ class Stopping:
             return False
         self._silent_from_s = now + self._patience_s
         none = isinstance(reply, Fail) and reply.reason in (NO_MOTION, NOT_IN_MOTION)
+        if now >= self._own_from_s:  # it answers the start or a stop: all others have come
+            if not none and not _is_number(reply):
+                self.began = True
+            elif none and self._rounds == 1:
+                self.began = self.began or False
         if isinstance(reply, Ok) and self._owed and reply.form is Form.NOTHING:
             return False
         if isinstance(reply, Ok | Fail) and not none:
@@ -127,3 +135,7 @@ class Stopping:
             return False
         self.result = reply
         return True
+
+
+def _is_number(reply: Reply) -> bool:
+    return isinstance(reply, Ok) and reply.form is not Form.NOTHING

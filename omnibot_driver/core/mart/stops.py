@@ -180,6 +180,10 @@ class Stops(Ground):
         if Form.INTEGER in ANSWERS.get(stopping.motion, ()):
             self.conversation.owes(Form.INTEGER, now)
         result, motion = stopping.result, stopping.motion
+        if stopping.began:
+            self.odometry.wheel.started()
+        elif stopping.began is False and not self.conversation.doubles(now):
+            self.odometry.wheel.refused()
         if motion is Motion.SPIN and isinstance(result, Ok) and result.form is Form.INTEGER:
             self._spin_over(result.number, stopping.began_s, now)
         if motion is Motion.STRAIGHT:

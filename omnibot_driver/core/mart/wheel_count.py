@@ -20,6 +20,8 @@ MOST_M, MOST_MPS = 0.3, 2.0
 STRAY_COUNTS: Final = 3
 """A robot that stands is counted no farther."""
 ODD_TIMES: Final = 3
+SAME_TIMES: Final = 2
+"""The count of a robot that is driven is not twice that of before: the start was lost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,29 +38,37 @@ class Step:
 
 class WheelCount:
     """``last``: None where nothing was counted; ``told_s``: when, ``from_s``: at the earliest;
-    ``certain``: it cannot be the answer to another question.
+    ``certain``: it cannot be the answer to another question. ``maybe``: the counts of a motion that
+    was not answered, and has begun or not: they are the same as those of the motion before.
     """
 
     def __init__(self) -> None:
         self.last: int | None = None
         self.told_s = self.from_s = -math.inf
         self.certain = False
+        self.maybe = 0
         self.may_begin_anew = False
         """The next count may be from zero on, by the check of the IMU."""
         self._raw: int | None = None
         self._before: int | None = None
-        self._begins = self._confirmed = self._same = self._unseen = False
-        self._odd = 0
+        self._begins = self._confirmed = self._unseen = False
+        self._same = self._odd = 0
 
     def begin(self) -> None:
         """A motion has begun, and the count with it, if the start has come."""
         self._before, self.last = self.last, 0
         self.may_begin_anew = self._begins = True
-        self.certain = self._confirmed = self._same = False
+        self.certain = self._confirmed = False
+        self._same = self.maybe = 0
 
     def started(self) -> None:
         """The server has answered that it has."""
         self._confirmed = True
+
+    def refused(self) -> None:
+        """It has not, by the reply to its stop: the count goes on."""
+        if not self._confirmed:
+            self.last, self._begins = self._before, False
 
     def connect(self) -> None:
         """The server was not heard for long: it may have gone on, or have begun anew."""
@@ -67,6 +77,7 @@ class WheelCount:
     def rest(self) -> None:
         """The motion is over."""
         self.last, self._begins = self._raw, False
+        self.maybe = 0
 
     def tell(
         self,
@@ -90,8 +101,13 @@ class WheelCount:
         if (self.may_begin_anew or rests) and abs(count) <= abs(count - before):
             before = 0
         unsure = bool(self._begins and self._before and abs(count - self._before) <= 1)
-        if unsure and (not self._confirmed or self._same or math.isinf(stood_s)):
-            self._same = True  # as before the start, which was lost
+        driven = math.isinf(stood_s)
+        if self._confirmed and not self._same and when.from_s >= stood_s and not when.doubtful:
+            unsure = False
+        if unsure and (not self._confirmed or self._same or driven):
+            # as before the start, which may have been lost
+            self._same += driven and not when.doubtful
+            self.maybe = count if self._same < SAME_TIMES else 0
             self._raw, self.told_s, self.from_s = count, when.at_s, when.from_s
             return Step(0.0, seconds)
         lost = bool(self._unseen and not before and self.last)
@@ -101,6 +117,8 @@ class WheelCount:
             return self._odd_one(count, when, Step(0.0, seconds, lost=True))
         if not rests and self._falls_back(count, when):
             return self._odd_one(count, when, Step(wheel_m, seconds, lost=True))
+        if rests and when.doubtful and abs(count - before) > STRAY_COUNTS:
+            return self._odd_one(count, when, Step(wheel_m, seconds))
         most_m = DOUBT_M + DOUBT_MPS * (moved_s + when.spread_s)
         if when.doubtful and not self._begins and abs(wheel_m - expected_mps * moved_s) > most_m:
             return None
@@ -126,4 +144,4 @@ class WheelCount:
         self.last = self._raw = count
         self.told_s, self.from_s = when.at_s, when.from_s
         self.may_begin_anew = self._begins = self._unseen = False
-        self._odd = 0
+        self._odd = self.maybe = 0

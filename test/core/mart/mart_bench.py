@@ -16,6 +16,7 @@ from omnibot_driver.core.mart import MartSettings as Settings
 from omnibot_driver.core.mart.board import MartBoard
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.readings import JobDone
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.common.network import FaultyNetwork, NetworkFaults
 from omnibot_driver.simulator.mart import QUIRKS, Firmware, MartSettings, SimulatedMart
@@ -63,6 +64,8 @@ class MartBench(AnyBench):
         super().__init__(MartBoard(settings or Settings()), robot)
         self.server = robot.board.server
         self.board: Any = self.session.board
+        self._odometry: list[OdometryEstimate] = []
+        self._sorted = 0
 
     def ready(self) -> "MartBench":
         """Nominal, and seen to stand."""
@@ -70,6 +73,13 @@ class MartBench(AnyBench):
         self.run_until(lambda: self.session.state == "nominal", 30.0)
         self.run(1.5)
         return self
+
+    @property
+    def odometry(self) -> list[OdometryEstimate]:
+        new = self.events[self._sorted :]
+        self._sorted += len(new)
+        self._odometry += [event for event in new if isinstance(event, OdometryEstimate)]
+        return self._odometry
 
     def command(self, vx: float, yaw_rate: float, seconds: float) -> None:
         """Ten times a second; what is refused is refused."""

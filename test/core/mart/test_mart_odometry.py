@@ -1,0 +1,198 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What odometry makes of replies that are lost, late, doubled or another query's."""
+
+import pytest
+from honesty import nees
+from mart_bench import MartBench
+
+from omnibot_driver.core.mart import MartSettings, State, parse, words
+from omnibot_driver.core.mart.conversation import Answer, Conversation
+from omnibot_driver.core.mart.moment import Moment
+from omnibot_driver.core.mart.odometry import MartOdometry
+from omnibot_driver.core.mart.polls import Polls
+from omnibot_driver.core.mart.speed_loop import SpeedLoop
+from omnibot_driver.core.mart.states import Motion
+from omnibot_driver.core.mart.stopping import REPEAT_S, Stopping
+from omnibot_driver.core.mart.words import Word
+
+WRONG_NEES = 28.0
+"""1 in 270,000 squares of three honest normal errors is beyond it."""
+
+
+def at(at_s: float, *, doubtful: bool = False) -> Moment:
+    return Moment(at_s, at_s - 0.005, at_s + 0.005, doubtful)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("quiet_s", [0.05, 0.5], ids=["ok is heard", "ok is lost"])
+@pytest.mark.parametrize("twist", [(-0.2, 0.0), (0.3, 0.0), (0.0, 0.5)])
+def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
+    twist: tuple[float, float], quiet_s: float
+) -> None:
+    """Two motions alike, so the count after the second is that after the first: not one of a
+    robot whose start was lost.
+    """
+    bench = MartBench("source", gyro_noise_dps=0.0).ready()
+    for _ in range(2):
+        for state in (State.STARTING, State.STOPPING):
+            for _ in range(60):
+                if bench.board._pilot.state is state:
+                    break
+                bench.command(*twist, 0.1)
+            bench.speaks = False
+        bench.run(quiet_s)
+        bench.speaks = True
+        for _ in range(15):
+            bench.run(0.1)
+            assert nees(bench) < WRONG_NEES
+    chassis = bench.server.chassis
+    assert chassis.way_m > 0.4 or abs(chassis.yaw_rad) > 1.0
+    if quiet_s < 0.3:
+        assert bench.error.way_m < 0.05
+
+
+def reversed_by_1000() -> MartOdometry:
+    """Moved once, and begun again; the encoder still reports the first motion."""
+    odometry = MartOdometry(MartSettings())
+    odometry.counted(0, at(0.5))
+    odometry.begin(Motion.REVERSE, 1.0)
+    odometry.started(1.1)
+    odometry.counted(-1000, at(3.0))
+    odometry.stand(4.0)
+    odometry.counted(-1000, at(4.5))
+    odometry.rest()
+    odometry.begin(Motion.REVERSE, 5.0)
+    return odometry
+
+
+def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
+    """Its stop was answered by no motion."""
+    odometry = reversed_by_1000()
+    before = odometry.doubt.total([]).xx
+    odometry.wheel.refused()
+    odometry.stand(8.0)
+    odometry.counted(-1000, at(8.5))
+    odometry.rest()
+    assert odometry.pose.x_m == pytest.approx(-0.4)
+    assert odometry.doubt.total([]).xx < before + 0.01**2
+
+
+def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
+    """Before its end is counted for certain, and from then on."""
+    odometry = reversed_by_1000()
+    odometry.stand(8.0)
+    odometry.counted(-1000, at(8.5, doubtful=True))
+    assert odometry.told(8.6, blind_since_s=None).covariance.xx > 0.3**2
+    odometry.counted(-1000, at(8.7))
+    odometry.rest()
+    assert odometry.told(9.0, blind_since_s=None).covariance.xx > 0.3**2
+
+
+def test_a_count_that_stays_while_the_robot_is_driven_is_no_motion() -> None:
+    """The reply to the start was a copy of another ok."""
+    odometry = reversed_by_1000()
+    odometry.started(5.1)
+    for at_s in (5.2, 5.3, 5.4):
+        odometry.counted(-1000, at(at_s))
+    odometry.stand(6.0)
+    odometry.counted(-1000, at(6.5))
+    odometry.rest()
+    assert odometry.pose.x_m == pytest.approx(-0.4)
+    assert odometry.doubt.total([]).xx < 0.05**2
+
+
+def stopped(*replies: tuple[float, bytes]) -> bool | None:
+    """What the replies to stops at 10 s and 10.3 s tell of a start at 8 s."""
+    stop = Stopping(Motion.REVERSE, 10.0, delay_s=0.3, started_s=8.0, owed=1)
+    stop.due(10.0)
+    for at_s, data in replies:
+        if at_s > 10.0 + REPEAT_S:
+            stop.due(10.0 + REPEAT_S)
+        stop.hear(parse(data), at_s)
+    return stop.began
+
+
+def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
+    """Unless it may be that to a second stop, and the reply to the first was lost."""
+    assert stopped((10.2, b"fail no motion")) is False
+    assert stopped((10.4, b"ok"), (10.41, b"fail no motion")) is True
+    assert stopped((10.2, b"fail insufficent clearence")) is True
+    assert stopped((10.4, b"fail no motion")) is None
+
+
+def asked(talk: Conversation, word: Word, reply: bytes, at_s: float, took_s: float) -> Answer:
+    talk.ask(word.request(), at_s)
+    answer = talk.hear(parse(reply), at_s + took_s)
+    assert answer is not None
+    return answer
+
+
+def test_a_copy_that_is_taken_for_a_reply_leaves_the_reply_itself_to_come() -> None:
+    """A count came twice, the second time for a sonar: its range is not the next count, nor the
+    range of the other sonar.
+    """
+    talk = Conversation(0.3)
+    assert not asked(talk, words.ENC, b"ok 1792", 1.0, 0.01).when.doubtful
+    assert asked(talk, words.SFC, b"ok 1792", 1.02, 0.04).when.doubtful
+    assert not talk.may_ask(words.SRC, 1.1)
+    assert asked(talk, words.ENC, b"ok 141", 1.1, 0.01).when.doubtful
+    assert talk.may_ask(words.SRC, 1.8)
+
+
+def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
+    """That one may still come."""
+    talk = Conversation(0.3)
+    asked(talk, words.ENC, b"ok 5", 1.0, 0.01)
+    talk.ask(words.SFC.request(), 1.1)
+    talk.give_up(1.2)
+    assert talk.hear(parse(b"ok 5"), 1.21) is None
+    assert not talk.may_ask(words.SRC, 1.22)
+    assert talk.hear(parse(b"ok 141"), 1.23) is None
+    assert talk.may_ask(words.SRC, 1.24)
+
+
+def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -> None:
+    """Both report -1 where nothing is near: a copy could not be recognised."""
+    polls, asked_s = Polls(), {words.SFC: -1.0, words.SRC: -1.0}
+    for tick in range(1000):
+        now = tick * 0.01
+        for word in polls.due(State.STILL, now)[:1]:
+            if word in asked_s:
+                assert now - max(asked_s.values()) > 0.35
+                asked_s[word] = now
+            polls.asked(word, now)
+    assert min(asked_s.values()) > 8.0
+
+
+def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
+    """It may be the reply of a sonar; what comes three times is so."""
+    odometry = MartOdometry(MartSettings())
+    odometry.counted(1167, at(1.0))
+    assert odometry.counted(152, at(1.1, doubtful=True)) is None
+    odometry.counted(1167, at(1.2))
+    assert odometry.pose.x_m == 0.0
+    for at_s in (1.3, 1.4, 1.5):
+        odometry.counted(1267, at(at_s, doubtful=True))
+    assert odometry.pose.x_m == pytest.approx(0.04)
+
+
+def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
+    """A change that came twice is in the gain that was learned, and not in the motor."""
+    loop = SpeedLoop(MartSettings())
+    loop.begin(30, False, 0.0)
+    for tick in range(100):
+        loop.measured(0.2, -0.3, -0.015, tick * 0.05)
+    assert loop.balance == pytest.approx(1.0 + 0.08)
+    assert loop.left_over_right == pytest.approx(1.0 + 0.08)
+
+
+def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
+    """Its motors take 50 ms, and no speed was counted yet."""
+    odometry = MartOdometry(MartSettings())
+    odometry.counted(0, at(0.5))
+    odometry.begin(Motion.SPIN, 1.0)
+    odometry.started(1.06)
+    odometry.counted(2, at(1.07))
+    covariance = odometry.told(1.13, blind_since_s=None).covariance
+    assert covariance.yaw_yaw > 0.03**2
