@@ -3,15 +3,20 @@
 """A bounded search that drives the real pilot and conversation against the simulated firmware.
 
 ``mart_model`` searches without a bound, but with a driver of its own. Here what runs is what is
-searched: every pair of wishes, with one datagram of either way lost, late or doubled, whichever it
-is; and every driver that begins, whatever the robot does then, with a network that is away for any
-time. ``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` does all of it.
+searched: every pair of wishes, and rows of eight in which each wish follows each, with one datagram
+of either way lost, late or doubled, or the IMU dead from it on, whichever it is; and every driver
+that begins, whatever the robot does then, with a network that is away for any time.
+``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` does all of it.
 """
 
+import copy
 import heapq
+import math
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import count, product
 from multiprocessing import Pool
 from typing import Final, Literal, NamedTuple
@@ -20,8 +25,8 @@ from mart_bench import POLLS, MartBench
 
 from omnibot_driver.core.packets import Packet
 
-Fate = Literal["lost", "late", "twice"]
-FATES: Final[tuple[Fate, ...]] = ("lost", "late", "twice")
+Fate = Literal["lost", "late", "twice", "the IMU dies"]
+FATES: Final[tuple[Fate, ...]] = ("lost", "late", "twice", "the IMU dies")
 LATE_S: Final = 0.29
 """The network delay that the driver assumes, less a tick."""
 WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
@@ -33,20 +38,24 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "stop": lambda bench: bench.run(0.7),
     "e-stop": lambda bench: (bench.estop(True), bench.run(0.4), bench.estop(False)),
 }
-MOST_DATAGRAMS: Final = 14
-"""Each way, from the first wish on, without the polls."""
+MOST_DATAGRAMS: Final = 7
+"""Each way, for each wish, without the polls; what follows is an e-stop that is repeated."""
+PROOF_S: Final = 0.25
+"""A motion that begins so long after the death of the IMU was not proved."""
+STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
+"""What starts the motors without a look at the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
 """What a driver may meet that begins."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
 """Times after which the network comes back."""
 BACK_S: Final = (0.2, 0.7, 30.0)
 """Times after which it is away again, for a second."""
-ENDS_S: Final = 16.0
+ENDS_S, SETTLED_S = 16.0, 1.5
 
 
 class Trial(NamedTuple):
-    """``met``, ``away_s``, ``back_s``, ``ways`` of a driver that begins; else two ``wishes``, and
-    which datagram of which way meets which fate.
+    """``met``, ``away_s``, ``back_s``, ``ways`` of a driver that begins; else the ``wishes``, and
+    which datagram of which way meets which fate. The polls are not counted.
     """
 
     wishes: tuple[str, ...] = ()
@@ -63,10 +72,11 @@ class Carrier:
     """In place of the robot's network: what it does to each datagram is known before."""
 
     def __init__(self, bench: MartBench, trial: Trial) -> None:
-        self.robot, self.trial = bench.robot, trial
+        self.bench, self.robot, self.trial = bench, bench.robot, trial
         self.board = bench.robot.board
         self.numbers = [-1, -1]
         self.counting = False
+        self.died_s = math.inf
         self._late: list[tuple[float, int, int, Packet]] = []
         self._order = count()
 
@@ -93,7 +103,11 @@ class Carrier:
         times_s = [now_s]
         if chosen:
             late_s = now_s + LATE_S
-            times_s = {"lost": [], "late": [late_s], "twice": [now_s, late_s]}[self.trial.fate]
+            fates = {"lost": [], "late": [late_s], "twice": [now_s, late_s]}
+            times_s = fates.get(self.trial.fate, times_s)
+            if self.trial.fate == "the IMU dies":
+                self.board.server.imu.alive = False
+                self.died_s = now_s
         for at_s in times_s:
             heapq.heappush(self._late, (at_s, next(self._order), way, packet))
 
@@ -122,8 +136,22 @@ def _ahead(bench: MartBench) -> tuple[float, float, float]:
 def pairs() -> Iterator[Trial]:
     """Every pair of wishes, with each fate of each datagram."""
     for pair in product(WISHES, WISHES):
-        for way, number, fate in product((0, 1), range(MOST_DATAGRAMS), FATES):
-            yield Trial(pair, way, number, fate)
+        yield from each_fate(pair)
+
+
+def eights() -> Iterator[Trial]:
+    """Rows of eight, one for each step from wish to wish, with each fate of each datagram."""
+    names = tuple(WISHES)
+    for step in range(len(names)):
+        yield from each_fate(tuple(names[n * step % len(names)] for n in range(8)))
+
+
+def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
+    """None, and each of each datagram."""
+    for way, number in enumerate(ran(Trial(wishes)).numbers):
+        most = min(number + 1, MOST_DATAGRAMS * len(wishes))
+        for n, fate in product(range(most), FATES):
+            yield Trial(wishes, way, n, fate)
 
 
 def beginnings() -> Iterator[Trial]:
@@ -133,31 +161,61 @@ def beginnings() -> Iterator[Trial]:
             yield Trial(met=met, away_s=away_s, back_s=back_s, ways=ways)
 
 
-def trouble(trial: Trial) -> str:
-    """What must not be; empty where it is not. With a living IMU throughout."""
-    bench = MartBench("firmware", seed=3)
-    carrier = Carrier(bench, trial)
-    bench.robot = carrier
-    if trial.met:
-        bench.server.receive(trial.met, 0, None, 0.0)
+@cache
+def _ready() -> MartBench:
+    return MartBench("firmware", seed=3).ready()
+
+
+def ran(trial: Trial) -> Carrier:
+    """To its end."""
+    bench = copy.deepcopy(_ready()) if trial.wishes else MartBench("firmware", seed=3)
+    carrier = bench.robot = Carrier(bench, trial)
     if trial.wishes:
-        bench.ready()
         carrier.counting = True
         for wish in trial.wishes:
             WISHES[wish](bench)
-        bench.run(2.0)
+        bench.run(0.5)
+        carrier.counting = False
+        bench.run(1.5)
         bench.estop(True)  # a goal goes on without anybody
         bench.run(3.0)
-    else:
-        bench.open()
-        bench.run(trial.away_s + ENDS_S)
-    if bench.server.hung or bench.server.crashed or (trial.wishes and bench.server.stop_port_hung):
+        return carrier
+    if trial.met:
+        bench.server.receive(trial.met, 0, None, 0.0)
+    bench.open()
+    bench.run(trial.away_s + (trial.back_s + 1.0 if trial.back_s < ENDS_S else 0.0))
+    rests_s = 0.0
+    for _ in range(round(ENDS_S / 0.1)):
+        bench.run(0.1)
+        rests = bench.robot.stands and bench.session.state == "nominal"
+        rests_s = rests_s + 0.1 if rests else 0.0
+        if rests_s > SETTLED_S:
+            break
+    return carrier
+
+
+def trouble(trial: Trial) -> str:
+    """What must not be; empty where it is not."""
+    carrier = ran(trial)
+    bench, server = carrier.bench, carrier.bench.server
+    lost = any(notice.startswith("lost") for notice in bench.notices)
+    if math.isfinite(carrier.died_s):
+        late_s = carrier.died_s + PROOF_S
+        if any(at_s > late_s and data.split()[0] in STARTS for at_s, _, data in server.received):
+            return "a motion begins with a dead IMU"
+        return "" if carrier.stands or lost else "the robot moves, and the driver does not say so"
+    if server.hung or server.crashed or (trial.wishes and server.stop_port_hung):
         return "the server hangs"
-    if not bench.robot.stands:
+    if not carrier.stands:
         return "the robot moves"
-    if trial.wishes and any(notice.startswith("lost") for notice in bench.notices):
-        return "the server is given up"
-    return ""
+    return "the server is given up" if trial.wishes and lost else ""
+
+
+SETS: Final[dict[str, Callable[[], Iterator[Trial]]]] = {
+    "pairs": pairs,
+    "eights": eights,
+    "beginnings": beginnings,
+}
 
 
 def search(trials: list[Trial]) -> list[tuple[Trial, str]]:
@@ -168,11 +226,13 @@ def search(trials: list[Trial]) -> list[tuple[Trial, str]]:
 
 
 def main() -> None:
-    """Both, or those named: ``pairs``, ``beginnings``."""
-    for name in sys.argv[1:] or ("pairs", "beginnings"):
-        trials = list({"pairs": pairs, "beginnings": beginnings}[name]())
+    """All, or those named: ``pairs``, ``eights``, ``beginnings``."""
+    for name in sys.argv[1:] or SETS:
+        began_s = time.monotonic()
+        trials = list(SETS[name]())
         bad = search(trials)
-        print(f"{name}: {len(trials)} trials, {len(bad)} end badly")
+        took_s = time.monotonic() - began_s
+        print(f"{name}: {len(trials)} trials in {took_s:.0f} s, {len(bad)} end badly", flush=True)
         for trial, why in bad[:20]:
             print(f"  {why}: {trial}")
 

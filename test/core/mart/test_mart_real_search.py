@@ -2,11 +2,20 @@
 
 """A sample of the bounded search that drives the real pilot; ``real_search`` has all of it."""
 
+from collections.abc import Callable
 from random import Random
+from typing import Any
 
 import pytest
 import real_search
 from real_search import Trial, trouble
+
+from omnibot_driver.core.mart import states, words
+from omnibot_driver.core.mart.imu_proof import ImuProof
+from omnibot_driver.core.mart.pilot import Pilot
+from omnibot_driver.core.mart.states import Motion, State
+from omnibot_driver.core.mart.stopping import Stopping
+from omnibot_driver.core.packets import Packets
 
 pytestmark = pytest.mark.slow
 
@@ -31,14 +40,66 @@ def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""
 
 
-@pytest.mark.parametrize(
-    ("met", "away_s"), [(b"RM 30", 3.6), (b"B SLOW", 3.6)], ids=["SRM behind SL", "SM behind SL"]
-)
-def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
-    met: bytes, away_s: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A planted trap: the sweep of a driver that asks nothing first."""
-    from omnibot_driver.core.mart.pilot import Pilot
+Patch = Callable[[Any, str, Any], None]
 
-    monkeypatch.setattr(Pilot, "_ask_what_moves", Pilot._sweep)
-    assert trouble(Trial(met=met, away_s=away_s, ways=(0,))) == "the server hangs"
+
+def sweeps_again(patch: Patch) -> None:
+    """Behind the stop port, without asking first what moves."""
+    patch(Pilot, "_ask_what_moves", Pilot._sweep)
+
+
+def says_sl_before_sm(patch: Patch) -> None:
+    due = Stopping.due
+
+    def trapped(stopping: Stopping, now: float) -> tuple[words.Word, ...]:
+        said = due(stopping, now)
+        return (words.SL, *said) if words.SM in said else said
+
+    patch(Stopping, "due", trapped)
+
+
+def turns_within_rm(patch: Patch) -> None:
+    """L, where SRM belongs in between."""
+    agrees, act = Pilot._agrees, Pilot._act
+
+    def spins(pilot: Pilot, now: float) -> bool:
+        return pilot.state is State.DRIVING and pilot._wish(now)[0] is Motion.SPIN
+
+    def trapped(pilot: Pilot, now: float) -> Packets:
+        if spins(pilot, now):
+            return pilot._begin(words.L.request("SLOW"), now)
+        return act(pilot, now)
+
+    patch(Pilot, "_agrees", lambda pilot, now: agrees(pilot, now) or spins(pilot, now))
+    patch(Pilot, "_act", trapped)
+    allowed = {*states.MAY_SAY[State.DRIVING], words.L}
+    patch(states, "MAY_SAY", {**states.MAY_SAY, State.DRIVING: frozenset(allowed)})
+
+
+def starts_without_proof(patch: Patch) -> None:
+    """As if the IMU had been proved just now."""
+    patch(ImuProof, "fresh", lambda imu, now: True)
+
+
+TRAPS = {
+    "SRM behind SL": (sweeps_again, Trial(met=b"RM 30", away_s=3.6, ways=(0,)), "server hangs"),
+    "SM behind SL": (sweeps_again, Trial(met=b"B SLOW", away_s=3.6, ways=(0,)), "server hangs"),
+    "SL before SM": (says_sl_before_sm, Trial(("backward", "stop")), "server hangs"),
+    "L in RM": (turns_within_rm, Trial(("forward", "left")), "server hangs"),
+    "no proof": (
+        starts_without_proof,
+        Trial(("e-stop", "forward"), 0, 0, "the IMU dies"),
+        "a motion begins with a dead IMU",
+    ),
+}
+
+
+@pytest.mark.parametrize("trap", TRAPS)
+def test_a_trap_that_is_planted_in_the_pilot_is_found(
+    trap: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without it the same trial ends well."""
+    plant, trial, found = TRAPS[trap]
+    assert trouble(trial) == ""
+    plant(monkeypatch.setattr)
+    assert found in trouble(trial)
