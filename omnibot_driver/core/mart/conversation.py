@@ -91,7 +91,7 @@ class Conversation:
         self.pending: Pending | None = None
         self._owed_until_s: dict[Form, float] = {}
         self._copies_until_s: dict[Form, float] = {}
-        self._answers: dict[Word, tuple[str, float]] = {}
+        self._answers: dict[Word, tuple[Ok | Fail, float]] = {}
         self.trip_s = 0.0
         self._disturbed_s = self._doubled_s = -math.inf
 
@@ -166,7 +166,12 @@ class Conversation:
         pending = self.pending
         if isinstance(reply, Ok):
             self.heard(reply.form, now)
-        if pending is None or isinstance(reply, Other) or not _matches(reply, pending, now):
+        if (
+            pending is None
+            or isinstance(reply, Other)
+            or not _matches(reply, pending, now)
+            or self._is_copy(pending.word, reply, now)
+        ):
             self.discarded += 1
             if isinstance(reply, Ok):
                 if not self._has_come(reply, now):
@@ -180,31 +185,29 @@ class Conversation:
             self.trip_s += SMOOTHING * (took_s - self.trip_s)
         if pending.word in PRESSING and isinstance(reply, Ok) and took_s > SLOW_S:
             self._disturbed_s = now
-        owed = self._owed(pending.word, now)
-        doubtful = self._is_copy(pending, reply, now) or owed
+        doubtful = self._owed(pending.word, now) or self._has_come(reply, now, but=pending.word)
+        self._answers[pending.word] = reply, now + self.delay_s
         from_s = pending.sent_s
         if doubtful or self.disturbed(now):
             from_s = min(from_s, now - self.delay_s)  # an answer to a question before
         when = Moment(now - took_s / 2, from_s, now, doubtful)
         return Answer(pending.request, reply, took_s, when)
 
-    def _is_copy(self, pending: Pending, reply: Ok | Fail, now: float) -> bool:
-        """Whether another command was answered alike just now; its reply may have come twice. The
-        command's own reply is then still to come, unless it would be the same as before.
+    def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
+        """Whether another query was answered so just now, and this one was not before: the reply
+        has come twice, and its own is still to come.
         """
-        if not isinstance(reply, Ok):
-            return False
-        word = pending.word
-        before, _ = self._answers.pop(word, ("", 0.0))
-        is_copy = self._has_come(reply, now)
-        self._answers[word] = reply.text, now + self.delay_s
-        as_before = word in PRESSING and reply.text == before
-        if is_copy and word.kind is Kind.QUERY and not as_before:
-            self._owes_until(word, pending.sent_s)
-        return is_copy
+        before, _ = self._answers.get(word, (reply, now))
+        return reply != before and self._has_come(reply, now, but=word, kind=Kind.QUERY)
 
-    def _has_come(self, reply: Ok, now: float) -> bool:
-        return any(text == reply.text and until_s > now for text, until_s in self._answers.values())
+    def _has_come(
+        self, reply: Ok | Fail, now: float, *, but: Word | None = None, kind: Kind | None = None
+    ) -> bool:
+        """Whether a command was answered so just now."""
+        return isinstance(reply, Ok) and any(
+            each == reply and until_s > now and word is not but and kind in (None, word.kind)
+            for word, (each, until_s) in self._answers.items()
+        )
 
     def _owes_until(self, word: Word, sent_s: float) -> None:
         """The reply to this may still come."""

@@ -77,6 +77,8 @@ class MartOdometry(Reckoning):
             errors += self.doubt.turn(self.spun_rad, self.told_rad)
         if len(self._track) < 2:
             errors += anywhere(STARTS_MPS * ahead_s, STARTS_RADPS * ahead_s)
+        more_mps, more_radps = self.speed_changes
+        errors += anywhere(more_mps * ahead_s, more_radps * ahead_s)
         if self.wheel.maybe:
             errors += anywhere(*self.maybe)
         return errors

@@ -279,6 +279,16 @@ class Reckoning:
         return (way_m - then_m) / seconds, (yaw_rad - then_rad) / seconds
 
     @property
+    def speed_changes(self) -> tuple[float, float]:
+        """m/s and rad/s by which it was faster or slower between the last two counts."""
+        if len(self._track) < 2:
+            return 0.0, 0.0
+        (then_s, then_m, then_rad), (at_s, way_m, yaw_rad) = self._track[-2], self._track[-1]
+        seconds = max(at_s - then_s, LEAST_S)
+        speed, rate = self.speeds
+        return (way_m - then_m) / seconds - speed, (yaw_rad - then_rad) / seconds - rate
+
+    @property
     def window_s(self) -> float:
         return max(WINDOW_S, SPREADS * self.spread_s)
 

@@ -17,6 +17,8 @@ from omnibot_driver.core.mart.settings import MartSettings
 MOST_UNITS: Final = 127
 MOST_CHANGE: Final = 15
 """Units in one exchange: all that a command which arrives twice can do too much."""
+MOST_BACKWARD: Final = 5
+"""The same in B on a slow network, where nothing may tell that it came twice."""
 SETTLE_S, LEARN_S = 0.45, 0.35
 """After a larger change nothing is learned for this time; then once in this time."""
 LARGE_UNITS: Final = 3
@@ -35,8 +37,10 @@ UNEQUAL: Final = 0.04
 """Of two motors, where nothing but what is commanded tells of a turn."""
 MOST_UNEQUAL: Final = 2 * UNEQUAL
 """A larger difference that was learned is not believed."""
-COPIED, MISSED, SLOW_TRIP_S = 0.1, 0.5, 0.03
-"""How probable it is that a change came twice on a slow network, or did not come."""
+COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
+"""Variance of a change that came twice on a slow network, or did not come, for its square. More than
+is probable, as a wrong guess stays for the whole motion.
+"""
 LONGEST_STEP_S: Final = 0.2
 
 
@@ -175,10 +179,11 @@ class SpeedLoop:
         self._rate_radps = rate_radps
         held_radps = rate_radps + HOLD_PER_S * self._error_rad
         right_mps, left_mps = self.sides(speed_mps, self._direction * held_radps)
+        most = MOST_BACKWARD if self._direction < 0.0 and self._is_slow else MOST_CHANGE
         steps = []
         for side, rim_mps in ((self._right, right_mps), (self._left, left_mps)):
             wanted = side.wanted_units(rim_mps, self._per_unit_mps)
-            steps.append(max(-MOST_CHANGE, min(MOST_CHANGE, wanted - side.units)))
+            steps.append(max(-most, min(most, wanted - side.units)))
         right, left = steps
         if self._right.units + right <= 0 and self._left.units + left <= 0:
             return None
@@ -187,7 +192,7 @@ class SpeedLoop:
     def changed(self, right: int, left: int, now: float) -> None:
         """That was sent; it is taken for obeyed, and the measurement tells if it was not."""
         self.part = abs(right) / max(1, self._right.units) + abs(left) / max(1, self._left.units)
-        self._unsure += (COPIED if self.trip_s > SLOW_TRIP_S else 0.0) * self.part**2
+        self._unsure += (COPIED if self._is_slow else 0.0) * self.part**2
         self._right.units = min(MOST_UNITS, max(0, self._right.units + right))
         self._left.units = min(MOST_UNITS, max(0, self._left.units + left))
         if max(abs(right), abs(left)) >= LARGE_UNITS:
@@ -196,6 +201,11 @@ class SpeedLoop:
     def missed(self) -> None:
         """The last change was not answered: it was obeyed, or not."""
         self._unsure += MISSED * self.part**2
+
+    @property
+    def _is_slow(self) -> bool:
+        """Whether the network is one on which a change may come twice."""
+        return self.trip_s > SLOW_TRIP_S
 
     @property
     def _per_unit_mps(self) -> float:

@@ -128,16 +128,24 @@ def asked(talk: Conversation, word: Word, reply: bytes, at_s: float, took_s: flo
     return answer
 
 
-def test_a_copy_that_is_taken_for_a_reply_leaves_the_reply_itself_to_come() -> None:
-    """A count came twice, the second time for a sonar: its range is not the next count, nor the
-    range of the other sonar.
-    """
+def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
+    """A count came twice: its copy is no range, and the range is not the next count."""
     talk = Conversation(0.3)
-    assert not asked(talk, words.ENC, b"ok 1792", 1.0, 0.01).when.doubtful
-    assert asked(talk, words.SFC, b"ok 1792", 1.02, 0.04).when.doubtful
-    assert not talk.may_ask(words.SRC, 1.1)
-    assert asked(talk, words.ENC, b"ok 141", 1.1, 0.01).when.doubtful
-    assert talk.may_ask(words.SRC, 1.8)
+    asked(talk, words.SFC, b"ok 141", 0.5, 0.06)
+    asked(talk, words.ENC, b"ok 1792", 1.0, 0.01)
+    talk.ask(words.SFC.request(), 1.02)
+    assert talk.hear(parse(b"ok 1792"), 1.06) is None
+    answer = talk.hear(parse(b"ok 141"), 1.08)
+    assert answer is not None
+    assert not answer.when.doubtful
+
+
+def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> None:
+    """A robot that has not moved yet, and a motor board without a fault."""
+    talk = Conversation(0.3)
+    for n in range(3):
+        asked(talk, words.MCSTAT, b"ok 0", 1.0 + 0.1 * n, 0.01)
+        asked(talk, words.ENC, b"ok 0", 1.05 + 0.1 * n, 0.01)
 
 
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
@@ -196,3 +204,14 @@ def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
     odometry.counted(2, at(1.07))
     covariance = odometry.told(1.13, blind_since_s=None).covariance
     assert covariance.yaw_yaw > 0.03**2
+
+
+@pytest.mark.parametrize(("reverse", "most"), [(True, 5), (False, 15)])
+def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
+    reverse: bool, most: int
+) -> None:
+    """In B the heading may be unknown."""
+    loop = SpeedLoop(MartSettings())
+    loop.trip_s = 0.05
+    loop.begin(20, reverse, 0.0)
+    assert loop.change(0.4, 0.0, 1.0) == (most, most)
