@@ -55,7 +55,7 @@ class Ending:
     """``exit_codes``: what is right. Whatever happens, Stop is the last that the board heard.
 
     ``allowed_s``, ``late_s``: how long the robot may drive on, and the process live on; ``full``:
-    the port is, of old commands.
+    the port is, of old commands. ``read``: it is the next read that fails.
     """
 
     end: Callable[[Rig], object]
@@ -64,6 +64,7 @@ class Ending:
     allowed_s: float = 0.0
     late_s: float = 0.0
     full: bool = False
+    read: bool = False
 
     def __call__(self, rig: Rig) -> None:
         """End the driver while the robot drives."""
@@ -71,8 +72,8 @@ class Ending:
         self.end(rig)
         since = rig.line.tick
         rig.expect_ended(*self.exit_codes, late_s=self.late_s)
-        old_s = rig.kind.old_bytes_s if self.full else 0.0
-        rig.expect_still(since, "the driver ends", self.allowed_s + old_s)
+        more_s = self.full * rig.kind.old_bytes_s + self.read * rig.kind.silent_s
+        rig.expect_still(since, "the driver ends", self.allowed_s + more_s)
         rig.hand.leave()
         heard = bytes(rig.line.board.received)
         rig.findings.expect(heard.endswith(rig.kind.stop), f"last it heard {heard[-26:].hex(' ')}")
@@ -154,7 +155,7 @@ ENDINGS: Final[dict[str, Ending]] = {
     "a final Stop that hangs, and ctrl-C": Ending(
         by_signals(signal.SIGINT), (1,), HANGS, allowed_s=0.5, late_s=4.0
     ),
-    "an exception in the reader": Ending(by_topic, (1,), before=IN_THE_READER),
+    "an exception in the reader": Ending(by_topic, (1,), before=IN_THE_READER, read=True),
     "SIGINT, the port full": Ending(partial(while_full, by_signals(signal.SIGINT)), full=True),
     "an exception, the port full": Ending(
         partial(while_full, by_topic),

@@ -41,7 +41,9 @@ BOARD: Final = RigBoard(
     old_bytes_s=1.8,  # 20 kB at 115200 baud, which it hears byte by byte
     ends_later_s=1.5,  # it shows a stand after 0.6 s, which is waited for twice
     deaf_s=0.6,  # lines are lost while it sends; a lost port is open again after 0.5 s
+    silent_s=0.2,  # between two groups
     imu=False,
+    jump_stddevs=4.0,
     without=frozenset(
         {
             "~/pause and un-pause",

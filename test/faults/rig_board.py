@@ -22,6 +22,7 @@ class RigBoard:
     how long after a stop its motors are off; ``old_bytes_s``: how long it takes to hear
     what a full port has kept; ``ends_later_s``: how much longer its driver takes to end;
     ``deaf_s``: how long it may miss what is said on one line, so that the next one has to tell it.
+    ``silent_s``: how long it sends nothing, as a rule.
     ``imu``: whether it sends readings of one; ``jump_stddevs``: by how many of its own standard
     deviations an odometry that is predicted may be put right.
 
@@ -50,6 +51,7 @@ class RigBoard:
     old_bytes_s: float = 0.0
     ends_later_s: float = 0.0
     deaf_s: float = 0.0
+    silent_s: float = 0.0
     imu: bool
     jump_stddevs: float = 0.0
     sent: Sent = lambda _board: []

@@ -74,12 +74,15 @@ class Refused:
 
 
 class OutlierFilter:
-    """``limits`` may be replaced at any time; ``tick_s`` is the time between two ImuReadings."""
+    """``limits`` may be replaced at any time; ``tick_s`` is the time between two ImuReadings.
 
-    def __init__(self, limits: MotionLimits, tick_s: float) -> None:
+    ``corrected``: displacements are steps of an estimate, which leaps where it is put right.
+    """
+
+    def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
         self.limits = limits
         self.refused_imu = self.refused_displacements = 0
-        self._tick_s = tick_s
+        self._tick_s, self._corrected = tick_s, corrected
         self._imu_leaps = _Spikes(STILL, knocked=3)
         self._motion_leaps = _Spikes(BACK, knocked=0)
         self._held_imu: list[tuple[ImuReading, float]] = []
@@ -143,7 +146,7 @@ class OutlierFilter:
             self._refuse(reading)
             return []
         was_flip = leaps = False
-        if reading.duration_s:
+        if reading.duration_s and not self._corrected:
             square_s2 = reading.duration_s * reading.duration_s
             turn = self.limits.fastest_radps2 * square_s2
             way = self.limits.fastest_mps2 * square_s2

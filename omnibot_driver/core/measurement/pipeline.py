@@ -50,7 +50,9 @@ class MeasurementPipeline:
             self._clock = board.clock
         else:
             self._clock = DeviceClock(period_s) if period_s else ArrivalClock()
-        self._outliers = OutlierFilter(settings.motion, period_s or 0.0)
+        self._outliers = OutlierFilter(
+            settings.motion, period_s or 0.0, corrected=board.traits.own_odometry
+        )
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
         """Of each read the readings, and how old the newest was."""
         self.undigested: list[Stamped] = []

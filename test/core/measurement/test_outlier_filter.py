@@ -277,3 +277,11 @@ def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) ->
     assert through.admit(sound, 1.0) == [(sound, 1.0)]
     assert through.admit(replace(sound, **{broken: values[broken]}), 1.0) == []
     assert through.refused_displacements == 1
+
+
+def test_an_estimate_that_is_put_right_may_leap() -> None:
+    """It is a step of the board's own odometry: no bit of it was changed on the line."""
+    steps = [ahead(0.01), ahead(0.05), ahead(0.01)]
+    assert admitted(steps, gate())[1] == []
+    through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
+    assert admitted(steps, through) == [[step] for step in steps]
