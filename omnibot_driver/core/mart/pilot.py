@@ -14,9 +14,8 @@ from omnibot_driver.core.commands.orders import EmergencyStop
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
 from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S
-from omnibot_driver.core.mart.moment import Moment
-from omnibot_driver.core.mart.replies import Fail, Ok, Reply, signed
-from omnibot_driver.core.mart.starts import Starts
+from omnibot_driver.core.mart.measuring import Measuring
+from omnibot_driver.core.mart.replies import Fail, Ok, Reply
 from omnibot_driver.core.mart.states import (
     HALTS,
     LAST_HALTS,
@@ -34,12 +33,9 @@ COPY_S: Final = 0.25
 """After a controlled move the encoder is answered by then, unless a copy of the move runs."""
 BLIND_PART: Final = 0.15
 """A larger change of the motors without an answer or a heading stops the robot."""
-STRAY_COUNTS: Final = 3
-"""A robot that stands and is counted so far since the last count moves."""
-STRAY_AGAIN_S: Final = 3.0
 
 
-class Pilot(Starts):
+class Pilot(Measuring):
     """One server's."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
@@ -243,77 +239,6 @@ class Pilot(Starts):
                 self._halt(now)  # nothing would tell how it turns; it begins anew
         else:
             self._polls.press(word)
-
-    def _measured(self, answer: Answer, now: float) -> None:
-        word, reply = answer.word, answer.reply
-        if isinstance(reply, Fail):
-            if word is words.ENC:
-                self.health.encoder_failed()
-            return
-        if word is words.ENC:
-            self._counted(signed(int(reply.number)), answer.when, now)
-        elif word is words.RMRA:
-            if answer.when.is_uncertain and self.health.is_voltage(reply.number):
-                return
-            changed = self.odometry.turned(reply.number, answer.when)
-            certain = answer.when.from_s >= self._begun_s and not answer.when.doubtful
-            if changed and certain and self.state in (State.REVERSING, State.TURNING):
-                self.health.heading_changed(self.motion)
-        else:
-            if answer.when.doubtful and word is not words.MCSTAT:
-                return
-            uncertain = answer.when.is_uncertain
-            self.readings += self.health.measured(word, reply, now, uncertain=uncertain)
-            self.loop.volts = self.health.volts_or(self._settings.nominal_volts)
-
-    def _counted(self, count: int, when: Moment, now: float) -> None:
-        wheel = self.odometry.wheel
-        before = None if wheel.may_begin_anew else wheel.last
-        reading = self.odometry.counted(count, when)
-        if reading is None:
-            return
-        self.health.encoder_answers()
-        self.readings.append(reading)
-        _speed, rate = self.odometry.speeds
-        if self.state is State.STILL:
-            rested = when.from_s >= self._rested_s and self.odometry.wheel.certain
-            if self._moved_by is not None and rested and self.odometry.motion is not Motion.NONE:
-                self._surplus.learn(self._moved_by, self.odometry.moved_m, self.odometry.spun_rad)
-                self._moved_by = None
-            if rested and self.odometry.motion is not Motion.NONE:
-                self._doubt_a_copy(now)
-                self.odometry.rest()
-            self._watch_stray(before, count, now)
-        elif self.state is State.TURNING:
-            self._spin_seen_radps = rate
-        else:
-            self._fresh = True
-            self._learn(reading.dyaw_rad, now)
-
-    def _watch_stray(self, before: int | None, count: int, now: float) -> None:
-        """A robot that stands is counted: a late copy of a start, another client, or a push."""
-        self._counted_at_rest += 1
-        if self._counted_at_rest < 2 or now - self._rested_s < 0.3 or before is None:
-            return
-        if abs(count - before) <= STRAY_COUNTS or now - self._stray_s < STRAY_AGAIN_S:
-            return
-        self.health.reference_moves()
-        if self._negative_sweep and now - self._swept_s < 2.0:
-            self._stray_s = now
-            self._rescue = True
-            self._notice(
-                "the robot moves, and the server knows of no motion: a turn by 1 degree is begun,"
-                " which ends with the motors off",
-                halt=True,
-            )
-            return
-        self._notice(
-            "robot moves without a command; the driver stops it (a late copy of a command, another"
-            " client, or a push)",
-            halt=True,
-        )
-        self.motion = Motion.UNKNOWN
-        self._halt(now)
 
     def _poll(self, now: float) -> Packets:
         for word in self._polls.due(self.state, now):

@@ -38,9 +38,8 @@ UNEQUAL: Final = 0.04
 MOST_UNEQUAL: Final = 2 * UNEQUAL
 """A larger difference that was learned is not believed."""
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Variance of a change that came twice on a slow network, or did not come, for its square.
-
-More than is probable, as a wrong guess stays for the whole motion.
+"""Variance of a change that came twice on a slow network, or did not come, for its square. More
+than is probable, as a wrong guess stays for the whole motion.
 """
 LONGEST_STEP_S: Final = 0.2
 

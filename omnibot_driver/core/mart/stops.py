@@ -7,6 +7,7 @@ argument.
 """
 
 import math
+from abc import ABC, abstractmethod
 from typing import Final
 
 from omnibot_driver.core.commands.actuator import Wanted
@@ -53,7 +54,7 @@ NAMES: Final = {
 ROLLING: Final = (State.DRIVING, State.REVERSING, State.TURNING)
 
 
-class Stops(Ground):
+class Stops(Ground, ABC):
     """The part of the pilot that stops."""
 
     def _order(self, now: float) -> Drive | GoTo | None:
@@ -251,9 +252,9 @@ class Stops(Ground):
         said = () if self.motion is Motion.UNKNOWN else HALTS[self.motion]
         return self._send(said, now) + self._greet(now)
 
+    @abstractmethod
     def _ask_what_moves(self, now: float) -> None:
-        """What comes where the stop port was used for a motion that is not known (``Asking``)."""
-        raise NotImplementedError
+        """What comes where the stop port was used for a motion that is not known."""
 
     def _obstacle(self, reply: Fail, motion: Motion) -> str:
         """What a failure within a motion means."""
