@@ -12,16 +12,14 @@ import numpy as np
 
 from omnibot_driver import boards
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.tools.calibrate import odometry_scale
+from omnibot_driver.tools.calibrate import floor_drives, odometry_scale
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.geometry_figure import draw
 from omnibot_driver.tools.calibrate.geometry_fit import Geometry, Reading, fit, rolled
 from omnibot_driver.tools.calibrate.log import Column
-from omnibot_driver.tools.calibrate.motion import Bounds
 from omnibot_driver.tools.calibrate.result import Finding, Result
 from omnibot_driver.tools.calibrate.seen import WHEELS
 from omnibot_driver.tools.calibrate.waypoints import square, visit
-from omnibot_driver.tools.needs import ToolError
 
 PLAIN: Final = 0.005
 """A wheel that differs from the others by more is worth a word."""
@@ -48,15 +46,13 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
         return odometry_scale.run(robot, console, arguments)
     console.say(INTRODUCTION)
     drives = plan(arguments.side, arguments.turns, squares=not arguments.without_squares)
-    console.confirm(
-        f"The robot will make {len(drives)} drives, within {arguments.side:g} m of where each one"
-        f" begins, at up to {arguments.speed:g} m/s. Is there room for it?"
+    readings = floor_drives.measured(
+        console,
+        drives,
+        arguments,
+        lambda drive: _drive(robot, console, drive, arguments),
+        lambda drive, path: _reading(console, drive, path, arguments),
     )
-    readings = []
-    for number, drive in enumerate(drives, 1):
-        console.wait(f"Drive {number} of {len(drives)}: {drive.name}. Mark the floor.")
-        path = _drive(robot, console, drive, arguments)
-        readings.append(_reading(console, drive, path, arguments))
     now = robot.parameters
     found = fit(readings, believed(now)["base_radius"], now["odom_wheel_drift"])
     return result(readings, found, now)
@@ -100,30 +96,20 @@ def plan(side_m: float, turns: int, *, squares: bool) -> list[Drive]:
 
 
 def _drive(robot: Any, console: Console, drive: Drive, arguments: argparse.Namespace) -> Column:
-    now = robot.parameters
-    speed = min(arguments.speed, now["max_linear_speed"])
-    turning = min(arguments.turning, now["max_angular_speed"])
-    if not (speed and turning):
-        raise ToolError("max_linear_speed or max_angular_speed is 0: the robot may not move")
+    speed, turning = floor_drives.speeds(robot, arguments)
     way_m = turn_rad = 0.0
     for before, after in zip([Pose(), *drive.places], drive.places, strict=False):
         way_m += (after - before).way_m
         turn_rad += abs((after - before).yaw_rad)
-    seconds = way_m / speed + turn_rad / turning + 2.0 * len(drive.places)
-    bounds = Bounds(
-        speed=speed + 1e-6,
-        turning=turning + 1e-6,
-        way=1.5 * arguments.side + 0.2,
-        turn=abs(drive.places[-1].yaw_rad) + 1.0,
-        seconds=3 * seconds,
+    return floor_drives.driven(
+        robot,
+        console,
+        drive.name,
+        visit(drive.places, speed, turning),
+        arguments,
+        turn_rad=abs(drive.places[-1].yaw_rad),
+        seconds=way_m / speed + turn_rad / turning + 2.0 * len(drive.places),
     )
-    with console.progress(f"Driving {drive.name}") as told:
-        law = visit(drive.places, speed, turning)
-        log = robot.drive(law, bounds, show=lambda s: told(s / seconds))
-    path: Column = log.odometry.pose
-    if not len(path) or not np.isfinite(path).all():
-        raise ToolError("odom gave no finite poses: see what the driver logs")
-    return path
 
 
 def _reading(
@@ -131,10 +117,7 @@ def _reading(
 ) -> Reading:
     end = np.full(3, math.nan)
     if drive.heading:
-        past_deg = console.number(
-            "How far past its mark does the front point, left +, right -", "degrees", -170.0, 170.0
-        )
-        end[2] = drive.places[-1].yaw_rad + math.radians(past_deg)
+        end[2] = drive.places[-1].yaw_rad + floor_drives.turned_past_mark(console)
     else:
         far_mm = 3000.0 * arguments.side
         for axis, question in enumerate(("forward of", "to the left of")):

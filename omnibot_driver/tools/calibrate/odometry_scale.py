@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.tools.calibrate import floor_drives
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.log import Column
-from omnibot_driver.tools.calibrate.motion import Bounds, Law
+from omnibot_driver.tools.calibrate.motion import Law
 from omnibot_driver.tools.calibrate.result import Finding, Result
 from omnibot_driver.tools.calibrate.waypoints import straight, turn
-from omnibot_driver.tools.needs import ToolError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,15 +71,13 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     drives = plan(arguments.side, arguments.turns)
     if COUNT in robot.parameters:
         drives = [drive for drive in drives if not drive.turns]
-    console.confirm(
-        f"The robot will make {len(drives)} drives, within {arguments.side:g} m of where each one"
-        f" begins, at up to {arguments.speed:g} m/s. Is there room for it?"
+    ratios = floor_drives.measured(
+        console,
+        drives,
+        arguments,
+        lambda drive: _drive(robot, console, drive, arguments),
+        lambda drive, path: _measure(console, drive, path, arguments),
     )
-    ratios = []
-    for number, drive in enumerate(drives, 1):
-        console.wait(f"Drive {number} of {len(drives)}: {drive.name}. Mark the floor.")
-        path = _drive(robot, console, drive, arguments)
-        ratios.append(_measure(console, drive, path, arguments))
     return result(ratios, robot.parameters)
 
 
@@ -94,35 +92,24 @@ def plan(side_m: float, turns: int) -> list[Drive]:
 
 
 def _drive(robot: Any, console: Console, drive: Drive, arguments: argparse.Namespace) -> Column:
-    now = robot.parameters
-    speed = min(arguments.speed, now["max_linear_speed"])
-    turning = min(arguments.turning, now["max_angular_speed"])
-    if not (speed and turning):
-        raise ToolError("max_linear_speed or max_angular_speed is 0: the robot may not move")
+    speed, turning = floor_drives.speeds(robot, arguments)
     law: Law = turn(drive.wanted, turning) if drive.turns else straight(drive.wanted, speed)
-    seconds = abs(drive.wanted) / (turning if drive.turns else speed) + 5.0
-    bounds = Bounds(
-        speed=speed + 1e-6,
-        turning=turning + 1e-6,
-        way=1.5 * arguments.side + 0.2,
-        turn=(abs(drive.wanted) if drive.turns else 0.0) + 1.0,
-        seconds=3 * seconds,
+    return floor_drives.driven(
+        robot,
+        console,
+        drive.name,
+        law,
+        arguments,
+        turn_rad=abs(drive.wanted) if drive.turns else 0.0,
+        seconds=abs(drive.wanted) / (turning if drive.turns else speed) + 5.0,
     )
-    with console.progress(f"Driving {drive.name}") as told:
-        log = robot.drive(law, bounds, show=lambda s: told(s / seconds))
-    path: Column = log.odometry.pose
-    if not len(path) or not np.isfinite(path).all():
-        raise ToolError("odom gave no finite poses: see what the driver logs")
-    return path
 
 
 def _measure(console: Console, drive: Drive, path: Column, arguments: argparse.Namespace) -> Ratio:
     first, last = Pose(*path[0]), Pose(*path[-1])
     if drive.turns:
-        past_deg = console.number(
-            "How far past its mark does the front point, left +, right -", "degrees", -170.0, 170.0
-        )
-        true, sigma = drive.wanted + math.radians(past_deg), math.radians(arguments.angle)
+        true = drive.wanted + floor_drives.turned_past_mark(console)
+        sigma = math.radians(arguments.angle)
         return Ratio(drive, last.yaw_rad - first.yaw_rad, true, sigma)
     come_mm = console.number(
         "How far has the robot's centre come", "mm", 1.0, 3000.0 * arguments.side

@@ -1,0 +1,97 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Drives on the floor, one after the other, each of which the user measures with a tape.
+
+Must not know what is computed from them.
+"""
+
+import argparse
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from omnibot_driver.tools.calibrate.console import Console
+from omnibot_driver.tools.calibrate.log import Column
+from omnibot_driver.tools.calibrate.motion import Bounds, Law
+from omnibot_driver.tools.needs import ToolError
+
+
+class Planned(Protocol):
+    """A drive that the user is told of by its name."""
+
+    @property
+    def name(self) -> str: ...
+
+
+Drive = TypeVar("Drive", bound=Planned)
+Measured = TypeVar("Measured")
+
+
+def measured(
+    console: Console,
+    drives: Sequence[Drive],
+    arguments: argparse.Namespace,
+    go: Callable[[Drive], Column],
+    measure: Callable[[Drive, Column], Measured],
+) -> list[Measured]:
+    """What ``measure`` makes of each drive and the poses that ``go`` returns; raises ToolError."""
+    console.confirm(
+        f"The robot will make {len(drives)} drives, within {arguments.side:g} m of where each one"
+        f" begins, at up to {arguments.speed:g} m/s. Is there room for it?"
+    )
+    found = []
+    for number, drive in enumerate(drives, 1):
+        console.wait(f"Drive {number} of {len(drives)}: {drive.name}. Mark the floor.")
+        found.append(measure(drive, go(drive)))
+    return found
+
+
+def speeds(robot: Any, arguments: argparse.Namespace) -> tuple[float, float]:
+    """The speed in m/s and the yaw rate in rad/s, within the driver's limits. Raises ToolError."""
+    now = robot.parameters
+    speed = min(arguments.speed, now["max_linear_speed"])
+    turning = min(arguments.turning, now["max_angular_speed"])
+    if not (speed and turning):
+        raise ToolError("max_linear_speed or max_angular_speed is 0: the robot may not move")
+    return speed, turning
+
+
+def driven(
+    robot: Any,
+    console: Console,
+    name: str,
+    law: Law,
+    arguments: argparse.Namespace,
+    *,
+    turn_rad: float,
+    seconds: float,
+) -> Column:
+    """The poses of a drive; raises ToolError.
+
+    ``turn_rad``: its heading at the end; ``seconds``: how long it takes if nothing goes wrong.
+    """
+    speed, turning = speeds(robot, arguments)
+    bounds = Bounds(
+        speed=speed + 1e-6,
+        turning=turning + 1e-6,
+        way=1.5 * arguments.side + 0.2,
+        turn=turn_rad + 1.0,
+        seconds=3 * seconds,
+    )
+    with console.progress(f"Driving {name}") as told:
+        log = robot.drive(law, bounds, show=lambda s: told(s / seconds))
+    path: Column = log.odometry.pose
+    if not len(path) or not np.isfinite(path).all():
+        raise ToolError("odom gave no finite poses: see what the driver logs")
+    return path
+
+
+def turned_past_mark(console: Console) -> float:
+    """The user's answer in rad, positive to the left."""
+    return math.radians(
+        console.number(
+            "How far past its mark does the front point, left +, right -", "degrees", -170.0, 170.0
+        )
+    )
