@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from any_board import TICK_S as BENCH_TICK_S
 from any_board import AnyBench, MartRobot
 
 from omnibot_driver.core.errors import CommandRefused
@@ -20,6 +21,7 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.common.network import FaultyNetwork, NetworkFaults
 from omnibot_driver.simulator.mart import QUIRKS, Firmware, MartSettings, SimulatedMart
+from omnibot_driver.simulator.mart.board import TICK_S
 
 POLLS = {b"ENC", b"RMRA", b"MCSTAT", b"VOLTS", b"SFC", b"SRC", b"DOCKED", b"HELLO"}
 
@@ -29,13 +31,18 @@ class NetworkRobot(MartRobot):
 
     def __init__(self, faults: NetworkFaults, seed: int, **settings: Any) -> None:
         self.board = SimulatedMart(MartSettings(seed=seed, **settings))
+        self._good, self._heard = faults == NetworkFaults(), False
         self.network = [FaultyNetwork(faults, f"{seed} {channel}") for channel in (0, 1)]
 
     def receive(self, data: bytes, now: float, channel: int) -> None:
+        self._heard = True
         self.network[channel].to_board.send(data, self.board.now_s)
 
     def advance(self) -> list[Packet]:
         out: list[Packet] = []
+        if self._good and not self._heard and sleeps(self.board):
+            return out
+        self._heard = False
         for _ in range(5):
             now_s = self.board.now_s
             for channel, way in enumerate(self.network):
@@ -46,6 +53,14 @@ class NetworkRobot(MartRobot):
             for channel, way in enumerate(self.network):
                 out += [(channel, data) for data in way.from_board.arrived(self.board.now_s)]
         return out
+
+
+def sleeps(board: SimulatedMart) -> bool:
+    """Whether nothing happens in the next five ticks; they have passed then."""
+    if board.server.wake_at <= (board.ticks + 5) * TICK_S:
+        return False
+    board.ticks += 5
+    return True
 
 
 class MartBench(AnyBench):
@@ -66,6 +81,7 @@ class MartBench(AnyBench):
         self.board: Any = self.session.board
         self._odometry: list[OdometryEstimate] = []
         self._sorted = 0
+        self._wake_s = -math.inf
 
     def ready(self) -> "MartBench":
         """Nominal, and seen to stand."""
@@ -80,6 +96,23 @@ class MartBench(AnyBench):
         self._sorted += len(new)
         self._odometry += [event for event in new if isinstance(event, OdometryEstimate)]
         return self._odometry
+
+    def settle(self) -> None:
+        super().settle()
+        self._wake_s = self.session.wake_at
+
+    def run(self, seconds: float) -> None:
+        """As every bench, but what has nothing to do is not asked."""
+        for _ in range(round(seconds / BENCH_TICK_S)):
+            self.now += BENCH_TICK_S
+            packets = self.robot.advance()
+            for channel, data in packets:
+                if self.speaks:
+                    self.session.receive(data, self.now, channel)
+            if packets or self.now >= self._wake_s:
+                if self.now >= self.session.wake_at:
+                    self.session.tick(self.now)
+                self.settle()
 
     def command(self, vx: float, yaw_rate: float, seconds: float) -> None:
         """Ten times a second; what is refused is refused."""

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A small model of the MART server, and of any driver that keeps to the tables of ``states``.
+"""Any driver that keeps to the tables of ``states``, before a model of the MART server.
 
 The driver says whatever the tables allow, in any order, so it does more than the real one ever
 does. Each datagram may arrive, be lost, be late, or come twice; the IMU may die at any step. All
@@ -12,10 +12,11 @@ and what waits for that delay can be said only when no such copy is left.
 from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
 
+from mart_model_server import SAID, START_WORDS, Reply, Server, execute
+
 from omnibot_driver.core.mart.states import (
     HALTS,
     HARMFUL_LATE,
-    LAST_HALTS,
     NEEDS_IMU,
     STARTS,
     WHILE,
@@ -26,36 +27,12 @@ from omnibot_driver.core.mart.states import (
 from omnibot_driver.core.mart.words import WORDS, Kind
 
 BY_TEXT: Final = {("CHECK" if word.kind is Kind.CHECK else word.text): word for word in WORDS}
-START_WORDS: Final = ("RM", "B", "R", "L", "TF", "MCR")
-"""TB is like TF, and MCL like MCR, in all that is modelled."""
-SAID: Final = (*START_WORDS, "CHECK", "SRM", "SM", "SL", "SS")
 COPIED: Final = frozenset(SAID)
 """Of these a copy may come late; one of any other changes nothing here."""
 MOVES: Final = ("TF", "MCR")
 MOST_COPIES: Final = 2
 UNANSWERED: Final = 3
 """Stops without an answer, before the stop port is used as the last resort."""
-KIND: Final = {
-    "RM": Motion.REFERENCE,
-    "B": Motion.REVERSE,
-    "R": Motion.SPIN,
-    "L": Motion.SPIN,
-    "TF": Motion.STRAIGHT,
-    "MCR": Motion.TURN,
-}
-
-
-class Server(NamedTuple):
-    """``port``: free, busy (a move runs), waits (for the IMU), hung. ``released``: the stop port
-    has stopped an uncontrolled motion, which the server still believes in.
-    """
-
-    motion: Motion = Motion.NONE
-    moving: bool = False
-    port: str = "free"
-    released: bool = False
-    imu: bool = True
-    crashed: bool = False
 
 
 class Driver(NamedTuple):
@@ -63,7 +40,8 @@ class Driver(NamedTuple):
     number of stops.
 
     ``moved``: the last motion that was begun was a controlled move; ``counted``: the encoder was
-    answered since the robot stands, and since no harmful copy can come any more.
+    answered since the robot stands, and since no harmful copy can come any more; ``greeted``: the
+    server has been stopped once.
     """
 
     state: State = State.UNKNOWN
@@ -73,6 +51,7 @@ class Driver(NamedTuple):
     unanswered: int = 0
     moved: bool = False
     counted: bool = False
+    greeted: bool = False
 
 
 class World(NamedTuple):
@@ -84,71 +63,8 @@ class World(NamedTuple):
     replies: tuple[str, ...] = ()
 
 
-Reply = str | None
 Rules = Callable[[State, str, Motion], bool]
 Step = tuple[str, World]
-
-
-def execute(server: Server, word: str) -> tuple[Server, Reply]:
-    """One datagram arrives, on either port; what the server then is, and answers."""
-    if server.crashed:
-        return server, None
-    if word in ("SL", "SS"):
-        return _stop_port(server, word)
-    if server.port != "free":
-        return server, None  # it waits in the queue, and is another late copy in effect
-    motion = server.motion
-    if word == "CHECK":
-        if motion is not Motion.NONE:
-            return server, "conflict"
-        return server, "ok" if server.imu else "imu lost"
-    if word in START_WORDS:
-        return _start(server, word)
-    stops = {"SRM": (Motion.REFERENCE,), "SM": (Motion.REVERSE, Motion.SPIN)}.get(word)
-    if stops is None:
-        return server, "ok"
-    if motion not in stops:
-        return server, "no motion"
-    if server.released and motion is not Motion.SPIN:
-        return server._replace(port="hung", moving=False), None
-    if not server.imu and not server.released:
-        return server._replace(port="hung", moving=False), None
-    return Server(imu=server.imu), "ok"
-
-
-def _start(server: Server, word: str) -> tuple[Server, Reply]:
-    motion = server.motion
-    if motion is Motion.REFERENCE and word == "L":
-        return server._replace(port="hung", moving=True), None
-    if motion is not Motion.NONE:
-        return server, "conflict"
-    kind = KIND[word]
-    if server.imu:
-        port = "busy" if word in ("TF", "MCR") else "free"
-        return server._replace(
-            motion=kind, moving=True, port=port
-        ), None if port == "busy" else "ok"
-    if word == "MCR":
-        return server, "imu lost"
-    if word in ("TF", "B"):
-        return server._replace(motion=kind, port="waits"), None
-    return server._replace(motion=kind, moving=True, port="waits"), None
-
-
-def _stop_port(server: Server, word: str) -> tuple[Server, Reply]:
-    motion = server.motion
-    if server.port == "waits":
-        return server, None
-    if motion is Motion.STRAIGHT and word == "SL":
-        return Server(imu=server.imu), "ok"
-    if motion is Motion.TURN and word == "SS":
-        return Server(imu=server.imu), "ok"
-    if motion in (Motion.REFERENCE, Motion.REVERSE) or (motion is Motion.SPIN and word == "SS"):
-        return server._replace(moving=False, released=True), None
-    return server, None
-
-
-# The driver
 
 
 def allowed(world: World, word: str, rules: Rules) -> bool:
@@ -166,8 +82,13 @@ def allowed(world: World, word: str, rules: Rules) -> bool:
         return False
     if word in ("SL", "SS") and driver.state is State.STILL:
         return driver.moved
-    if driver.state is State.STOPPING and word not in {row.text for row in HALTS[driver.motion]}:
-        return driver.unanswered >= UNANSWERED
+    if driver.state is State.STOPPING:
+        halts = {row.text for row in HALTS[driver.motion]}
+        if word in halts:
+            return driver.unanswered <= UNANSWERED
+        return driver.unanswered >= UNANSWERED and halts.isdisjoint(world.copies)
+    if driver.state is State.ASKING:
+        return {"SRM", "SM"}.isdisjoint(world.copies)  # it is said again 3 s later
     return True
 
 
@@ -231,7 +152,7 @@ def _waits(world: World) -> Iterator[Step]:
     if state is State.CHECKING:
         yield "no reply", world._replace(driver=driver._replace(state=State.STILL, pending=""))
     if state is State.STILL and server.port == "free" and server.moving:
-        stray = Driver(State.STOPPING, Motion.UNKNOWN, moved=driver.moved)
+        stray = Driver(State.STOPPING, Motion.UNKNOWN, moved=driver.moved, greeted=True)
         yield "a poll sees it move", world._replace(driver=stray)
     late = any(BY_TEXT[copy] in HARMFUL_LATE for copy in world.copies)
     if state is State.STILL and server.port == "free" and not server.moving and not late:
@@ -246,6 +167,29 @@ def _waits(world: World) -> Iterator[Step]:
         )
     ):
         yield "it tells its name", world._replace(driver=_rests(driver))
+    if sweeps_first(driver) and state is State.STOPPING:
+        yield "asks what moves", world._replace(driver=driver._replace(state=State.ASKING))
+    if state is State.ASKING and server.port == "free" and not world.copies:
+        yield _asked(world)
+
+
+def sweeps_first(driver: Driver) -> bool:
+    """Whether the stop port was used for a motion that the driver has never known."""
+    spent = driver.unanswered > UNANSWERED and driver.motion is Motion.UNKNOWN
+    return spent and not driver.greeted
+
+
+def _asked(world: World) -> Step:
+    """The server tells its name, so no earlier datagram is on its way; then whether a motion is in
+    progress, and the encoder whether the robot moves. Replies that are lost change nothing.
+    """
+    _, reply = execute(world.server, "CHECK")
+    driver = Driver(State.STOPPING, Motion.UNKNOWN)
+    if reply == "conflict" and not world.server.moving:
+        return "a motion that stands is found", world._replace(
+            driver=driver._replace(state=State.LOST)
+        )
+    return "SRM and SM do no harm", world._replace(driver=driver)
 
 
 def _said(word: str, world: World) -> Iterator[Step]:
@@ -254,12 +198,15 @@ def _said(word: str, world: World) -> Iterator[Step]:
     row = BY_TEXT[word]
     if row in STARTS:
         state = State.MOVING if row.kind is Kind.MOVE else State.STARTING
-        driver = Driver(state, STARTS[row], pending=word, moved=row.kind is Kind.MOVE)
+        moves = row.kind is Kind.MOVE
+        driver = Driver(state, STARTS[row], pending=word, moved=moves, greeted=True)
     elif word == "CHECK":
         driver = driver._replace(state=State.CHECKING, pending=word, proved=False)
     elif driver.state is State.STOPPING:
-        if driver.unanswered > UNANSWERED:
+        if driver.unanswered > UNANSWERED and not sweeps_first(driver):
             driver = driver._replace(state=State.LOST)
+        elif driver.unanswered > UNANSWERED:
+            pass
         else:
             driver = driver._replace(unanswered=driver.unanswered + 1)
     said = world._replace(driver=driver)
@@ -314,122 +261,4 @@ def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
 
 
 def _rests(driver: Driver) -> Driver:
-    return Driver(State.STILL, Motion.NONE, moved=driver.moved)
-
-
-# The search
-
-
-def trouble(world: World) -> str:
-    """What must never be, with a living IMU and a driver that has not given up."""
-    server, driver = world.server, world.driver
-    if server.crashed:
-        return "the server has crashed"
-    given_up = driver.state is State.LOST or driver.unanswered > UNANSWERED
-    if not server.imu or given_up:
-        return ""
-    if server.port == "hung":
-        return "the command port hangs"
-    if server.released:
-        return "a motion is released by the stop port, and the next stop will hang"
-    if server.moving and not _can_stop(world):
-        return "nothing stops the robot"
-    return ""
-
-
-def _can_stop(world: World) -> bool:
-    """Whether what the driver says of itself, when it is delivered, leaves the robot standing."""
-    server, driver = world.server, world.driver
-    if driver.state is State.STILL:
-        motion = Motion.UNKNOWN
-        words = HALTS[motion] if server.port == "free" else LAST_HALTS[motion]
-        if server.port != "free" and not driver.moved:
-            return False
-    elif driver.state is State.CHECKING:
-        return _can_stop(world._replace(driver=driver._replace(state=State.STILL)))
-    else:
-        words = HALTS[driver.motion]
-        if driver.motion is Motion.UNKNOWN and server.port != "free":
-            words = LAST_HALTS[driver.motion]
-    for word in words:
-        server, _ = execute(server, word.text)
-    if server.moving and server.port == "free":  # the belief was wrong: a poll finds out, and
-        for word in HALTS[Motion.UNKNOWN]:
-            server, _ = execute(server, word.text)
-    return not server.moving and server.port != "hung"
-
-
-class Found(NamedTuple):
-    """``worlds``: how many can be reached; ``steps``: between them; ``bad``: the way to the first
-    that must not be, step by step.
-    """
-
-    worlds: int
-    steps: int
-    bad: tuple[str, ...]
-
-
-FOUND_MOVING: Final = (
-    Server(),
-    *(Server(motion, True) for motion in (Motion.REFERENCE, Motion.REVERSE, Motion.SPIN)),
-    *(Server(motion, True, "busy") for motion in (Motion.STRAIGHT, Motion.TURN)),
-)
-"""A driver that is started again may find any of these."""
-
-
-def search(rules: Rules = table, most: int = 3_000_000) -> Found:
-    """Everything that can happen, breadth first; ends at the first trouble."""
-    row = [World(server) for server in FOUND_MOVING]
-    came: dict[World, tuple[World, str] | None] = dict.fromkeys(row)
-    count = 0
-    while row:
-        following = []
-        for world in row:
-            for what, after in steps(world, rules):
-                count += 1
-                if after in came:
-                    continue
-                came[after] = (world, what)
-                if why := trouble(after):
-                    return Found(len(came), count, (*_way(after, came), why))
-                following.append(after)
-        row = following
-        if len(came) > most:
-            raise AssertionError(f"more than {most} worlds")
-    return Found(len(came), count, ())
-
-
-def servers() -> dict[Server, tuple[str, ...]]:
-    """Every state of a server to which all datagrams are delivered, and the way there."""
-    row = [Server()]
-    found: dict[Server, tuple[str, ...]] = {Server(): ()}
-    while row:
-        server = row.pop(0)
-        following = {word: execute(server, word)[0] for word in SAID}
-        following["the IMU dies"] = server._replace(imu=False)
-        for what, after in following.items():
-            if after not in found and not (server.port == "busy" and what == "the IMU dies"):
-                found[after] = (*found[server], what)
-                row.append(after)
-    return found
-
-
-def _way(world: World, came: dict[World, tuple[World, str] | None]) -> list[str]:
-    way = []
-    before = came[world]
-    while before is not None:
-        world, what = before
-        way.append(what)
-        before = came[world]
-    return way[::-1]
-
-
-if __name__ == "__main__":
-    import sys
-    import time
-
-    MOST_COPIES = int(sys.argv[1]) if len(sys.argv) > 1 else MOST_COPIES  # type: ignore[misc]
-    began_s = time.monotonic()
-    result = search()
-    print(f"{result.worlds} worlds, {result.steps} steps, {time.monotonic() - began_s:.1f} s")
-    print("\n".join(result.bad) or "no trouble can be reached")
+    return Driver(State.STILL, Motion.NONE, moved=driver.moved, greeted=True)

@@ -21,7 +21,7 @@ from itertools import count, product
 from multiprocessing import Pool
 from typing import Final, Literal, NamedTuple
 
-from mart_bench import POLLS, MartBench
+from mart_bench import POLLS, MartBench, sleeps
 
 from omnibot_driver.core.packets import Packet
 
@@ -116,6 +116,8 @@ class Carrier:
 
     def advance(self) -> list[Packet]:
         out: list[Packet] = []
+        if not self._late and sleeps(self.board):
+            return out
         for _ in range(5):
             for channel, data in self.board.advance():
                 self._put(1, (channel, data), data[3:4].isdigit() or data[3:4] == b"-")

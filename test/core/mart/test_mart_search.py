@@ -7,7 +7,9 @@ from typing import Final
 
 import mart_model as model
 import pytest
-from mart_model import Server
+from mart_model import World
+from mart_model_search import search
+from mart_model_server import SAID, Server, execute, servers
 
 from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.simulator.mart import FIRMWARE, Kind, MartServer, MartSettings
@@ -37,7 +39,7 @@ KINDS: Final = {
 
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
     """With up to two copies on their way, a late reply, and an IMU that may die at any step."""
-    found = model.search()
+    found = search()
     assert found.bad == ()
     assert found.worlds > 10_000
 
@@ -62,7 +64,7 @@ TRAPS: Final[dict[str, tuple[Callable[[State, str, Motion], bool], str]]] = {
 def test_a_planted_trap_is_found(trap: str) -> None:
     """A table that allows one word too many."""
     more, trouble = TRAPS[trap]
-    found = model.search(lambda *asked: model.table(*asked) or more(*asked))
+    found = search(lambda *asked: model.table(*asked) or more(*asked))
     assert trouble in found.bad[-1]
     assert any(step.startswith(trap.split()[0]) for step in found.bad)
 
@@ -72,7 +74,19 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 ) -> None:
     """Without the rule about what is harmful late."""
     monkeypatch.setattr(model, "HARMFUL_LATE", frozenset())
-    assert model.search().bad
+    assert search().bad
+
+
+def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Without asking what moves: SL has ended RM, and SRM hangs the server."""
+
+    def sweeps(world: World) -> model.Step:
+        return "sweeps", world._replace(driver=model.Driver(State.STOPPING))
+
+    monkeypatch.setattr(model, "_asked", sweeps)
+    assert search().bad[-1] == "the command port hangs"
 
 
 class Desk:
@@ -109,10 +123,10 @@ def compared(server: Server) -> Server:
     return server
 
 
-@pytest.mark.parametrize("word", [*model.SAID, "the IMU dies"])
+@pytest.mark.parametrize("word", [*SAID, "the IMU dies"])
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
     """In every state of the server that answers; one that is busy keeps what comes for later."""
-    for server, way in model.servers().items():
+    for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):
             continue
         if server.port == "busy" and word not in ("SL", "SS"):
@@ -120,7 +134,7 @@ def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
         if word == "the IMU dies":
             expected = server._replace(imu=False)
         else:
-            expected, _ = model.execute(server, word)
+            expected, _ = execute(server, word)
         desk = Desk()
         for what in (*way, word):
             desk.do(what)

@@ -1,0 +1,117 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Every world of ``mart_model`` that can be reached, and what must not be in any.
+
+``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3``: with so many copies on
+their way; docs/boards/mart.md has the figures.
+"""
+
+import sys
+import time
+from typing import Final, NamedTuple
+
+import mart_model as model
+from mart_model import UNANSWERED, Rules, World, sweeps_first, table
+from mart_model_server import Server, execute
+
+from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
+
+
+def trouble(world: World) -> str:
+    """What must never be, with a living IMU and a driver that has not given up."""
+    server, driver = world.server, world.driver
+    if server.crashed:
+        return "the server has crashed"
+    asks = driver.state is State.ASKING or sweeps_first(driver)
+    given_up = driver.state is State.LOST or (driver.unanswered > UNANSWERED and not asks)
+    if not server.imu or given_up:
+        return ""
+    if server.port == "hung":
+        return "the command port hangs"
+    if asks:
+        return ""
+    if server.released:
+        return "a motion is released by the stop port, and the next stop will hang"
+    if server.moving and not _can_stop(world):
+        return "nothing stops the robot"
+    return ""
+
+
+def _can_stop(world: World) -> bool:
+    """Whether what the driver says of itself, when it is delivered, leaves the robot standing."""
+    server, driver = world.server, world.driver
+    if driver.state is State.STILL:
+        motion = Motion.UNKNOWN
+        words = HALTS[motion] if server.port == "free" else LAST_HALTS[motion]
+        if server.port != "free" and not driver.moved:
+            return False
+    elif driver.state is State.CHECKING:
+        return _can_stop(world._replace(driver=driver._replace(state=State.STILL)))
+    else:
+        words = HALTS[driver.motion]
+        if driver.motion is Motion.UNKNOWN and server.port != "free":
+            words = LAST_HALTS[driver.motion]
+    for word in words:
+        server, _ = execute(server, word.text)
+    if server.moving and server.port == "free":  # the belief was wrong: a poll finds out, and
+        for word in HALTS[Motion.UNKNOWN]:
+            server, _ = execute(server, word.text)
+    return not server.moving and server.port != "hung"
+
+
+class Found(NamedTuple):
+    """``worlds``: how many can be reached; ``steps``: between them; ``bad``: the way to the first
+    that must not be, step by step.
+    """
+
+    worlds: int
+    steps: int
+    bad: tuple[str, ...]
+
+
+FOUND_MOVING: Final = (
+    Server(),
+    *(Server(motion, True) for motion in (Motion.REFERENCE, Motion.REVERSE, Motion.SPIN)),
+    *(Server(motion, True, "busy") for motion in (Motion.STRAIGHT, Motion.TURN)),
+)
+"""A driver that is started again may find any of these."""
+
+
+def search(rules: Rules = table, most: int = 3_000_000) -> Found:
+    """Everything that can happen, breadth first; ends at the first trouble."""
+    row = [World(server) for server in FOUND_MOVING]
+    came: dict[World, tuple[World, str] | None] = dict.fromkeys(row)
+    count = 0
+    while row:
+        following = []
+        for world in row:
+            for what, after in model.steps(world, rules):
+                count += 1
+                if after in came:
+                    continue
+                came[after] = (world, what)
+                if why := trouble(after):
+                    return Found(len(came), count, (*_way(after, came), why))
+                following.append(after)
+        row = following
+        if len(came) > most:
+            raise AssertionError(f"more than {most} worlds")
+    return Found(len(came), count, ())
+
+
+def _way(world: World, came: dict[World, tuple[World, str] | None]) -> list[str]:
+    way = []
+    before = came[world]
+    while before is not None:
+        world, what = before
+        way.append(what)
+        before = came[world]
+    return way[::-1]
+
+
+if __name__ == "__main__":
+    model.MOST_COPIES = int(sys.argv[1]) if len(sys.argv) > 1 else model.MOST_COPIES  # type: ignore[misc]
+    began_s = time.monotonic()
+    result = search()
+    print(f"{result.worlds} worlds, {result.steps} steps, {time.monotonic() - began_s:.1f} s")
+    print("\n".join(result.bad) or "no trouble can be reached")

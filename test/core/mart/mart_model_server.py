@@ -1,0 +1,112 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A small model of the MART server: what each word does in each state of motion.
+
+``test_mart_search`` replays each transition on the simulated firmware.
+"""
+
+from typing import Final, NamedTuple
+
+from omnibot_driver.core.mart.states import Motion
+
+START_WORDS: Final = ("RM", "B", "R", "L", "TF", "MCR")
+"""TB is like TF, and MCL like MCR, in all that is modelled."""
+SAID: Final = (*START_WORDS, "CHECK", "SRM", "SM", "SL", "SS")
+KIND: Final = {
+    "RM": Motion.REFERENCE,
+    "B": Motion.REVERSE,
+    "R": Motion.SPIN,
+    "L": Motion.SPIN,
+    "TF": Motion.STRAIGHT,
+    "MCR": Motion.TURN,
+}
+
+
+class Server(NamedTuple):
+    """``port``: free, busy (a move runs), waits (for the IMU), hung. ``released``: the stop port
+    has stopped an uncontrolled motion, which the server still believes in.
+    """
+
+    motion: Motion = Motion.NONE
+    moving: bool = False
+    port: str = "free"
+    released: bool = False
+    imu: bool = True
+    crashed: bool = False
+
+
+Reply = str | None
+
+
+def execute(server: Server, word: str) -> tuple[Server, Reply]:
+    """One datagram arrives, on either port; what the server then is, and answers."""
+    if server.crashed:
+        return server, None
+    if word in ("SL", "SS"):
+        return _stop_port(server, word)
+    if server.port != "free":
+        return server, None  # it waits in the queue, and is another late copy in effect
+    motion = server.motion
+    if word == "CHECK":
+        if motion is not Motion.NONE:
+            return server, "conflict"
+        return server, "ok" if server.imu else "imu lost"
+    if word in START_WORDS:
+        return _start(server, word)
+    stops = {"SRM": (Motion.REFERENCE,), "SM": (Motion.REVERSE, Motion.SPIN)}.get(word)
+    if stops is None:
+        return server, "ok"
+    if motion not in stops:
+        return server, "no motion"
+    if server.released and motion is not Motion.SPIN:
+        return server._replace(port="hung", moving=False), None
+    if not server.imu and not server.released:
+        return server._replace(port="hung", moving=False), None
+    return Server(imu=server.imu), "ok"
+
+
+def _start(server: Server, word: str) -> tuple[Server, Reply]:
+    motion = server.motion
+    if motion is Motion.REFERENCE and word == "L":
+        return server._replace(port="hung", moving=True), None
+    if motion is not Motion.NONE:
+        return server, "conflict"
+    kind = KIND[word]
+    if server.imu:
+        port = "busy" if word in ("TF", "MCR") else "free"
+        return server._replace(
+            motion=kind, moving=True, port=port
+        ), None if port == "busy" else "ok"
+    if word == "MCR":
+        return server, "imu lost"
+    if word in ("TF", "B"):
+        return server._replace(motion=kind, port="waits"), None
+    return server._replace(motion=kind, moving=True, port="waits"), None
+
+
+def _stop_port(server: Server, word: str) -> tuple[Server, Reply]:
+    motion = server.motion
+    if server.port == "waits":
+        return server, None
+    if motion is Motion.STRAIGHT and word == "SL":
+        return Server(imu=server.imu), "ok"
+    if motion is Motion.TURN and word == "SS":
+        return Server(imu=server.imu), "ok"
+    if motion in (Motion.REFERENCE, Motion.REVERSE) or (motion is Motion.SPIN and word == "SS"):
+        return server._replace(moving=False, released=True), None
+    return server, None
+
+
+def servers() -> dict[Server, tuple[str, ...]]:
+    """Every state of a server to which all datagrams are delivered, and the way there."""
+    row = [Server()]
+    found: dict[Server, tuple[str, ...]] = {Server(): ()}
+    while row:
+        server = row.pop(0)
+        following = {word: execute(server, word)[0] for word in SAID}
+        following["the IMU dies"] = server._replace(imu=False)
+        for what, after in following.items():
+            if after not in found and not (server.port == "busy" and what == "the IMU dies"):
+                found[after] = (*found[server], what)
+                row.append(after)
+    return found

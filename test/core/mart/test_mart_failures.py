@@ -1,0 +1,156 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A dead IMU, an obstacle, a motor that is stuck, a server that fails: no motion goes on."""
+
+import pytest
+from campaign import FIRMWARES
+from mart_bench import MartBench
+
+from omnibot_driver.simulator.mart import Firmware, Kind
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize("wish", [(0.3, 0.0), (0.0, 0.5), "goal"])
+def test_a_dead_imu_refuses_motion_until_it_is_back(
+    firmware: Firmware, wish: tuple[float, float] | str
+) -> None:
+    """Nothing is sent that would start the motors; a server with RST IMU is asked again."""
+    bench = MartBench(firmware).ready()
+    bench.server.imu.alive = False
+    if isinstance(wish, str):
+        bench.go_to(0.5, 0.5, 0.0)
+        bench.run(3.0)
+    else:
+        bench.command(*wish, 3.0)
+    assert bench.server.chassis.way_m == 0.0
+    assert bench.server.chassis.yaw_rad == 0.0
+    assert any("IMU" in notice for notice in bench.notices)
+    assert "IMU" in bench.try_command(0.3, 0.0)
+    bench.server.imu.alive = True
+    bench.run(1.5)
+    bench.command(0.3, 0.0, 2.0)
+    assert bench.robot.stands is (firmware == "documented")
+
+
+def test_one_failed_reset_of_the_imu_is_no_dead_imu() -> None:
+    """It leaves the IMU closed, so it is said again; the third one would count."""
+    bench = MartBench("source").ready()
+    bench.server.imu.alive = False
+    bench.try_command(0.3, 0.0)
+    bench.run_until(lambda: bench.server.imu.closed, 2.0)
+    bench.run_until(lambda: not bench.server.busy, 2.0)
+    bench.server.imu.alive = True
+    bench.command(0.3, 0.0, 1.5)
+    assert not bench.robot.stands
+    assert bench.notices == []
+
+
+def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
+    """The server's count goes on from a stop of 0.56 s to 0.6 s."""
+    bench = MartBench("source").ready()
+    bench.server.motions[Kind.REFERENCE].samples = 58
+    bench.command(0.3, 0.0, 4.0)
+    assert any("RM failed" in notice for notice in bench.notices)
+    assert bench.board.refusal == ""
+    assert not bench.robot.stands
+
+
+def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
+    """The server gives the reason of the last B; the front sonar sees nothing."""
+    bench = MartBench("source").ready()
+    bench.server.motions[Kind.LINEAR].error = "insufficent clearence"
+    bench.server.motions[Kind.REFERENCE].samples = 58
+    bench.command(0.3, 0.0, 4.0)
+    assert any("RM failed (insufficent clearence)" in notice for notice in bench.notices)
+    assert not any("obstacle in front" in notice for notice in bench.notices)
+    assert not bench.robot.stands
+
+
+def test_a_dead_imu_is_told_when_a_command_comes() -> None:
+    """No word is sent that starts."""
+    bench = MartBench().ready()
+    bench.server.imu.alive = False
+    bench.command(0.3, 0.0, 3.0)
+    assert bench.robot.stands
+    assert b"RM" not in {data.split()[0] for data in bench.said()}
+    assert any("IMU" in notice for notice in bench.notices)
+    assert "IMU" in bench.try_command(0.3, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("motion", "firmware"),
+    [
+        ((0.3, 0.0), "firmware"),
+        ((0.3, 0.0), "source"),
+        ((-0.2, 0.0), "firmware"),
+        ((0.0, 0.5), "firmware"),
+    ],
+)
+def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
+    motion: tuple[float, float], firmware: Firmware
+) -> None:
+    """The heading is frozen: half a second, and the time of a stop. By the source it moves in RM
+    alone, so nothing tells of it elsewhere.
+    """
+    bench = MartBench(firmware).ready()
+    bench.command(*motion, 2.5)
+    assert not bench.robot.stands
+    bench.server.imu.alive = False
+    bench.command(*motion, 1.2)
+    assert bench.robot.stands
+    bench.run(6.0)
+    assert any("heading does not change" in notice for notice in bench.notices)
+    assert any(notice.startswith("lost: ") for notice in bench.notices)
+    assert bench.try_command(0.3, 0.0)
+    bench.server.imu.alive = True
+    bench.server.restart()
+    bench.run(8.0)
+    bench.command(0.3, 0.0, 2.0)
+    assert not bench.robot.stands
+
+
+def test_an_obstacle_ends_the_way_forward_and_leaves_the_others() -> None:
+    """The controller stops by itself, and says nothing until it is asked."""
+    bench = MartBench(front_m=1.4).ready()
+    bench.command(0.3, 0.0, 6.0)
+    assert bench.robot.stands
+    assert not bench.server.hit_wall
+    assert any("obstacle in front" in notice for notice in bench.notices)
+    bench.command(-0.2, 0.0, 3.0)
+    assert not bench.robot.stands
+
+
+@pytest.mark.parametrize("bits", [4, 8, 16, 32])
+def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
+    """Until the motor board is well again."""
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.server.chassis.motor_status = bits
+    bench.command(0.3, 0.0, 2.0)
+    assert b"SRM" in bench.said()
+    name = bench.session.figures(bench.now).board.own["Motor board"]
+    assert name.startswith("motor ")
+    assert name in bench.try_command(0.3, 0.0)
+
+
+@pytest.mark.parametrize("stuck", ["left", "right", "both"])
+def test_a_stuck_motor_is_no_motion_that_goes_on(stuck: str) -> None:
+    """Whichever it is; RM may hang by it, and then the server is lost."""
+    bench = MartBench(stuck=stuck).ready()
+    bench.command(0.3, 0.0, 8.0)
+    bench.run(3.0)
+    assert bench.server.chassis.right == bench.server.chassis.left == 128
+    assert bench.notices
+
+
+def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
+    """SRM finds no motion there; a controlled turn takes the motors over, and ends."""
+    bench = MartBench(reference_start_fails=True).ready()
+    bench.command(0.3, 0.0, 8.0)
+    assert bench.robot.stands
+    assert bench.server.chassis.way_m < 1.0
+    bench.run(10.0)
+    assert bench.robot.stands
+    assert bench.try_command(0.3, 0.0)

@@ -1,0 +1,179 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Whatever moves the simulated controller is stopped, on any network, and by whom it may be."""
+
+import pytest
+from campaign import FIRMWARES
+from mart_bench import MartBench
+
+from omnibot_driver.core.mart import State
+from omnibot_driver.simulator.common.network import NetworkFaults
+from omnibot_driver.simulator.mart import Firmware
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize("motion", [(0.3, 0.0), (0.3, 0.4), (-0.2, 0.0), (0.0, 0.5)])
+def test_a_stop_leaves_the_robot_standing_within_half_a_second(
+    firmware: Firmware, motion: tuple[float, float]
+) -> None:
+    """From the e-stop to standstill."""
+    bench = MartBench(firmware).ready()
+    bench.command(*motion, 2.5)
+    assert not bench.robot.stands
+    bench.estop(True)
+    assert bench.until_it_stands() < 0.5
+    bench.run(2.0)
+    assert bench.robot.stands
+    assert bench.session.stands
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize("after_s", [0.02, 0.12, 0.17, 0.22, 0.35, 0.56])
+def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
+    after_s: float, firmware: Firmware
+) -> None:
+    """While the IMU is checked, while RM is on its way, while its reply is outstanding."""
+    bench = MartBench(firmware, faults=NetworkFaults(delay_s=0.02), seed=1).ready()
+    for vx, yaw_rate in ((0.3, 0.0), (-0.2, 0.0), (0.0, 0.5)):
+        bench.try_command(vx, yaw_rate)
+        bench.run(after_s)
+        bench.estop(True)
+        bench.run(2.5)
+        assert bench.robot.stands
+        way_m = bench.server.chassis.way_m
+        bench.run(2.0)
+        assert bench.server.chassis.way_m == way_m
+        bench.estop(False)
+        bench.run(0.5)
+    assert not bench.server.hung
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    "faults",
+    [
+        NetworkFaults(lose=0.1),
+        NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.05),
+        NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.3),
+    ],
+    ids=["lost", "lost, doubled, late by 50 ms", "lost, doubled, late by 300 ms"],
+)
+def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
+    faults: NetworkFaults, seed: int
+) -> None:
+    """Motions of all kinds, one after the other, then an end."""
+    bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
+    for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.1), (0.2, -0.4)):
+        bench.command(vx, yaw_rate, 2.5)
+    bench.go_to(0.5, 0.5, 1.0)
+    bench.run(4.0)
+    bench.session.leave(bench.now)
+    bench.settle()
+    bench.run(1.0)
+    assert bench.until_it_stands() < 2.0
+    way_m = bench.server.chassis.way_m
+    bench.run(3.0)
+    assert bench.server.chassis.way_m - way_m < 0.01
+    assert not bench.server.hung
+    assert not any("lost" in notice for notice in bench.notices)
+
+
+def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
+    """The driver believes that the robot stands."""
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(3.0)
+    assert bench.robot.stands
+    bench.server.receive(b"RM 30", 0, None, bench.robot.board.now_s)
+    bench.run(0.15)
+    assert not bench.robot.stands
+    assert bench.until_it_stands() < 0.85
+    assert any("moves without a command" in notice for notice in bench.notices)
+
+
+def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
+    """It keeps the command port silent, so nothing else tells of it."""
+    bench = MartBench().ready()
+    bench.go_to(0.6, 0.0, 0.0)
+    bench.run_until(lambda: b"TF" in bench.server.executed[-1].encode(), 10.0)
+    bench.server.receive(bench.server.executed[-1].encode(), 0, None, bench.robot.board.now_s)
+    bench.run_until(lambda: bench.board._pilot.state is State.STILL, 20.0)
+    bench.estop(True)
+    assert bench.until_it_stands() < 1.0
+    bench.run(2.0)
+    assert bench.robot.stands
+    assert not bench.server.hung
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
+    """Ten times a second, and a motion that another program starts does not get far."""
+    bench = MartBench(firmware).ready()
+    bench.estop(True)
+    bench.run(1.0)
+    seen = len(bench.written)
+    bench.run(2.0)
+    assert bench.said(seen).count(b"SRM") == pytest.approx(20, abs=3)
+    bench.server.receive(b"RM 30", 0, None, bench.robot.board.now_s)
+    bench.run(0.1)
+    assert bench.until_it_stands() < 0.6
+    assert not bench.server.hung
+
+
+@pytest.mark.parametrize("motion", [(0.3, 0.0), (-0.2, 0.0), (0.0, 0.5)])
+def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
+    motion: tuple[float, float],
+) -> None:
+    """Right behind SM or SRM it would race with them, and hang a port."""
+    bench = MartBench("firmware").ready()
+    bench.command(*motion, 2.5)
+    bench.server.imu.alive = False
+    bench.command(*motion, 6.0)
+    received = bench.server.received
+    first_s = min(at_s for at_s, port, _ in received if port == 1)
+    stops = [at_s for at_s, _, data in received if data in (b"SM", b"SRM") and at_s <= first_s]
+    assert first_s - max(stops) > 0.3
+    assert {port for _, port, _ in received} == {0, 1}
+
+
+def test_a_restarted_driver_stops_what_it_meets() -> None:
+    """A motion by RM, and a controlled move that keeps the port silent."""
+    for begun in (b"RM 30", b"B SLOW", b"L SLOW", b"TF 200", b"MCR 300"):
+        bench = MartBench()
+        bench.server.receive(begun, 0, None, 0.0)
+        bench.run(1.0)
+        assert not bench.robot.stands
+        bench.open()
+        bench.run(15.0)
+        assert bench.session.state == "nominal"
+        assert bench.robot.stands, begun
+
+
+@pytest.mark.parametrize("wish", ["forward", "backward", "left", "goal ahead", "goal aside"])
+def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops_the_robot(
+    wish: str,
+) -> None:
+    """In every state: the guard repeats the words it had before the last datagram, for a second."""
+    twists = {"forward": (0.3, 0.2), "backward": (-0.2, 0.0), "left": (0.0, 0.5)}
+    seen = set()
+    for tenths in [*range(2, 16), 25, 40]:
+        network = NetworkFaults(delay_s=0.03)
+        bench = MartBench(FIRMWARES[tenths % 3], network, seed=tenths).ready()
+        if wish in twists:
+            bench.command(*twists[wish], tenths * 0.1)
+            bench.try_command(*twists[wish])
+        else:
+            bench.go_to(1.5, 0.0 if wish == "goal ahead" else 1.5, 0.0)
+            bench.run(tenths * 0.1)
+        seen.add(bench.board._pilot.state)
+        words = bench.board.stop()
+        for tick in range(300):
+            if tick < 100 and tick % 5 == 0:
+                for channel, data in words:
+                    bench.robot.receive(data, bench.now, channel)
+            bench.robot.advance()
+        assert bench.robot.stands, (wish, tenths, words)
+        assert not bench.server.hung
+    assert len(seen) >= 2 or wish.startswith("goal")
