@@ -7,6 +7,7 @@ once; each driver is a child of it with output, environment, arguments and an ex
 and runs the same ``main``. Tests of the start itself start a new interpreter instead.
 """
 
+import atexit
 import contextlib
 import gc
 import json
@@ -86,13 +87,20 @@ class Nursery:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         folder = str(Path(__file__).parent)
         main = f"import sys; sys.path.append({folder!r}); import driver_nursery as nursery"
-        subprocess.Popen(
+        process = subprocess.Popen(
             [sys.executable, "-c", f"{main}; nursery.serve({theirs.fileno()})"],
             pass_fds=[theirs.fileno()],
             env={**os.environ, "PYTHONUNBUFFERED": "1", "OPENBLAS_NUM_THREADS": "1"},
         )
         theirs.close()
+        atexit.register(end, ours, process)
         return ours
+
+
+def end(control: socket.socket, process: "subprocess.Popen[bytes]") -> None:
+    """Close its control, and wait until the nursery has left."""
+    control.close()
+    process.wait()
 
 
 def serve(descriptor: int) -> None:
