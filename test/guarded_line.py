@@ -107,6 +107,6 @@ def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
 
 
 def replaced(line: Line, guard: int) -> bool:
-    """Whether another guard runs, and this one has ended and is no zombie."""
+    """Whether another guard runs, and this one has ended and was reaped."""
     found = line.children()
     return bool(found) and guard not in found

@@ -19,7 +19,7 @@ from omnibot_driver.tools.needs import ToolError
 
 
 class Planned(Protocol):
-    """A drive that the user is told of by its name."""
+    """A drive, with the name by which the user knows it."""
 
     @property
     def name(self) -> str: ...
