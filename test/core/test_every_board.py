@@ -166,7 +166,7 @@ def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_odometry_stays_a_number_over_lines_that_come_and_go(bench: AnyBench, seed: int) -> None:
-    """While the robot drives, turns and backs, at any moment; and it is told of nowhere else."""
+    """While the robot drives, turns and backs, at any moment."""
     random = Random(seed)
     for _ in range(6):
         bench.drive_on(random.choice([0.3, -0.2, 0.0]), random.uniform(0.1, 2.0))

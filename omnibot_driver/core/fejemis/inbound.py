@@ -2,7 +2,7 @@
 
 """What follows from each message: which board sent it, what it stops, whether the robot obeys.
 
-Hands a message to whoever it concerns, and keeps the mode. Knows no bytes, and nothing of how
+Hands a message to the part that it concerns, and keeps the mode. Knows no bytes, and nothing of how
 anything is said to the boards.
 """
 

@@ -42,7 +42,7 @@ def test_the_gyro_is_calibrated_by_the_board() -> None:
 
 
 def test_a_calibration_is_done_when_its_offsets_were_read_twice_alike() -> None:
-    """A damaged answer that passes its sum is no proof."""
+    """A damaged answer that passes its sum proves nothing."""
     jobs = Jobs()
     jobs.ask(Job.CALIBRATE_GYRO, None, 0.0)
     jobs.due(0.0)
