@@ -39,7 +39,7 @@ from omnibot_driver.core.omnibot.translation import Translation
 
 pytestmark = interpreted_only
 
-SECONDS = 6.0
+SECONDS = 4.0
 Outcome = list[tuple[list[Frame], list[int], DecoderStatistics, bytes | None]]
 Chunks = list[tuple[bytes, float]]
 
