@@ -64,24 +64,29 @@ def answer(
     seconds: float,
     *,
     dead_s: Array | None = None,
+    begun: Array | float = 0.0,
 ) -> Array:
-    """Speed in RPM from standstill, (samples of STEP_S, *shape of the gains).
+    """Speed in RPM from standstill, (samples of STEP_S, *common shape of what follows).
 
-    ``dead_s``: several dead times in place of the loop's, of a shape that goes with the gains'.
+    Gains; ``dead_s``: several dead times in place of the loop's; ``begun``: the part of the way
+    between two marks that lies behind the wheel at first.
     """
+    late = loop.dead_s if dead_s is None else dead_s
     every = np.broadcast_arrays(
-        *(np.asarray(gain, dtype=np.float64) for gain in (gains.kp, gains.tn_s, gains.td_s)),
-        np.asarray(loop.dead_s if dead_s is None else dead_s, dtype=np.float64),
+        *(
+            np.asarray(one, dtype=np.float64)
+            for one in (gains.kp, gains.tn_s, gains.td_s, late, begun)
+        )
     )
     shape = every[0].shape
-    kp, tn_s, td_s, late_s = (one.ravel() for one in every)
+    kp, tn_s, td_s, late_s, ticks = (one.ravel() for one in every)
     count, period = round(seconds / STEP_S), round(loop.period_s / STEP_S)
     dead, lanes = np.rint(late_s / STEP_S).astype(int), np.arange(len(kp))
     duties = np.zeros((count + int(dead.max()) + 1, len(kp)))
     told = np.zeros((count, len(kp)))
     first = 1 - np.exp(-STEP_S / max(plant.slow_s, STEP_S))
     second = 1 - np.exp(-STEP_S / plant.fast_s) if plant.fast_s > STEP_S else 1.0
-    lagged, rpm, ticks, ticked_s = (np.zeros(len(kp)) for _ in range(4))
+    lagged, rpm, ticked_s = (np.zeros(len(kp)) for _ in range(3))
     seen, duty, wished = (np.zeros(len(kp)) for _ in range(3))
     errors, outputs = [np.zeros(len(kp))] * 2, [np.zeros(len(kp))] * 2
     per_rpm, half_s = loop.ticks_per_revolution / 60, loop.nominal_s / 2

@@ -33,7 +33,9 @@ SECONDS: Final = 4.0
 CANDIDATES: Final = 48
 ROUNDS: Final = 2
 DEAD_S: Final = np.arange(0.0, 0.101, 0.005)
-FIRST_TICKS: Final = (0.1, 0.3, 0.5, 0.7, 0.9)
+FIRST_BEGUN: Final = np.arange(0.05, 1.0, 0.1)
+BEGUN: Final = np.array([0.0, 0.4, 0.8])
+"""Of the way between two marks: when ticks come, against the controller's steps, changes a step."""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
@@ -76,7 +78,7 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
     for _ in range(ROUNDS):
         kps, used = np.meshgrid(scale * np.geomspace(low, high, CANDIDATES), tds, indexing="ij")
         gains = PiGains(kps, tn_s, used)
-        found = traits(answer(plant, gains, loop, target, SECONDS), target, goals.band)
+        found = _foreseen(plant, gains, loop, goals)
         # Up to the first gain that overshoots too much: far above it, saturation hides it again.
         tame = np.logical_and.accumulate(found.overshoot <= goals.overshoot, axis=0)
         allowed = np.isfinite(found.settled_s) & tame
@@ -106,7 +108,7 @@ def target_of(plant: Plant, goals: Goals) -> float:
 def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
     """Describe the effect of these gains."""
     target = target_of(plant, goals)
-    found: Traits = traits(answer(plant, gains, loop, target, SECONDS), target, goals.band)
+    found = _foreseen(plant, gains, loop, goals)
     return Tuned(
         gains,
         target,
@@ -115,6 +117,17 @@ def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
         float(found.error_s),
         float(phase_margin_deg(plant, gains, loop, target)),
     )
+
+
+def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
+    """Traits of a step wherever the wheel begins between two marks: the worst overshoot and time,
+    and the mean error.
+    """
+    target = target_of(plant, goals)
+    apart = PiGains(*(np.asarray(one)[..., None] for one in (gains.kp, gains.tn_s, gains.td_s)))
+    rpm = answer(plant, apart, loop, target, SECONDS, begun=BEGUN)
+    found = traits(rpm, target, goals.band)
+    return Traits(found.overshoot.max(-1), found.settled_s.max(-1), found.error_s.mean(-1))
 
 
 Steps = tuple[PiGains, float, Sequence[Column]]
@@ -129,18 +142,18 @@ def dead_time_s(plant: Plant, loop: Loop, made: Sequence[Steps]) -> float:
     costs = np.zeros(len(DEAD_S))
     for gains, target_rpm, records in made:
         shown = [response(record, loop.ticks_per_revolution) for record in records]
-        told_rpm = answer(plant, gains, loop, target_rpm, OVER_S + 1.0, dead_s=DEAD_S)
-        for place, ticks in enumerate(
-            np.cumsum(told_rpm, axis=0).T * STEP_S * loop.ticks_per_revolution / 60
-        ):
-            models = [_recorded(ticks, first, loop.ticks_per_revolution) for first in FIRST_TICKS]
+        late_s, begun = DEAD_S[:, None], FIRST_BEGUN
+        rpm = answer(plant, gains, loop, target_rpm, OVER_S + 1.0, dead_s=late_s, begun=begun)
+        ticks = begun + np.cumsum(rpm, axis=0) * STEP_S * loop.ticks_per_revolution / 60
+        for place in range(len(DEAD_S)):
+            models = [_recorded(one, loop.ticks_per_revolution) for one in ticks[:, place].T]
             costs[place] += sum(min(_unlike(one, model) for model in models) for one in shown)
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)
 
 
-def _recorded(ticks: Column, first: float, ticks_per_revolution: int) -> Response:
-    """The record that this answer would give; ``first``: position of the first mark."""
-    marks = np.arange(first, ticks[-1])
+def _recorded(ticks: Column, ticks_per_revolution: int) -> Response:
+    """The record of a wheel that is at these places, in ticks, after each ``STEP_S``."""
+    marks = np.arange(1.0, ticks[-1])
     at_s = np.interp(marks, ticks, STEP_S * np.arange(1, len(ticks) + 1))
     return response(np.diff(at_s, prepend=0.0), ticks_per_revolution)
 

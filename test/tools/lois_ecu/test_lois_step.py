@@ -160,9 +160,9 @@ def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
     """Within 10 ms; a short one is not believed."""
     gains = tune(PLANT, LOOP, Goals()).gains
     dead_s = 0.04
-    rpm = answer(PLANT, gains, Loop(0.091, TICKS, dead_s), 31.0, 4.0)
-    ticks = np.cumsum(rpm) * 1e-3 * TICKS / 60
-    at_s = np.interp(np.arange(0.4, ticks[-1]), ticks, 1e-3 * np.arange(1, len(ticks) + 1))
+    rpm = answer(PLANT, gains, Loop(0.091, TICKS, dead_s), 31.0, 4.0, begun=0.6)
+    ticks = 0.6 + np.cumsum(rpm) * 1e-3 * TICKS / 60
+    at_s = np.interp(np.arange(1.0, ticks[-1]), ticks, 1e-3 * np.arange(1, len(ticks) + 1))
     found = dead_time_s(PLANT, LOOP, [(gains, 31.0, [np.diff(at_s, prepend=0.0)])])
     assert found == pytest.approx(dead_s, abs=0.011)
 
