@@ -204,6 +204,8 @@ def _write_whole(descriptor: int, data: bytes) -> None:
 def _explain(url: str, parameter: str, error: Exception) -> str:
     """Explain the trouble with this port, with a remedy."""
     code = error.errno if isinstance(error, OSError) else None
+    if isinstance(error, ValueError) and "baud rate" in str(error):
+        return f"{url} cannot be set to this speed: {error}; check the parameter `baudrate`"
     # pyserial words some errors anew without their number; where it stumbled is in the context.
     misread = TypeError | ValueError | LookupError | re.error
     if isinstance(error, misread) or isinstance(error.__context__, misread):

@@ -26,6 +26,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
         (BlockingIOError(11, "Resource temporarily unavailable"), "fuser"),
         (OSError(16, "Device or resource busy"), "fuser"),
         (ValueError("invalid URL"), "socket://"),
+        (ValueError("Failed to set custom baud rate (12345): [Errno 22]"), "`baudrate`"),
         (IsADirectoryError(21, "Is a directory"), "is not a serial port"),
         (OSError(5, "Input/output error"), "USB0: Input/output error; check the parameter"),
         (OSError("it said so"), "USB0: it said so; check the parameter"),
