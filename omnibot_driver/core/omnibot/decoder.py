@@ -197,18 +197,28 @@ class FrameDecoder:
                 cost >= cost_model.LOOK_ALIKE or not goes_on(held, end, closed=closed)
             ):
                 return self._believe_but_the_last(walk, found)
-            if end == size and not closed and cost_model.may_be_lent(frame, context):
-                parted = self._arrived < length  # what is sent at once begins after a pause
-                at_pace = self.pauses.at_pace  # else the next frame may have begun
-                if not self.pauses.sharp or (
-                    parted and (not at_pace or expectation.more_is_due(frame, context))
-                ):
-                    break
+            if (
+                end == size
+                and not closed
+                and cost_model.may_be_lent(frame, context)
+                and self._next_may_have_begun(at, length, expectation.more_is_due(frame, context))
+            ):
+                break
             walk.add(end, frame, context)
             context = after
             at = end
         self._take(walk, len(walk.frames), context, found)
         return True
+
+    def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
+        """Whether the last byte in hand may be the first of another frame, as times tell.
+
+        ``start``, ``length``: of the frame in hand; ``due``: another one may follow at once.
+        """
+        pauses = self.pauses
+        if self._arrived >= length:  # what is sent at once begins after a pause
+            return not (pauses.sharp or (pauses.collected and not due))
+        return due or not (pauses.sharp and (pauses.at_pace or pauses.in_its_tick(start)))
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
         """Accept the frames of a run except the last two, which are in doubt; returns False."""

@@ -15,7 +15,16 @@ from operator import attrgetter
 from typing import Final
 
 from omnibot_driver.core.omnibot import cost_model
-from omnibot_driver.core.omnibot.late_reads import GAP_S, IDLE_S, PACE_S, Cause, Gap, Read, cause
+from omnibot_driver.core.omnibot.late_reads import (
+    GAP_S,
+    HALF_TICK_S,
+    IDLE_S,
+    PACE_S,
+    Cause,
+    Gap,
+    Read,
+    cause,
+)
 
 LATE_S: Final = 0.011
 """While the board runs its line is never idle for longer, unless bytes were lost; an adapter that
@@ -36,13 +45,15 @@ class InterFrameGaps:
     ``sharp``: as a rule, the first byte that comes after a pause begins a frame; ``between``: as a
     rule, a frame begins somewhere in what comes after it. ``certain``: both have held for this time
     that once more changes nothing. ``at_pace``: the last bytes came without a pause.
-    ``byte_s``: how long the line takes for a byte.
+    ``byte_s``: how long the line takes for a byte. ``collected``: the last read brought what had
+    come for longer than a tick, so it ended anywhere in a tick, and hardly just behind the first
+    byte of one.
     """
 
     def __init__(self, byte_s: float) -> None:
         self._byte_s = byte_s
         self.gaps: list[Gap] = []
-        self.at_pace = False
+        self.at_pace = self.collected = False
         self._reads: list[Read] = []
         self.doubt()
 
@@ -55,6 +66,7 @@ class InterFrameGaps:
         """Bytes arrived now, to be held from this place on, this time after the last."""
         idle_s = pause_s - arrived * self._byte_s
         self.at_pace = idle_s < PACE_S
+        self.collected = pause_s > LATE_S and arrived <= 2 * TICK_BYTES
         if idle_s > GAP_S and arrived <= TICK_BYTES:
             self._add(pause_s, arrived, place)
         if self.gaps:
@@ -72,8 +84,12 @@ class InterFrameGaps:
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
         """Note that the bytes after this pause began and ended with a frame."""
-        if pause_s - arrived * self._byte_s > GAP_S:
+        if self.stands_out(pause_s, arrived):
             self._trust(sharp=True, between=True)
+
+    def stands_out(self, pause_s: float, arrived: int) -> bool:
+        """Whether the line was idle before these bytes for longer than within any frame."""
+        return pause_s - arrived * self._byte_s > GAP_S
 
     def compare(self, ends: Sequence[int]) -> None:
         """Do they end where frames begin? Then they are the line's, not the adapter's."""
@@ -101,6 +117,14 @@ class InterFrameGaps:
     def silent_within(self, start: int, end: int) -> bool:
         """Whether there was a long pause of reading within these bytes."""
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
+
+    def in_its_tick(self, start: int) -> bool:
+        """Whether these bytes began after a pause, and so lately that the next tick has not."""
+        for gap in self.gaps:
+            if gap.first == start and gap.pause_s <= LATE_S:
+                came = next(read.now for read in self._reads if read.end > start)
+                return self._reads[-1].now - came < HALF_TICK_S
+        return False
 
     def forget(self, count: int) -> None:
         """Forget the pauses of the first bytes, which have been decoded."""

@@ -59,10 +59,16 @@ def take_pieces(
 ) -> ImuReading | None:
     """``take_single`` of a frame of which the pieces are the first part, and ``data`` the rest.
 
-    A last byte that may be the next header's needs a closer look.
+    The last byte may be the next header's only where a frame may follow at once.
     """
     first, came_at = pieces[0]
-    if data[-1] in LENT or now - came_at >= GAP_S:
+    last = decoder.context.imu
+    if now - came_at >= GAP_S or last is None:
+        return None
+    if data[-1] in LENT and (
+        decoder.expectation.more_is_due(last, decoder.context)
+        or not decoder.pauses.stands_out(came_at - decoder.last_arrival_s, len(first))
+    ):
         return None
     reading = take_single(joined(pieces) + data, came_at, decoder, translation, first=len(first))
     if reading is not None:

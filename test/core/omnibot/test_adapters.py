@@ -1,0 +1,83 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""An IMU frame comes out with the packet that completes it, however the adapter parts the line.
+
+Times tell that a last byte like 0xFF is not the first of the next frame: that one is not due yet.
+"""
+
+from collections.abc import Callable, Iterator
+from random import Random
+
+import pytest
+
+from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.omnibot.gaps import BYTE_S
+from omnibot_driver.core.readings import ImuReading
+from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
+
+TICKS = 1200
+SETTLED = 300
+"""Readings after which the decoder knows the adapter."""
+IMU_LENGTH = 14
+DRIFT = 1.0002
+"""Of the adapter's clock: its packets end at every moment of a tick."""
+
+Handed = Iterator[tuple[float, bytes]]
+
+
+def ticks() -> Iterator[tuple[float, bytes]]:
+    """A robot at rest, whose gyro says -1 more often than anything but 0."""
+    board = SimulatedBoard(BoardSettings(seed=1, running=True))
+    for tick in range(TICKS):
+        yield tick * 0.01, board.step()
+
+
+def pieces() -> Handed:
+    """1 to 16 bytes at the pace of the line."""
+    random = Random(1)
+    for at, data in ticks():
+        start = 0
+        while start < len(data):
+            end = min(len(data), start + random.randint(1, 16))
+            yield at + end * BYTE_S, data[start:end]
+            start = end
+
+
+def behind_timer(timer_s: float) -> Handed:
+    """Whatever has come when the timer runs out."""
+    held, out = b"", 0.0
+    for at, data in ticks():
+        for number in range(len(data)):
+            arrived = at + (number + 1) * BYTE_S
+            while out < arrived:
+                if held:
+                    yield out, held
+                held, out = b"", out + timer_s * DRIFT
+            held += data[number : number + 1]
+
+
+@pytest.mark.parametrize(
+    ("adapter", "waits"),
+    [(pieces, 0.01), (lambda: behind_timer(0.001), 0.01), (lambda: behind_timer(0.016), 0.005)],
+    ids=["pieces", "1 ms timer", "16 ms timer"],
+)
+def test_hardly_a_frame_waits_for_the_next_packet(
+    adapter: Callable[[], Handed], waits: float
+) -> None:
+    """Only what is in doubt waits: a delta may follow, or the frame is parted by the adapter."""
+    board = OmniBot(OmniBotSettings())
+    ends: list[int] = []
+    sent = 0
+    for _, data in ticks():
+        ends.append(sent + IMU_LENGTH)
+        sent += len(data)
+    handed = heard = late = 0
+    for now, data in adapter():
+        before, handed = handed, handed + len(data)
+        for reading in board.receive(data, now):
+            if isinstance(reading, ImuReading):
+                late += heard >= SETTLED and ends[heard] <= before
+                heard += 1
+    assert heard > TICKS - 10
+    assert late <= waits * (heard - SETTLED)
+    assert board.figures.discarded_bytes == 0
