@@ -48,8 +48,6 @@ class PairStream(SetpointStream):
 
     def angle_told(self, angle_rad: float, now: float) -> bool:
         """The front wheel stands here. Whether it shows now that it does not follow."""
-        if not self.driving:
-            return False
-        if self._pair.restless:
+        if self.driving and self._pair.restless:
             self._said_at = -math.inf
         return self._pair.follower.look(angle_rad, now)

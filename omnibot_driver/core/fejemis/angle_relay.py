@@ -1,15 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The angle of the front wheel as a line for the drive board, in digits that damage changes little.
+"""The angle of the front wheel as a line for the drive board, in digits that damage cannot change.
 
-Two lost characters whose codes add up to 99 change no sum, wherever they stand. So an angle is sent
-in digits without such a pair, or with one whose loss leaves nearly the same angle, and rounded for
-that by half a degree at most. To the right some angles have a ``6`` that no rounding avoids: their
-minus sign and that ``6`` can be lost unseen, which leaves less than 10° to the left.
+Two lost characters whose codes add up to 99 change no sum, wherever they stand. So an angle is told
+in digits without such a pair, and rounded for that by half a degree at most; what is rounded off is
+told with the next angles, so the mean is right. To the right some angles have a ``6`` that no
+rounding avoids: their minus sign and that ``6`` can be lost unseen, which leaves less than 10° to
+the left.
 
-Without sums any character can be lost unseen. Then whole degrees are sent, of which any loss leaves
+Without sums any character can be lost unseen. Then whole degrees are told, of which any loss leaves
 a smaller number: beyond 90° the board would compute an inner wheel faster than the outer one.
-The rounding is added up and told later, so the mean is right. Knows no sums but their modulus.
+Knows no sums but their modulus.
 """
 
 import math
@@ -24,8 +25,8 @@ from omnibot_driver.core.fejemis.sums import MODULUS
 
 ROUNDED: Final = 5
 """Tenths of a degree by which an angle may be moved."""
-NEAR: Final = 0.6
-"""Degrees: what two lost characters may change."""
+MOST_OWED: Final = 0.5
+"""Degrees."""
 ACROSS: Final = 10.0
 """Degrees to the left, below which an angle to the right may be heard as if it were there."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
@@ -40,12 +41,10 @@ class AngleRelay:
     def text(self, angle_rad: float, *, sums: bool) -> bytes:
         """The line, without its sum."""
         angle_deg = math.degrees(angle_rad)
-        if sums:
-            self._owed_deg = 0.0
-            return _with_sum(round(10 * angle_deg))
-        whole = round(angle_deg + self._owed_deg)
-        self._owed_deg = max(-1.0, min(1.0, self._owed_deg + angle_deg - whole))
-        return b"fwl %d" % whole
+        wanted_deg = angle_deg + self._owed_deg
+        text = _with_sum(round(10 * wanted_deg)) if sums else b"%d" % round(wanted_deg)
+        self._owed_deg = max(-MOST_OWED, min(MOST_OWED, wanted_deg - float(text)))
+        return b"fwl " + text
 
 
 def heard_instead(text: str) -> Iterator[float]:
@@ -58,19 +57,18 @@ def heard_instead(text: str) -> Iterator[float]:
 
 @lru_cache(maxsize=4000)
 def _with_sum(tenths: int) -> bytes:
-    across = b""
+    across = ""
     for off in range(ROUNDED + 1):
         for near in (tenths + off, tenths - off)[: 2 if off else 1]:
             for text in _written(near):
-                line = b"fwl " + text.encode("ascii")
-                if not robust(line):
+                if not robust(b"fwl " + text.encode("ascii")):
                     continue
                 instead = list(heard_instead(text))
-                if all(abs(angle_deg - near / 10) <= NEAR for angle_deg in instead):
-                    return line
+                if not instead:
+                    return text.encode("ascii")
                 if not across and all(0.0 <= angle_deg < ACROSS for angle_deg in instead):
-                    across = line
-    return across or b"fwl %.1f" % (tenths / 10)
+                    across = text
+    return across.encode("ascii") or b"%.1f" % (tenths / 10)
 
 
 def _written(tenths: int) -> list[str]:

@@ -51,17 +51,10 @@ class FejemisBoard(Board):
         self._told = Told()
         self._relay = AngleRelay()
         self._obedience = Obedience()
-        self._inbound = Inbound(
-            self._ports,
-            self._translation,
-            self._upkeep,
-            self._obedience,
-            self._told,
-            self._angle_told,
-        )
-        self.services = Services(
-            self, self._upkeep, self._obedience, self._translation.odometry, self._told
-        )
+        parts = self._ports, self._translation, self._upkeep, self._obedience, self._told
+        self._inbound = Inbound(*parts, self._angle_told)
+        odometry = self._translation.odometry
+        self.services = Services(self, self._upkeep, self._obedience, odometry, self._told)
         self._actuator: PairStream | None = None
         self.clock = self._translation.stamped
         self._now = -math.inf
@@ -118,7 +111,12 @@ class FejemisBoard(Board):
             return "power is about to be cut"
         if job := self._upkeep.jobs.at_rest:
             return job
-        return self._ports.trouble or self._upkeep.pending or self._inbound.watch.refusal
+        return (
+            self._ports.trouble
+            or self._upkeep.pending
+            or self._inbound.watch.refusal
+            or self._encoder.follower.refusal
+        )
 
     @property
     def advice(self) -> str | None:
@@ -254,6 +252,7 @@ class FejemisBoard(Board):
         if self._obedience.estopped:
             return NO_PACKETS
         self._obedience.pause_said = False
+        self._encoder.follower.start()
         return self.stop() + self._ports.line("drive", *self._upkeep.jobs.keep_power(), b"start")
 
     def pause(self) -> Packets:

@@ -19,6 +19,8 @@ TIMES: Final = 3
 BETWEEN_S: Final = 0.1
 BRUSH_AGAIN_S: Final = 1.0
 """How often ``brush 1`` is repeated while it turns: a line may be lost."""
+PACE_S: Final = 0.05
+"""A flood of voltages or colours is thinned to one each in this time, the newest."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
@@ -33,8 +35,11 @@ class Machine:
         self.brush = False
         self.volts = 0.0
         self.colour: tuple[int, int, int] | None = None
-        self._lift_until = -math.inf
         self._lift_line = b""
+        """Not sent yet."""
+        self._lift_at = self._lift_again_at = self._lift_until = -math.inf
+        """When it is sent, when the next one may be, and when the lift stops."""
+        self._led_at, self._led_again_at = math.inf, -math.inf
         self._off_left = self._led_left = self._brush_left = 0
         self._next_at = math.inf
 
@@ -46,7 +51,12 @@ class Machine:
     @property
     def wake_at(self) -> float:
         """When ``due`` has something."""
-        return min(self._next_at, self._lift_until if self.volts else math.inf)
+        return min(
+            self._next_at,
+            self._led_at,
+            self._lift_at if self._lift_line else math.inf,
+            self._lift_until if self.volts else math.inf,
+        )
 
     def set_brush(self, on: bool) -> None:
         """Until it is switched off."""
@@ -55,25 +65,26 @@ class Machine:
         self._next_at = -math.inf
 
     def lift(self, volts: float, now: float, longest_s: float) -> None:
-        """Positive lifts the wheel; 0 stops. Raises CommandRefused for NaN and infinity."""
+        """Positive lifts the wheel; 0 stops, at once. Raises CommandRefused for NaN, infinity."""
         if not math.isfinite(volts):
             raise CommandRefused("lift_cmd rejected: contains NaN or infinity; fix the sender")
         volts = max(-MOST_VOLTS, min(MOST_VOLTS, volts))
         self.volts = volts if abs(volts) >= LEAST_VOLTS else 0.0
         self._lift_line, seconds = lift_line(self.volts, longest_s)
-        self._lift_until = now + seconds if self.volts else -math.inf
-        self._next_at = -math.inf
+        self._lift_at = max(now, self._lift_again_at) if self.volts else now
+        self._lift_until = self._lift_at + seconds
 
-    def set_colour(self, red: int, green: int, blue: int) -> None:
+    def set_colour(self, red: int, green: int, blue: int, now: float) -> None:
         """Of the band."""
         self.colour = red, green, blue
         self._led_left = TIMES
-        self._next_at = -math.inf
+        self._led_at = max(now, self._led_again_at)
 
     def begin(self) -> None:
         """The front board is new: nothing of it turns, and its lights are its own."""
         self.off()
         self._led_left = TIMES if self.colour else 0
+        self._led_at = -math.inf if self.colour else math.inf
 
     def off(self) -> None:
         """Brush and lift."""
@@ -90,28 +101,39 @@ class Machine:
 
     def due(self, now: float) -> list[bytes]:
         """Lines to write now."""
-        if now < self.wake_at:
+        return [*self._lift_due(now), *self._off_due(now), *self._led_due(now)]
+
+    def _lift_due(self, now: float) -> list[bytes]:
+        if self.volts and now >= self._lift_until:
+            self.volts, self._lift_line = 0.0, b""
+            return [OFF[0]]
+        if not self._lift_line or now < self._lift_at:
+            return []
+        text, self._lift_line = self._lift_line, b""
+        self._lift_again_at = now + PACE_S
+        return [text]
+
+    def _off_due(self, now: float) -> list[bytes]:
+        if now < self._next_at:
             return []
         texts: list[bytes] = []
-        if self.volts and now >= self._lift_until:
-            self.volts = 0.0
-            texts.append(OFF[0])
-        if self._lift_line:
-            texts.append(self._lift_line)
-            self._lift_line = b""
         if self._off_left:
             self._off_left -= 1
             texts += OFF
         elif self.brush or self._brush_left:
             self._brush_left = max(0, self._brush_left - 1)
             texts.append(b"brush 1" if self.brush else b"brush 0")
-        if self._led_left and self.colour:
-            self._led_left -= 1
-            texts += [b"ledon %d" % any(self.colour), b"ledb %d %d %d" % self.colour]
-        again = self._off_left or self._brush_left or self._led_left
         rest_s = BRUSH_AGAIN_S if self.brush else math.inf
-        self._next_at = now + (BETWEEN_S if again else rest_s)
+        self._next_at = now + (BETWEEN_S if self._off_left or self._brush_left else rest_s)
         return texts
+
+    def _led_due(self, now: float) -> list[bytes]:
+        if now < self._led_at or self.colour is None:
+            return []
+        self._led_left -= 1
+        self._led_again_at = now + PACE_S
+        self._led_at = now + BETWEEN_S if self._led_left > 0 else math.inf
+        return [b"ledon %d" % any(self.colour), b"ledb %d %d %d" % self.colour]
 
 
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:

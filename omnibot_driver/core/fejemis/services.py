@@ -60,7 +60,7 @@ class Services:
     def set_led(self, red: int, green: int, blue: int, now: float) -> None:
         """Colour of the band, 0..255 each."""
         red, green, blue = (max(0, min(255, part)) for part in (red, green, blue))
-        self._upkeep.machine.set_colour(red, green, blue)
+        self._upkeep.machine.set_colour(red, green, blue, now)
 
     def ask(self, job: Job, token: object, now: float) -> None:
         """Begin a job; a JobDone answers. Raises RequestRefused."""

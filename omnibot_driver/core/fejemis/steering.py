@@ -26,10 +26,6 @@ STILL_ALIGNED_RAD: Final = math.radians(10.0)
 """A robot that turns goes on up to here."""
 GIVEN_RAD: Final = math.radians(5.0)
 """What a body may do besides while its wheel is on the way: as if it were off by this angle."""
-FOLLOWS_WITHIN_S: Final = 1.0
-"""A front wheel that gets no nearer to its angle within this time does not follow."""
-NEARER_RAD: Final = math.radians(1.0)
-FOLLOWS_RAD: Final = math.radians(12.0)
 
 
 @value(frozen=True, slots=True)
@@ -139,35 +135,3 @@ def _allowed(
     if sin:
         rolled = min(rolled, (sideways + given) / sin)
     return rolled * (cos + sin / front_m * geometry.track_m / 2)
-
-
-class Follower:
-    """Whether the front wheel goes where it is commanded to. ``fault``: it does not."""
-
-    def __init__(self) -> None:
-        self.begin()
-
-    def begin(self) -> None:
-        """Nothing is commanded."""
-        self._angle_rad: float | None = None
-        self._since, self._from_rad = math.inf, math.nan
-        self.fault = False
-
-    def aim(self, angle_rad: float) -> None:
-        """It is to stand here."""
-        self._angle_rad = angle_rad
-
-    def look(self, angle_rad: float, now: float) -> bool:
-        """It stands there. Whether this shows, for the first time, that it does not follow."""
-        if self._angle_rad is None:
-            return False
-        off_rad = self._angle_rad - angle_rad
-        if abs(off_rad) <= FOLLOWS_RAD:
-            self._since, self._from_rad, self.fault = now, angle_rad, False
-            return False
-        nearer_rad = math.copysign(1.0, off_rad) * (angle_rad - self._from_rad)
-        if math.isnan(nearer_rad) or nearer_rad > NEARER_RAD:
-            self._since, self._from_rad = now, angle_rad
-        late = now - self._since > FOLLOWS_WITHIN_S
-        first, self.fault = late and not self.fault, late
-        return first

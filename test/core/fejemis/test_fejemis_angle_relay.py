@@ -25,12 +25,12 @@ def angles(data: bytes) -> set[float]:
 
 
 def has_a_six_to_the_right(angle_deg: float) -> bool:
-    """However it is rounded by half a degree: -60° to -69°, -6.25° and -16.25° and so on."""
-    return -69.5 < angle_deg < -59.5 or (angle_deg < 0.0 and 6.0 < -angle_deg % 10 < 6.5)
+    """However it is rounded by half a degree: -60° to -69°, -6° and -16° and so on."""
+    return -69.5 < angle_deg < -59.5 or (angle_deg < 0.0 and 5.5 < -angle_deg % 10 < 6.5)
 
 
 def test_every_angle_is_told_within_half_a_degree() -> None:
-    """Most are sent to a tenth."""
+    """Most are told to a tenth."""
     off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
     assert max(off) < 0.51
     assert sum(each < 0.01 for each in off) > 0.6 * len(off)
@@ -38,30 +38,28 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """Of all angles: within 0.6°; or, of those with a 6 to the right, less than 10° left."""
+    """Of all angles; those that have a 6 to the right become less than 10° to the left."""
     across = 0
     for angle_deg in EVERY:
         text = relayed(angle_deg)
         assert robust(text), text
-        told = float(text[4:])
-        instead = list(heard_instead(text[4:].decode()))
-        if any(abs(other - told) > 0.6 for other in instead):
+        if instead := list(heard_instead(text[4:].decode())):
             across += 1
             assert has_a_six_to_the_right(angle_deg), text
             assert all(0.0 <= other < ACROSS for other in instead), text
-    assert across / len(EVERY) < 0.08
+    assert across / len(EVERY) < 0.1
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 5.5, 12.5, 35.5, 55.5, 90.0, -5.5, -30.4, -58.3])
-def test_an_angle_stays_within_a_degree_whichever_two_characters_are_lost(
+def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
     """Of the line with its sum and its end, to the most lenient reader."""
-    data = line(relayed(angle_deg), sums=True)
+    text = relayed(angle_deg)
+    data = line(text, sums=True)
     for count in (1, 2):
         for lost in itertools.combinations(range(len(data)), count):
-            for other in angles(without(data + BEHIND, lost)):
-                assert other == pytest.approx(angle_deg, abs=1.2), (data, lost)
+            assert angles(without(data + BEHIND, lost)) <= {float(text[4:])}, (data, lost)
 
 
 def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
@@ -78,11 +76,11 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
     passed = total = 0
     for _ in range(3):
         angle_deg = chance.uniform(-59.0, 90.0)
-        data = line(relayed(angle_deg), sums=True)
+        text = relayed(angle_deg)
+        data = line(text, sums=True)
         for lost in itertools.combinations(range(len(data)), 3):
             total += 1
-            heard = angles(without(data + BEHIND, lost))
-            passed += any(abs(other - angle_deg) > 1.2 for other in heard)
+            passed += not angles(without(data + BEHIND, lost)) <= {float(text[4:])}
     assert passed / total < 0.01
 
 
@@ -96,10 +94,11 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
                 assert all(abs(other) <= 90.0 for other in angles(without(text + b"\n", lost)))
 
 
-@pytest.mark.parametrize("angle_deg", [0.3, -6.25, 45.5, -64.9])
-def test_without_sums_the_mean_of_what_is_told_is_the_angle(angle_deg: float) -> None:
-    """What was rounded off is sent later."""
+@pytest.mark.parametrize("sums", [True, False])
+@pytest.mark.parametrize("angle_deg", [0.3, 5.5, 12.4, 45.5, -6.25, -64.9])
+def test_the_mean_of_what_is_told_is_the_angle(angle_deg: float, *, sums: bool) -> None:
+    """What was rounded off is told later."""
     relay = AngleRelay()
-    told = [float(relay.text(math.radians(angle_deg), sums=False)[4:]) for _ in range(200)]
+    told = [float(relay.text(math.radians(angle_deg), sums=sums)[4:]) for _ in range(200)]
     assert sum(told) / len(told) == pytest.approx(angle_deg, abs=0.01)
-    assert all(abs(each - angle_deg) < 1.0 for each in told)
+    assert all(abs(each - angle_deg) < 1.01 for each in told)

@@ -206,7 +206,8 @@ def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_t
     """It says that all is well."""
     bench = nominal()
     bench.robot.befall("front", "sensor-frozen")
-    bench.drive_on(0.0, 0.5, 2.0)
+    with pytest.raises(CommandRefused, match="front wheel did not go where"):
+        bench.drive_on(0.0, 0.5, 2.0)
     assert any("does not go where it is commanded" in text for text in bench.notices)
     assert bench.robot.standing
 

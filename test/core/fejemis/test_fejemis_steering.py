@@ -13,7 +13,6 @@ from omnibot_driver.core.fejemis.motion_lines import drive_line, front_line
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.steering import (
     ALIGNED_RAD,
-    Follower,
     Geometry,
     outer_mps,
     scale,
@@ -193,51 +192,6 @@ def test_a_mirrored_reverse_is_driven() -> None:
     truth = bench.robot.truth
     assert (truth.speed_mps, truth.yaw_rate_radps) == pytest.approx((-0.2, 0.3), abs=0.01)
     assert not bench.notices
-
-
-@pytest.mark.parametrize("w", [0.0, 0.3])
-def test_a_clamped_reverse_is_stopped(w: float) -> None:
-    """The wheel goes across instead; the robot rolls some centimetres at the most."""
-    bench = nominal(
-        Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)
-    )
-    bench.drive_on(-0.2, w, 3.0)
-    bench.run(1.0)
-    assert bench.robot.standing
-    assert math.hypot(bench.robot.truth.x_m, bench.robot.truth.y_m) < 0.06
-    assert any("allow_reverse" in text for text in bench.notices)
-
-
-def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
-    """One that comes nearer, however slowly, follows."""
-    follower = Follower()
-    follower.aim(1.5)
-    assert not any(follower.look(0.015 * n, 0.015 * n) for n in range(100))
-    follower.begin()
-    follower.aim(1.5)
-    assert sum(follower.look(0.0, 0.015 * n) for n in range(200)) == 1
-    assert follower.fault
-    follower.look(1.45, 3.1)
-    assert not follower.fault
-
-
-def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
-    """It had come near to its angle, and is far from the new one."""
-    follower = Follower()
-    follower.aim(1.5)
-    assert not any(follower.look(0.02 * n, 0.015 * n) for n in range(60))
-    follower.aim(-1.5)
-    assert not any(follower.look(1.2 - 0.02 * n, 0.9 + 0.015 * n) for n in range(130))
-
-
-def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_time() -> None:
-    """From one side to the other."""
-    follower = Follower()
-    seen = 0
-    for n in range(200):
-        follower.aim(1.5 if n % 3 else 0.9)
-        seen += follower.look(0.0, 0.015 * n)
-    assert seen == 1
 
 
 def test_a_speed_of_nothing_that_is_negative_is_none() -> None:

@@ -9,6 +9,7 @@ import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.fejemis.machine import Machine
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
@@ -127,6 +128,45 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
     assert 0.0 < float(said[-1].split()[2]) <= 0.2
     with pytest.raises(CommandRefused, match="NaN"):
         lift_it(bench, math.nan)
+
+
+def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
+    """Twenty lines a second; to stop never waits, and brings no more of the brush."""
+    machine = Machine()
+    machine.set_brush(True)
+    said: list[tuple[float, bytes]] = []
+    for n in range(1000):
+        now = 0.001 * n
+        machine.lift(7.0 + 0.001 * n, now, 0.5)
+        machine.set_colour(n % 256, 0, 0, now)
+        said += [(now, text) for text in machine.due(now)]
+    lifts = [text for _, text in said if text.startswith(b"motv")]
+    assert len(lifts) == pytest.approx(20, abs=1)
+    assert float(lifts[-1].split()[1]) == pytest.approx(7.9, abs=0.1)
+    assert sum(text.startswith(b"ledb") for _, text in said) == pytest.approx(20, abs=1)
+    assert sum(text == b"brush 1" for _, text in said) <= 4
+    machine.lift(0.0, 1.0, 0.5)
+    assert b"motv 0 0" in machine.due(1.0)
+    assert not any(text.startswith(b"motv") for text in machine.due(1.06))
+
+
+def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
+    """It is counted from when it is sent; what comes in between ends it."""
+    machine = Machine()
+    machine.lift(3.0, 0.0, 0.5)
+    machine.due(0.0)
+    machine.lift(6.0, 0.01, 0.5)
+    assert machine.due(0.01) == []
+    assert machine.wake_at == 0.05
+    assert machine.due(0.05)[0].startswith(b"motv 6")
+    assert machine.volts == 6.0
+    assert machine.due(0.549) == [b"motv 0 0"]
+    machine.lift(3.0, 1.0, 0.5)
+    machine.due(1.0)
+    machine.lift(6.0, 1.01, 0.5)
+    machine.off()
+    assert machine.due(1.02) == [b"motv 0 0", b"brush 0"]
+    assert not any(text.startswith(b"motv 6") for text in machine.due(1.06))
 
 
 ENDS: dict[str, Callable[[Bench], object]] = {

@@ -1,0 +1,113 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A front wheel that does not go where it is commanded."""
+
+import contextlib
+import math
+
+import pytest
+from fejemis_bench import Bench, nominal
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.fejemis.follower import UNTIL_IT_MOVES, UNTIL_START, Follower
+from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.requests import Request
+from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
+from omnibot_driver.simulator.fejemis import Firmware
+
+TICK_S = 0.015
+
+
+def blocked(follower: Follower, since: float, angle_rad: float = 0.0) -> float:
+    """The wheel stands here while it is commanded to 1.5 rad; returns when that shows."""
+    follower.aim(1.5)
+    for n in range(200):
+        if follower.look(angle_rad, since + TICK_S * n):
+            return since + TICK_S * n
+    raise AssertionError("not noticed")
+
+
+def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
+    """One that comes nearer, however slowly, follows."""
+    follower = Follower()
+    follower.aim(1.5)
+    assert not any(follower.look(0.015 * n, TICK_S * n) for n in range(100))
+    follower.begin()
+    follower.aim(1.5)
+    assert sum(follower.look(0.0, TICK_S * n) for n in range(200)) == 1
+
+
+def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
+    """It had come near to its angle, and is far from the new one."""
+    follower = Follower()
+    follower.aim(1.5)
+    assert not any(follower.look(0.02 * n, TICK_S * n) for n in range(60))
+    follower.aim(-1.5)
+    assert not any(follower.look(1.2 - 0.02 * n, 0.9 + TICK_S * n) for n in range(130))
+
+
+def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_time() -> None:
+    """From one side to the other."""
+    follower = Follower()
+    seen = 0
+    for n in range(200):
+        follower.aim(1.5 if n % 3 else 0.9)
+        seen += follower.look(0.0, TICK_S * n)
+    assert seen == 1
+
+
+def test_motion_is_refused_until_the_wheel_has_moved() -> None:
+    """A sender that goes on would else move the robot for a second, again and again."""
+    follower = Follower()
+    at = blocked(follower, 0.0)
+    assert follower.refusal == UNTIL_IT_MOVES
+    follower.begin()
+    follower.look(math.radians(2.0), at + 1.0)
+    assert follower.refusal
+    follower.look(math.radians(4.0), at + 1.1)
+    assert not follower.refusal
+
+
+def test_after_a_second_fault_within_a_minute_only_a_start_helps() -> None:
+    """Later it is a first one again."""
+    follower = Follower()
+    at = blocked(follower, 0.0)
+    follower.look(1.0, at + 1.0)
+    at = blocked(follower, at + 2.0)
+    assert follower.refusal == UNTIL_START
+    follower.look(1.0, at + 1.0)
+    assert follower.refusal == UNTIL_START
+    follower.start()
+    assert not follower.refusal
+    at = blocked(follower, at + 2.0)
+    assert follower.refusal == UNTIL_IT_MOVES
+    follower.look(1.0, at + 1.0)
+    blocked(follower, at + 70.0)
+    assert follower.refusal == UNTIL_IT_MOVES
+
+
+def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> None:
+    """A sender that goes on."""
+    for _ in range(round(seconds / 0.1)):
+        with contextlib.suppress(CommandRefused):
+            bench.drive(v, w)
+        bench.run(0.1)
+
+
+@pytest.mark.parametrize("w", [0.0, 0.3])
+def test_a_clamped_reverse_is_stopped(w: float) -> None:
+    """The wheel goes across instead; the robot rolls some centimetres at the most, twice."""
+    bench = nominal(
+        Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)
+    )
+    drive_whatever_is_said(bench, -0.2, w, 6.0)
+    bench.run(1.0)
+    assert bench.robot.standing
+    assert math.hypot(bench.robot.truth.x_m, bench.robot.truth.y_m) < 0.12
+    assert any("allow_reverse" in text for text in bench.notices)
+    with pytest.raises(CommandRefused, match="second time within a minute"):
+        bench.drive(-0.2, w)
+    assert bench.ask(Request.START).success
+    bench.run(0.5)
+    bench.drive_on(0.3)
+    assert not bench.robot.standing
