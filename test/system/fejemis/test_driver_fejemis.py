@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -22,7 +22,6 @@ from std_srvs.srv import SetBool, Trigger
 from two_ports import TwoPorts
 
 Start = Callable[..., Any]
-NODE: Final = "omnibot_driver"
 
 
 def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> None:

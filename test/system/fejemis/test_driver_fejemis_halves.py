@@ -5,7 +5,7 @@
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import pytest
 from driver_process import Driver
@@ -17,7 +17,6 @@ from two_ports import DRIVE, FRONT, TwoPorts
 from omnibot_driver.simulator.fejemis import Firmware
 
 Start = Callable[..., Any]
-NODE: Final = "omnibot_driver"
 
 
 @pytest.mark.parametrize(("channel", "name"), [(DRIVE, "drive"), (FRONT, "front")])
