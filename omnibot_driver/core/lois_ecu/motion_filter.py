@@ -15,6 +15,7 @@ import math
 from typing import Final
 
 from omnibot_driver.core.lois_ecu.filter_history import FilterHistory
+from omnibot_driver.core.lois_ecu.filter_variances import pose_covariance, twist_variances
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
 from omnibot_driver.core.lois_ecu.wheel_motion import (
     ALONG,
@@ -58,7 +59,9 @@ class MotionFilter:
     one.
 
     signed: ticks count both ways, always. holds: a wheel that stands keeps its measured speed.
-    reverse_gain: speed over target, backwards.
+    reverse_gain: speed over target, backwards. unsettled_s: a wheel that is halted soon after a
+    change of its set-point rolled at another speed than the model says, perhaps in the other
+    direction: its way is off by this time that change.
     """
 
     def __init__(self) -> None:
@@ -66,6 +69,7 @@ class MotionFilter:
         self.wheels = (Wheel(0), Wheel(PER_WHEEL))
         self.tick_m = self.rpm_mps = self.track_m = self.turn_sign = 1.0
         self.reverse_gain = 1.0
+        self.unsettled_s = 0.0
         self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
@@ -100,23 +104,11 @@ class MotionFilter:
 
     def pose_covariance(self) -> Covariance:
         """Of x, y and yaw."""
-        matrix, turn = self.filter.covariance, self.turn_sign / self.track_m
-        left, right = WAY, PER_WHEEL + WAY
-        return Covariance(
-            matrix[X][X],
-            matrix[X][Y],
-            turn * (matrix[X][right] - matrix[X][left]),
-            matrix[Y][Y],
-            turn * (matrix[Y][right] - matrix[Y][left]),
-            turn * turn * (matrix[left][left] + matrix[right][right] - 2 * matrix[left][right]),
-        )
+        return pose_covariance(self.filter, self.turn_sign / self.track_m)
 
     def twist_variances(self) -> tuple[float, float]:
         """Of the speed in (m/s)² and the turning in (rad/s)²."""
-        left, right, estimate = SPEED, PER_WHEEL + SPEED, self.filter
-        speed = estimate.variance_of([(left, 0.5), (right, 0.5)])
-        turning = estimate.variance_of([(left, -1 / self.track_m), (right, 1 / self.track_m)])
-        return 1e-4 + speed, 1e-3 + turning
+        return twist_variances(self.filter, self.track_m)
 
     @property
     def resting(self) -> bool:
@@ -167,12 +159,16 @@ class MotionFilter:
 
     def doubt(self, index: int, stddev_m: float) -> None:
         """The way of this wheel may be off by this, and all that follows from it."""
+        self.filter.disturb(self._doubted(index), stddev_m**2)
+
+    def _doubted(self, index: int) -> Terms:
+        """What depends on a way of this wheel that was not measured."""
         wheel, base = self.wheels[index], PER_WHEEL * index
         terms = [*self._way_terms(index), (base + SPEED, 2.0)]
         counts = wheel.counts(self.speed_mps(index), signed=self.signed)
         if not counts and wheel.course.measured_sign:
             terms += [(TURN, 2.0 * index - 1), (ALONG, 0.5)]
-        self.filter.disturb(terms, stddev_m**2)
+        return terms
 
     def _way_terms(self, index: int) -> Terms:
         """What a way of this wheel changes."""
@@ -185,16 +181,21 @@ class MotionFilter:
 
     def _take_effect(self, now: float) -> None:
         for index, wheel in enumerate(self.wheels):
-            before = self._way_terms(index)
+            if wheel.course.next_change_s() > now:
+                continue
+            before, doubted = self._way_terms(index), self._doubted(index)
             cleared, changed = wheel.course.carry_out(now)
             if not (cleared or changed):
                 continue
             speed = self.speed_mps(index)
             if cleared:
+                if self.holds and not self.signed:
+                    self.filter.disturb(doubted, (self.unsettled_s * wheel.unsettled_mps) ** 2)
                 self.filter.forget(wheel.base + HELD, 0.0, 0.0)
                 wheel.begin_anew(speed)
             step = abs(wheel.course.target_mps - speed)
             wheel.restless_mps = max(wheel.restless_mps, step)
+            wheel.unsettled_mps = step if changed and wheel.course.target_mps else 0.0
             late_m = LATE_PART * wheel.course.step_s * speed
             self.filter.disturb(max(before, self._way_terms(index), key=len), late_m**2)
         kinds = (self.wheels[0].course.kind, self.wheels[1].course.kind)

@@ -18,12 +18,13 @@ from omnibot_driver.core.lois_ecu.board_odometry import OdometryReader, Told
 from omnibot_driver.core.lois_ecu.comparison import Comparison
 from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry, Source
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Stream, Ticks
+from omnibot_driver.core.lois_ecu.misconfiguration import own_gains
 from omnibot_driver.core.lois_ecu.motion_filter import LONGEST_STEP_S, MotionFilter
 from omnibot_driver.core.lois_ecu.plausibility import wrapped
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.size_errors import LoisOdometrySettings, SizeErrors
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
-from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, WAY, X, Y
+from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, UNSETTLED_S, WAY, X, Y
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, Uncertainty
 
 __all__ = ["FusedOdometry", "LoisOdometry", "LoisOdometrySettings", "Source"]
@@ -74,6 +75,7 @@ class LoisOdometry:
         self._unheard_s = max(UNHEARD_S, UNHEARD_GROUPS * period_s)
         motion.tick_m, motion.rpm_mps = settings.tick_m, settings.rim_mps_per_rpm
         motion.track_m = settings.track_m
+        motion.unsettled_s = UNSETTLED_S[bool(own_gains(settings))]
         motion.turn_sign = -1.0 if settings.inverted else 1.0
         motion.yaw0_rad += yaw_rad - motion.yaw_rad
         self._board = OdometryReader(settings.track_m, settings.rim_mps_per_rpm)

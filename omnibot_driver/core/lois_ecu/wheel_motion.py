@@ -39,6 +39,8 @@ COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """After a change of sign no wheel goes on for longer in the old direction."""
+UNSETTLED_S: Final = (0.06, 0.27)
+"""With gains that are set, and with the board's own: with the public firmware's a wheel swings."""
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
 
@@ -75,6 +77,8 @@ class Wheel:
         self.course = WheelModel(self.course.step_s)
         self.restless_mps = 0.0
         """Size of the last changes of speed, fading."""
+        self.unsettled_mps = 0.0
+        """The same of the last set-point alone, until the wheel is halted."""
         self.wound_m = 0.0
         """What it lacked of its way since its controller began anew."""
         self.cut = False
@@ -133,7 +137,9 @@ class Wheel:
         elif way or target_mps:
             self.blind = True
         self.rolls_on_s = max(self.rolls_on_s - dt, 0.0)
-        self.restless_mps *= math.exp(-dt / SETTLING_S)
+        faded = math.exp(-dt / SETTLING_S)
+        self.unsettled_mps *= faded
+        self.restless_mps *= faded
         if self.restless_mps < FADED_MPS:
             self.restless_mps = 0.0
 

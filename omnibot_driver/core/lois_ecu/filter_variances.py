@@ -1,0 +1,29 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""How well the motion filter knows the body's pose and velocity. Knows its states, no motion."""
+
+from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
+from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, SPEED, WAY, X, Y
+from omnibot_driver.core.odometry.covariance import Covariance
+
+
+def pose_covariance(motion: SparseFilter, turn: float) -> Covariance:
+    """Of x, y and yaw; ``turn``: rad for each m that the right wheel rolls further."""
+    matrix = motion.covariance
+    left, right = WAY, PER_WHEEL + WAY
+    return Covariance(
+        matrix[X][X],
+        matrix[X][Y],
+        turn * (matrix[X][right] - matrix[X][left]),
+        matrix[Y][Y],
+        turn * (matrix[Y][right] - matrix[Y][left]),
+        turn * turn * (matrix[left][left] + matrix[right][right] - 2 * matrix[left][right]),
+    )
+
+
+def twist_variances(motion: SparseFilter, track_m: float) -> tuple[float, float]:
+    """Of the speed in (m/s)² and the turning in (rad/s)²."""
+    left, right = SPEED, PER_WHEEL + SPEED
+    speed = motion.variance_of([(left, 0.5), (right, 0.5)])
+    turning = motion.variance_of([(left, -1 / track_m), (right, 1 / track_m)])
+    return 1e-4 + speed, 1e-3 + turning

@@ -1,0 +1,39 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Set-points that change their sign soon after each other, of which the board tells little."""
+
+import pytest
+from lois_drives import HOST_GAINS
+
+from omnibot_driver.core.lois_ecu import BoardOdometry, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+
+def variance(settings: LoisEcuSettings, holds_s: float) -> float:
+    """Of the yaw, after three changes of sign, each set-point holding for this time."""
+    odometry = LoisOdometry(settings)
+    group = BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
+    now, rpm, turned_s = 0.0, 20, 1.0
+    for step in range(round((3 * holds_s + 1.0) / 0.2)):
+        now = 0.2 * step
+        odometry.heard_ticks(Ticks(200 * step, 0, 0), now)
+        if step < 4:
+            odometry.heard_odometry(group, now + 0.01)
+        if now >= turned_s:
+            rpm, turned_s = -rpm, turned_s + holds_s
+            odometry.wrote(SetRpm(rpm, rpm), now)
+    told = odometry.predict(now)
+    assert told is not None
+    return told.covariance.yaw_yaw
+
+
+def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own_gains() -> None:
+    """With those of the public firmware a wheel swings."""
+    assert variance(LoisEcuSettings(), 0.6) > 1.5 * variance(HOST_GAINS, 0.6)
+
+
+def test_a_wheel_that_has_settled_is_not_doubted() -> None:
+    """What it did before the sign changed is known."""
+    own, host = variance(LoisEcuSettings(), 15.0), variance(HOST_GAINS, 15.0)
+    assert own == pytest.approx(host, rel=0.02)
