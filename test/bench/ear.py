@@ -15,6 +15,7 @@ from functools import partial
 
 import rclpy
 from nav_msgs.msg import Odometry
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState
@@ -40,7 +41,7 @@ def main() -> None:
         node.create_subscription(JointState, f"{namespace}/joint_states", lambda _joints: None, 100)
     threading.Thread(target=lambda: (sys.stdin.read(), rclpy.shutdown()), daemon=True).start()
     print("listening", flush=True)
-    with suppress(ExternalShutdownException):
+    with suppress(ExternalShutdownException, RCLError):  # shut down while it waits, or works
         rclpy.spin(node)
     print(json.dumps({"heard": heard, "odometries": odometries}), flush=True)
 

@@ -26,7 +26,7 @@ from steps import STEPS
 
 WINDOW_S = 6.0
 COMMANDS_S = 3.0
-SETTLING_S = 5.0
+SETTLING_S = 8.0
 GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "pieces of 1 to 16 bytes": (1.0, 1.0, 1.0, 1.0),
     "1 ms timer": (None, None, None, None),
@@ -69,7 +69,10 @@ def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
             *zip(*values, strict=True),
             goal=goal,
         )
-        for name, goal, of in (("median", median_goal, median), ("99th percentile", p99_goal, _p99))
+        for name, goal, of in (
+            ("median", median_goal, _median),
+            ("99th percentile", p99_goal, _p99),
+        )
         if (values := [[of(each) for each in window] for window in windowed])
     ]
     spent = [
@@ -94,7 +97,7 @@ def memory() -> list[str]:
         stack.enter_context(ear("ours"))
         ours = stack.enter_context(driver(stage.paths[0], "ours"))
         bare = stack.enter_context(floor("bare", stage.paths[1], "floor"))
-        time.sleep(2 * SETTLING_S)
+        time.sleep(SETTLING_S)
         (guard,) = ours.children
         mine, its, least = (memory_mb(pid) for pid in (ours.process.pid, guard, bare.process.pid))
     rows = ["| process | resident | proportional | to the bare node |", "|---|---|---|---|"]
@@ -116,7 +119,7 @@ def steps(windows: int) -> list[str]:
             *(stack.enter_context(step(each, paths[each], each)) for each in STEPS),
             stack.enter_context(driver(paths["ours"], "ours")),
         ]
-        time.sleep(2 * SETTLING_S)
+        time.sleep(SETTLING_S)
         marks, busy = [time.monotonic()], [[program.busy_s for program in programs]]
         for _ in range(windows):
             time.sleep(WINDOW_S)
@@ -126,7 +129,7 @@ def steps(windows: int) -> list[str]:
     units = (1.0, *(MPS2_PER_COUNT,) * (len(names) - 1))
     late = [_latencies(*each) for each in zip(stage.said, heard, units, strict=True)]
     least = [
-        [median(us for at, us in each if start <= at < end) for each in late]
+        [_median([us for at, us in each if start <= at < end]) for each in late]
         for start, end in pairwise(marks)
     ]
     spent = [[b - a for a, b in zip(*pair, strict=True)] for pair in pairwise(busy)]
@@ -273,6 +276,10 @@ def _command_latencies(
                 found.append(1e6 * (arrived - at))
                 break
     return found
+
+
+def _median(values: Sequence[float]) -> float:
+    return median(values) if values else math.nan
 
 
 def _p99(values: Sequence[float]) -> float:
