@@ -92,7 +92,7 @@ class FejemisBoard(Board):
     def front_angle_rad(self) -> float | None:
         """Where the front wheel stands; None where that is not known well enough to drive."""
         front = self._translation.front
-        return front.angle_rad if front.known(self._now) else None
+        return front.drives_by_rad if front.known(self._now) else None
 
     @property
     def with_sums(self) -> bool:

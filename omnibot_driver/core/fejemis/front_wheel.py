@@ -65,6 +65,14 @@ class FrontWheel:
         """When the angle is too old, unless another comes."""
         return self.heard_at + OLDEST_S + 1e-6
 
+    @property
+    def drives_by_rad(self) -> float:
+        """What the drive board is to compute with: it allows 90° to either side.
+
+        Beyond, by the manual's equations, its inner wheel would be faster than the outer one.
+        """
+        return max(-math.pi / 2, min(math.pi / 2, self.angle_rad))
+
     def known(self, now: float) -> bool:
         """Whether the angle is known, and new enough to drive by."""
         return not self.fault and now - self.heard_at <= OLDEST_S

@@ -129,7 +129,7 @@ class Inbound:
         front = self._translation.front
         if not front.hear(message, now):
             return
-        self.relay_rad = front.angle_rad
+        self.relay_rad = front.drives_by_rad
         self._translation.steering(front.angle_rad, now)
         if self._angle_told(front.angle_rad, now):
             self._told.halt(

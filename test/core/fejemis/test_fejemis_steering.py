@@ -5,7 +5,7 @@
 import math
 
 import pytest
-from fejemis_bench import nominal
+from fejemis_bench import DRIVE, nominal
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -172,6 +172,22 @@ def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> 
     assert bench.robot.truth.yaw_rate_radps == pytest.approx(-1.0, abs=0.03)
     assert abs(bench.robot.truth.x_m - before_m) < 0.03
     assert not bench.notices
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int) -> None:
+    """Told of 95°, the drive board would turn its inner wheel at 1.45 times the outer one."""
+    bench = nominal()
+    angles_deg = [60.0]
+    bench.robot.front._items["fwl"] = lambda: f"fwl {side * angles_deg[-1]:.2f} 0x0 0x3c2"
+    for angle_deg in (60.0, 85.0, 95.0):
+        angles_deg.append(angle_deg)
+        bench.run(0.1)
+    bench.drive_on(0.0, side * 0.5, 1.0)
+    last = [float(text[4:]) for text in bench.lines(DRIVE) if text.startswith("fwl")][-20:]
+    assert last == [side * 90.0] * 20
+    assert abs(bench.robot.truth.yaw_rate_radps) < 0.51
+    assert not bench.robot.standing
 
 
 def test_reverse_is_off_until_it_is_allowed() -> None:
