@@ -55,6 +55,13 @@ def test_the_first_pose_must_be_confirmed_too() -> None:
     assert odometry.refused_poses == 1
 
 
+def test_a_board_that_was_paused_is_no_doubt_where_the_odometry_begins() -> None:
+    """The time of its first displacement is unknown, but there is nothing yet that it can spoil."""
+    odometry, trip = Odometry(SETTINGS), Trip(1.0)
+    odometry.displace(replace(trip.move(0.0, 0.0, 0.0), duration_s=None), 0.0)
+    assert attach(odometry, trip.pose)[-1].covariance == Covariance()
+
+
 def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
     """The next one was lost; after a second it is taken for true."""
     odometry = Odometry(SETTINGS)

@@ -269,8 +269,10 @@ class Odometry:
         bridge, tangent = self._bridge.tangents(reading, heading_rad)
         seconds = reading.duration_s
         if seconds is None:
-            self._track.miss(UNKNOWN_S)
-            seconds = max(0.0, stamp_s - (stamp_s if last_stamp_s is None else last_stamp_s))
+            seconds = 0.0
+            if last_stamp_s is not None:  # else the odometry begins here, and has missed nothing
+                self._track.miss(UNKNOWN_S)
+                seconds = max(0.0, stamp_s - last_stamp_s)
         elif reading.lost:
             self._track.miss((reading.lost + 1) * seconds)
         if reading.lost:
