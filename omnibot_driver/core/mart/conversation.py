@@ -197,6 +197,8 @@ class Conversation:
         """Whether another query was answered so just now, and this one was not before: the reply
         has come twice, and its own is still to come.
         """
+        if word.kind is not Kind.QUERY:
+            return False  # RMCS tells the angle that RMRA has just told
         before, _ = self._answers.get(word, (reply, now))
         return reply != before and self._has_come(reply, now, but=word, kind=Kind.QUERY)
 

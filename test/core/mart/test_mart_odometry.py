@@ -148,6 +148,14 @@ def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> No
         asked(talk, words.ENC, b"ok 0", 1.05 + 0.1 * n, 0.01)
 
 
+def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> None:
+    """RMCS reports what RMRA has reported."""
+    talk = Conversation(0.3)
+    asked(talk, words.RMCS, b"ok 1.00", 0.5, 0.01)
+    asked(talk, words.RMRA, b"ok 2.00", 1.0, 0.01)
+    asked(talk, words.RMCS, b"ok 2.00", 1.02, 0.01)
+
+
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
     """That one may still come."""
     talk = Conversation(0.3)
