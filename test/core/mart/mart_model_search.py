@@ -2,7 +2,7 @@
 
 """Every world of ``mart_model`` that can be reached, and what must not be in any.
 
-``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3``: with so many copies on
+``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3``, with 3 copies on
 their way; docs/boards/mart.md has the figures.
 """
 

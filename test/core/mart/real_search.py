@@ -41,7 +41,7 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
 MOST_DATAGRAMS: Final = 7
 """Each way, for each wish, without the polls; what follows is an e-stop that is repeated."""
 PROOF_S: Final = 0.25
-"""A motion that begins this long after the death of the IMU was not proved."""
+"""A motion that begins later than this after the death of the IMU was not proved."""
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """What starts the motors without a look at the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")

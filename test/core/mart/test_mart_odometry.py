@@ -129,7 +129,7 @@ def asked(talk: Conversation, word: Word, reply: bytes, at_s: float, took_s: flo
 
 
 def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
-    """A count came twice: its copy is not a range, and the range is not the next count."""
+    """A count came twice: its copy is not the range, and the range is not the next count."""
     talk = Conversation(0.3)
     asked(talk, words.SFC, b"ok 141", 0.5, 0.06)
     asked(talk, words.ENC, b"ok 1792", 1.0, 0.01)
