@@ -86,7 +86,7 @@ def most_calls(
     return {length: sum(each) / len(each) for length, each in counted.items()}
 
 
-@pytest.mark.parametrize(("kind", "bound"), [(IMU, 12), (DELTA, 8), (POSE, 8)])
+@pytest.mark.parametrize(("kind", "bound"), [(IMU, 14), (DELTA, 9), (POSE, 9)])
 def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     """One read of one tick."""
     assert most_calls(FrameDecoder().feed)[kind] <= bound

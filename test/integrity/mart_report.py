@@ -21,9 +21,9 @@ from typing import Final
 TEST: Final = Path(__file__).parents[1]
 sys.path[:0] = [str(TEST), str(TEST / "core"), str(TEST / "core" / "mart")]
 
-from campaign import FIRMWARES, TWISTS  # noqa: E402
 from honesty import nees  # noqa: E402
 from mart_bench import MartBench  # noqa: E402
+from mart_campaign import FIRMWARES, TWISTS  # noqa: E402
 
 from omnibot_driver.core.mart.readings import (  # noqa: E402
     BatteryReading,

@@ -2,13 +2,13 @@
 
 """The angle of the front wheel as a line for the drive board, in digits that damage cannot change.
 
-Two lost characters whose codes add up to 99 change no sum, wherever they stand. So an angle is told
+Two lost characters whose codes add up to 99 change no sum, wherever they stand. So an angle is sent
 in digits without such a pair, and rounded for that by half a degree at most; what is rounded off is
-told with the next angles, so the mean is right. To the right some angles have a ``6`` that no
+sent with the next angles, so the mean is right. To the right some angles have a ``6`` that no
 rounding avoids: their minus sign and that ``6`` can be lost unseen, which leaves less than 10° to
 the left.
 
-Without sums any character can be lost unseen. Then whole degrees are told, of which any loss leaves
+Without sums any character can be lost unseen. Then whole degrees are sent, of which any loss leaves
 a smaller number: beyond 90° the board would compute an inner wheel faster than the outer one.
 Knows no sums but their modulus.
 """

@@ -125,6 +125,9 @@ class Monitor(App[None]):
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             loop.add_signal_handler(number, self.exit)
+        # Within a write, Textual's handler would wait for that write to end.
+        if callable(leave := signal.getsignal(signal.SIGTSTP)):
+            loop.add_signal_handler(signal.SIGTSTP, leave, signal.SIGTSTP, None)
         loop.add_signal_handler(signal.SIGCONT, self._come_back)
         self.set_interval(REFRESH_S, self.refresh_view)
         self.refresh_view()

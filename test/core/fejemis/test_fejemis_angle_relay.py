@@ -30,7 +30,7 @@ def has_a_six_to_the_right(angle_deg: float) -> bool:
 
 
 def test_every_angle_is_told_within_half_a_degree() -> None:
-    """Most are told to a tenth."""
+    """Most are sent to a tenth."""
     off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
     assert max(off) < 0.51
     assert sum(each < 0.01 for each in off) > 0.6 * len(off)
@@ -97,7 +97,7 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 @pytest.mark.parametrize("sums", [True, False])
 @pytest.mark.parametrize("angle_deg", [0.3, 5.5, 12.4, 45.5, -6.25, -64.9])
 def test_the_mean_of_what_is_told_is_the_angle(angle_deg: float, *, sums: bool) -> None:
-    """What was rounded off is told later."""
+    """What was rounded off is sent later."""
     relay = AngleRelay()
     told = [float(relay.text(math.radians(angle_deg), sums=sums)[4:]) for _ in range(200)]
     assert sum(told) / len(told) == pytest.approx(angle_deg, abs=0.01)

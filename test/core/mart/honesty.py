@@ -14,8 +14,8 @@ from random import Random
 from statistics import mean, median
 
 import numpy as np
-from campaign import FIRMWARES, TWISTS
 from mart_bench import MartBench
+from mart_campaign import FIRMWARES, TWISTS
 
 from omnibot_driver.simulator.common.network import NetworkFaults
 

@@ -3,8 +3,8 @@
 """A dead IMU, an obstacle, a motor that is stuck, a server that fails: no motion goes on."""
 
 import pytest
-from campaign import FIRMWARES
 from mart_bench import MartBench
+from mart_campaign import FIRMWARES
 
 from omnibot_driver.simulator.mart import Firmware, Kind
 

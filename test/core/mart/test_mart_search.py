@@ -86,7 +86,7 @@ def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
         return "sweeps", world._replace(driver=model.Driver(State.STOPPING))
 
     monkeypatch.setattr(model, "_asked", sweeps)
-    assert search().bad[-1] == "the command port hangs"
+    assert "hang" in search().bad[-1]
 
 
 class Desk:

@@ -3,8 +3,8 @@
 """Whatever moves the simulated controller is stopped, on any network, and by whom it may be."""
 
 import pytest
-from campaign import FIRMWARES
 from mart_bench import MartBench
+from mart_campaign import FIRMWARES
 
 from omnibot_driver.core.mart import State
 from omnibot_driver.simulator.common.network import NetworkFaults

@@ -2,7 +2,7 @@
 
 """Random drives on networks of all kinds, in simulated time: does the robot stand in the end?
 
-``PYTHONPATH=.:test:test/core python test/core/mart/campaign.py 60``: that many drives for each
+``PYTHONPATH=.:test:test/core python test/core/mart/mart_campaign.py 60``: that many drives for each
 network; docs/boards/mart.md has the figures.
 """
 
