@@ -124,6 +124,7 @@ class Campaign(Outcome):
                 rig.expect_obeys_again()
         except Exception as error:  # whatever it is, the others are tried nevertheless
             rig.findings.expect(False, f"{row.name}: {error!r}")
+            rig.line.heal()  # judged: the next case has a line of its own
         row.tried += 1
         rig.findings.stood_after_s.clear()
         complaints = [f"{row.name}: {complaint}" for complaint in rig.findings.take()]

@@ -40,8 +40,11 @@ TRAITS: Final = Traits(
     slack_mps=0.15,
     slack_radps=0.6,
 )
-EXPECTED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
-"""Nothing is heard, and nothing can be: the server is busy with its last command."""
+HEARD: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
+"""The server lives, and nothing was measured: it is busy with its last command, or its replies tell
+nothing that is believed."""
+UNREAD_S: Final = 0.5
+"""A robot that drives is measured more often."""
 EXPECTED_EVERY_S: Final = 0.2
 
 
@@ -53,7 +56,7 @@ class MartBoard(Board):
     def __init__(self, settings: MartSettings) -> None:
         self._pilot = Pilot(settings)
         self._mode = Mode.UNKNOWN
-        self._told_s = self._expected_s = -math.inf
+        self._told_s = self._expected_s = self._read_s = -math.inf
 
     @property
     def settings(self) -> MartSettings:
@@ -106,9 +109,15 @@ class MartBoard(Board):
         """What a datagram tells."""
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
+        readings = self._pilot.take()
         if self._pilot.ready:
             self._mode = Mode.NOMINAL
-        return self._pilot.take()
+            unread = not readings and now >= self._read_s + UNREAD_S
+            if unread and self._pilot.heard_s == now:
+                readings.append(HEARD)
+        if readings:
+            self._read_s = now
+        return readings
 
     def silence(self) -> None:
         """The server has not answered for long: it may have been started again."""
@@ -127,7 +136,7 @@ class MartBoard(Board):
             readings.append(pilot.told(now))
         if pilot.busy(now) and now >= self._expected_s + EXPECTED_EVERY_S:
             self._expected_s = now
-            readings.append(EXPECTED)
+            readings.append(HEARD)
         return readings
 
     def reset_odometry(self) -> None:

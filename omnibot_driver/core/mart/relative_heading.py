@@ -62,7 +62,7 @@ class RelativeHeading:
         before_rad, before_s, at_s = self._angle_rad, self.told_s, when.at_s
         if before_rad is None:
             old = abs(angle_rad - self._before_rad) < OLD_RAD < abs(self._before_rad)
-            if not old:  # else of before RM
+            if not old or when.from_s >= stood_s:  # else of before RM, which may have been lost
                 self._take(angle_rad, when)
                 self.from_s = when.from_s
             return False

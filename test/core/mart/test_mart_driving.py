@@ -102,6 +102,28 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
         assert at_s - ended_s < 0.2 + 0.05 + 0.05
 
 
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
+    """The relative heading is that of the motion before, then: it was not set to zero."""
+    bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
+    bench.command(0.3, 0.4, 3.0)
+    bench.run(2.0)
+    inner, starts = bench.robot.receive, 0
+
+    def receive(data: bytes, now: float, channel: int) -> None:
+        nonlocal starts
+        starts += data.startswith(b"RM ")
+        if not (data.startswith(b"RM ") and starts == 1):
+            inner(data, now, channel)
+
+    bench.robot.receive = receive  # type: ignore[method-assign]
+    bench.command(0.3, 0.0, 6.0)
+    assert starts == 2
+    assert not bench.robot.stands
+    assert bench.error.way_m < 0.05
+    assert abs(bench.error.yaw_rad) < 0.05
+
+
 def test_a_goal_and_a_job_show_how_far_they_are() -> None:
     """In /diagnostics."""
     bench = MartBench().ready()
