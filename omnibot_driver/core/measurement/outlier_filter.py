@@ -43,6 +43,8 @@ STILL: Final = 0.08
 """Part of a leap by which the sensor's other words may move, and all of them when it is over."""
 END_OF_SCALE: Final = 0.99996
 """Part of full scale, just below the largest positive word."""
+MOST_HELD: Final = 10
+"""So many poses may follow a displacement that leaps; then no other displacement will come."""
 BACK: Final = 0.25
 """Part of a leap that may be left when a robot that drives is back where it was."""
 
@@ -107,7 +109,11 @@ class OutlierFilter:
             return [(reading, stamp_s)]
         if self._held_motion:
             self._held_motion.append((reading, stamp_s))
-            return []
+            if len(self._held_motion) <= MOST_HELD:
+                return []
+            self._motion_leaps.forget()
+            released, self._held_motion = self._held_motion, []
+            return released
         return [(self._told_of_losses(reading), stamp_s)]
 
     def release(self) -> list[Stamped]:

@@ -5,7 +5,7 @@
 Nodes are the places between bytes, each twice: as a boundary of frames, and within a bad run.
 Edges are whole frames, damaged ones, bad bytes. A shortest path is the best reading; a frame of it
 is sure where every path that reads its first byte in another way is dearer by ``SURE``. This module
-knows the shapes that a line gives to frames; prices are in ``evidence``. Work and memory are
+knows the shapes that a line gives to frames; prices are in ``cost_model``. Work and memory are
 proportional to the stretch.
 
 The context of a node (for the price of content) is that of the cheapest way to it.

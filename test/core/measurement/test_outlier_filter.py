@@ -186,6 +186,14 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
     assert through.refused_displacements == 0
 
 
+def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
+    """Ten may; then all come out, and what leaps after them is judged anew."""
+    pose, through = PoseReading(0.0, 0.0, 0.0), gate()
+    came = admitted([*[ahead()] * 3, ahead(0.06), *[pose] * 12, ahead(0.01)], through)
+    assert came[3:14] == [[]] * 10 + [[ahead(0.06), *[pose] * 10]]
+    assert came[14:] == [[pose], [pose], [ahead(0.01)]]
+
+
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
     """It has restarted, and how long it stood is unknown."""
     first = replace(ahead(9.0), duration_s=None, restarted=True)
