@@ -34,8 +34,8 @@ class Asking(Stops):
         self._stopping = None
         self.conversation.give_up(now)
         self.state, self.motion = State.ASKING, Motion.UNKNOWN
-        self.greeted = False
-        self._conflict = False
+        self.greeted = self._conflict = False
+        self._custom_units = None
         self._asked_count = None
         self._name_from_s = now + 2 * self._delay_s
         self._named_s = -math.inf

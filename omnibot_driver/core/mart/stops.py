@@ -138,6 +138,7 @@ class Stops(Ground, ABC):
         """Stop what is, or may be, under way."""
         if why:
             self._notice(f"{why}; robot stopped", halt=True)
+            self._custom_units = None  # a server that was started again has forgotten it
         pending = self.conversation.pending
         answers = ANSWERS.get(self.motion, ())
         owed = int(pending is not None and any(form in answers for form in pending.word.forms))

@@ -154,3 +154,17 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
     bench.run(10.0)
     assert bench.robot.stands
     assert bench.try_command(0.3, 0.0)
+
+
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
+    firmware: Firmware,
+) -> None:
+    """It has forgotten the one that SSP has set, and L without a speed never starts."""
+    bench = MartBench(firmware).ready()
+    for _ in range(3):
+        bench.command(0.0, 0.5, 3.0)
+        bench.run(2.0)
+    bench.server.restart()
+    bench.command(0.0, 0.5, 6.0)
+    assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.15)
