@@ -15,18 +15,23 @@ SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 19.5
 """A wheel that starts tells less; one that is faster ticks once more before it stands."""
+STEEP_RPM: Final = 25.0
+FASTEST_STEEP_RPM: Final = 23.5
+"""A wheel that has fallen by so much comes to rest within one tick from this speed."""
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 HIDDEN_PART: Final = 0.3
 """The clock runs at this part of its speed while no speeds are reported."""
+STEEP: Final[tuple[float, ...]] = (0.0, 0.3, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Chance that it stands, by the number of repetitions: after a far fall, after a far fall from a
-speed that was reported once, and after a shorter fall. Counted on the public firmware with the
-gains that it boots with, and with better ones, with which no wheel falls like this."""
+"""Chance that it stands, by the number of repetitions: of a fast wheel after a steep fall, after a
+far fall, after a far fall from a speed that was reported once, and after a shorter fall. Counted on
+the public firmware with the gains that it boots with, and with better ones, with which no wheel
+falls like this."""
 
 
 class RestingWheel:
@@ -72,10 +77,13 @@ class RestingWheel:
         self._told_rpm = rpm
         self._lately.append((self._clock_s, rpm))
         self.chance = 0.0
-        if not SLOWEST_RPM < rpm < FASTEST_RPM:
+        steep = self._fell_rpm >= STEEP_RPM
+        if not SLOWEST_RPM < rpm < (FASTEST_STEEP_RPM if steep else FASTEST_RPM):
             return
         chances: tuple[float, ...] = (0.0,)
-        if self._fell_rpm >= FELL_FAR_RPM:
+        if steep and rpm > FASTEST_RPM:
+            chances = STEEP
+        elif self._fell_rpm >= FELL_FAR_RPM:
             chances = FAR
         elif self._lone:
             chances = LONE

@@ -24,6 +24,14 @@ def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands()
     assert told(31, 28, 19, 12, 12, 12).chance == 1.0
 
 
+def test_a_wheel_that_fell_steeply_rests_from_a_higher_speed() -> None:
+    """From 51 to 21 RPM within a second, and no tick any more."""
+    assert told(51, 47, 31, 26, 21).chance == 0.0
+    assert 0.0 < told(51, 47, 31, 26, 21, 21).chance < 1.0
+    assert told(51, 47, 31, 26, 21, 21, 21).chance == 1.0
+    assert told(40, 31, 26, 21, 21, 21).chance == 0.0
+
+
 def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
     """However often it is repeated."""
     assert told(19, 20, *[20] * 50).chance == 0.0
