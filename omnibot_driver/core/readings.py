@@ -3,7 +3,7 @@
 """What boards measure, in SI units, with no trace of their bytes: values only."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -42,6 +42,10 @@ class DisplacementReading:
     lost: int
     restarted: bool = False
     measured: bool = True
+
+
+NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
+"""The board lives, and has told nothing of its motion."""
 
 
 @value(frozen=True, slots=True)

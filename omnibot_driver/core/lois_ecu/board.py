@@ -26,6 +26,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.traits import TRAITS
 from omnibot_driver.core.packets import NO_PACKETS, Packets, joined, packed
 from omnibot_driver.core.readings import (
+    NOTHING_MEASURED,
     DisplacementReading,
     EStopButtonReading,
     ExtraReading,
@@ -39,8 +40,6 @@ RESET_AGAIN_S: Final = 0.9
 """Longer than a wheel rolls on, and than four groups of ticks take."""
 STEADY_S: Final = 0.3
 """More than one period of the ticks without a change of the counts."""
-HEARD: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
-"""A first message, which tells nothing of motion yet."""
 
 
 class LoisEcuBoard(Board):
@@ -106,7 +105,7 @@ class LoisEcuBoard(Board):
         before = self.mode
         readings = self._read(self._ecu.receive(data, now))
         if not readings and self.mode is not before:
-            return [HEARD]
+            return [NOTHING_MEASURED]
         return readings
 
     def flush(self, now: float) -> list[Reading]:

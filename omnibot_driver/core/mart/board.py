@@ -22,7 +22,7 @@ from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.states import State
 from omnibot_driver.core.mart.stops import SLOWEST_MPS, SLOWEST_RADPS
 from omnibot_driver.core.packets import Packets
-from omnibot_driver.core.readings import DisplacementReading, Reading
+from omnibot_driver.core.readings import NOTHING_MEASURED, Reading
 from omnibot_driver.core.traits import Traits
 
 TRAITS: Final = Traits(
@@ -40,9 +40,6 @@ TRAITS: Final = Traits(
     slack_mps=0.15,
     slack_radps=0.6,
 )
-HEARD: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
-"""The server lives, and nothing was measured: it is busy with its last command, or its replies tell
-nothing that is believed."""
 UNREAD_S: Final = 0.5
 """A robot that drives is measured more often."""
 EXPECTED_EVERY_S: Final = 0.2
@@ -114,7 +111,7 @@ class MartBoard(Board):
             self._mode = Mode.NOMINAL
             unread = not readings and now >= self._read_s + UNREAD_S
             if unread and self._pilot.heard_s == now:
-                readings.append(HEARD)
+                readings.append(NOTHING_MEASURED)
         if readings:
             self._read_s = now
         return readings
@@ -136,7 +133,7 @@ class MartBoard(Board):
             readings.append(pilot.told(now))
         if pilot.busy(now) and now >= self._expected_s + EXPECTED_EVERY_S:
             self._expected_s = now
-            readings.append(HEARD)
+            readings.append(NOTHING_MEASURED)
         return readings
 
     def reset_odometry(self) -> None:

@@ -19,7 +19,7 @@ from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.speed_loop import UNEQUAL
 from omnibot_driver.core.mart.states import Motion
 from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
-from omnibot_driver.core.readings import DisplacementReading
+from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
 WINDOW_S, SPREADS = 0.35, 4
 """Speeds are averages over this time, or over this multiple of a reply's uncertainty if longer."""
@@ -34,7 +34,6 @@ UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
 """What a motion may have done of which the end was not heard."""
 ANY_RAD: Final = 1.8
 """Any heading, as a standard deviation."""
-NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
 
 
 class Reckoning:
