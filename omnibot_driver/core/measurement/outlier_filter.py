@@ -78,7 +78,8 @@ class Refused:
 class OutlierFilter:
     """``limits`` may be replaced at any time; ``tick_s`` is the time between two ImuReadings.
 
-    ``corrected``: displacements are steps of an estimate, which leaps where it is put right.
+    ``corrected``: displacements are steps of an estimate, which leaps where it is put right; what
+    no robot can do is then no motion that was measured.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -149,6 +150,8 @@ class OutlierFilter:
             self._motion_leaps.forget()
             seconds = None if before_s is None else (stamp_s - before_s) or None
         if seconds is not None and not self._possible(reading, seconds):
+            if self._corrected and isfinite(reading.dx_m + reading.dy_m + reading.dyaw_rad):
+                return [(replace(reading, measured=False), stamp_s)]
             self._refuse(reading)
             return []
         was_flip = leaps = False

@@ -293,3 +293,12 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
     assert admitted(steps, gate())[1] == []
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
     assert admitted(steps, through) == [[step] for step in steps]
+
+
+def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
+    """Nothing was refused: the line is good."""
+    through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
+    steps = [ahead(), ahead(1.0), ahead(math.nan), ahead()]
+    came = admitted(list(steps), through)
+    assert came == [[ahead()], [replace(ahead(1.0), measured=False)], [], [ahead(lost=1)]]
+    assert through.refused_displacements == 1
