@@ -30,7 +30,7 @@ STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 BEND_WALK: Final = 0.5
 """Part of a guessed turn's error that is another's in each step."""
 ASTRAY: Final = 0.7
-"""For rad² of the heading, part of the way that is none in the direction it is taken to be."""
+"""For rad² of the heading, part of the way that may lead elsewhere, ahead and aside."""
 SPREAD: Final = 0.3
 """Standard deviation of a time that lies anywhere between two, as a part of what is between."""
 CLOCK_S: Final = 0.01
@@ -48,7 +48,7 @@ class Doubt:
     def reset(self) -> None:
         """The frame begins here."""
         self._walk = Covariance()
-        self._levers = [(0.0, 0.0, 0.0)] * 4
+        self._levers = [(0.0, 0.0, 0.0)] * 5
         self._bend_before_rad = 0.0
 
     def moved(
@@ -88,6 +88,7 @@ class Doubt:
             (0.0, 0.0, drift_rad),
             (bend_m * cos, bend_m * sin, bend_rad),
             (astray * dx_m, astray * dy_m, 0.0),
+            (-astray * dy_m, astray * dx_m, 0.0),
         )
         self._levers = [
             (x - dy_m * yaw + own_x, y + dx_m * yaw + own_y, yaw + own_yaw)
@@ -132,10 +133,9 @@ class Doubt:
     def total(self, more: Errors) -> Covariance:
         """With what may have been done since."""
         scale, drift = self.settings.wheel_scale**2, self.settings.gyro_drift_radps**2
-        size, bias, bend, astray = self._levers
-        return self._walk.with_errors(
-            [(scale, *size), (drift, *bias), (1.0, *bend), (1.0, *astray), *more]
-        )
+        size, bias, *others = self._levers
+        errors = [(scale, *size), (drift, *bias), *((1.0, *lever) for lever in others)]
+        return self._walk.with_errors([*errors, *more])
 
 
 def anywhere(way_m: float, turn_rad: float) -> Errors:

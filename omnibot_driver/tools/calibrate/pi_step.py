@@ -38,6 +38,11 @@ ROUNDS: Final = 3
 WRITTEN_WITHIN_S: Final = 4.0
 """Settings are repeated, as the board acknowledges nothing."""
 
+QUIET_S: Final = 0.5
+"""The board times no tick while it sends, so it sends as seldom as it may."""
+RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
+"""Parameters that are put back."""
+
 Records = dict[str, list[Column]]
 """By side."""
 
@@ -56,7 +61,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
         f"Both wheels will turn at up to full duty, {total} times for some seconds."
         " Is the robot on a box, both wheels off the ground, nothing near them?"
     )
-    names = ["drive_mode", "record_samples", *_names("kp", "tn", "td")]
+    names = [*RECORDING, *_names("kp", "tn", "td")]
     names += _names("short_correction", "long_correction")
     before = {name: robot.parameters[name] for name in names}
     with console.progress("records") as show:
@@ -68,7 +73,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
             raise
         worse = [wheel.name for wheel in wheels if wheel.worse]
         gains = [name for side in worse for name in _names("kp", "tn", "td", sides=(side,))]
-        _restore(bench, before, ["drive_mode", "record_samples", *gains])
+        _restore(bench, before, [*RECORDING, *gains])
     found = _corrections({wheel.name: wheel.levels for wheel in wheels})
     found |= _gains({wheel.name: wheel.tuned for wheel in wheels if wheel.name not in worse})
     return result_of(wheels, goals, found)
@@ -105,7 +110,9 @@ class _Bench:
 def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[WheelTuned]:
     ticks = bench.ticks
     loop = Loop(1.0 / arguments.control_frequency, ticks, LEAST_DEAD_S)
-    bench.set({"drive_mode": "rpm", "record_samples": arguments.samples})
+    bench.set(
+        {"drive_mode": "rpm", "record_samples": arguments.samples, "ticks_period": QUIET_S}
+    )
     was = bench.steps([FIRST_RPM] * 2)
     corrections = _encoders(bench)
     starts = bench.record("duty_cmd", [FULL_PERCENT] * 2, arguments.records)
