@@ -110,9 +110,7 @@ class _Bench:
 def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[WheelTuned]:
     ticks = bench.ticks
     loop = Loop(1.0 / arguments.control_frequency, ticks, LEAST_DEAD_S)
-    bench.set(
-        {"drive_mode": "rpm", "record_samples": arguments.samples, "ticks_period": QUIET_S}
-    )
+    bench.set({"drive_mode": "rpm", "record_samples": arguments.samples, "ticks_period": QUIET_S})
     was = bench.steps([FIRST_RPM] * 2)
     corrections = _encoders(bench)
     starts = bench.record("duty_cmd", [FULL_PERCENT] * 2, arguments.records)

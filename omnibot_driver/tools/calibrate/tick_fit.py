@@ -85,6 +85,8 @@ def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
         )
     search = Search(intervals)
     values = search.roughly()
+    if search.find_missed(values):
+        values = search.roughly()
     marks = marks_in(search.off(values), ticks_per_revolution)
     if marks is not None:
         values = search.with_marks(marks, values)

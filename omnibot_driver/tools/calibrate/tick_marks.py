@@ -46,12 +46,13 @@ class Marks:
 
 
 def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
-    """``rows``: of each record, how much longer each time was than with even marks, as a part.
+    """``rows``: of each record, how much longer each time was than with even marks, as a part; nan
+    where that is not known.
 
     None where the times are not off in the same way in each turn.
     """
     rows = [np.clip(row, -LARGEST, LARGEST) for row in rows]
-    total = float(sum(np.dot(row, row) for row in rows))
+    total = float(sum(np.nansum(row * row) for row in rows))
     if total == 0.0:
         return None
     steps = _steps([max(rows, key=len)], [0], marks)
@@ -61,7 +62,7 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
         steps = _steps(rows, firsts, marks)
     found = Marks(steps)
     rest = sum(
-        float(np.sum((row - found.expected(first, len(row))) ** 2))
+        float(np.nansum((row - found.expected(first, len(row))) ** 2))
         for row, first in zip(rows, firsts, strict=True)
     )
     return found if rest < (1.0 - EXPLAINED) * total else None
@@ -70,7 +71,7 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 def _first(row: Column, steps: Column) -> int:
     """The step with which this row begins: where both agree best."""
     marks = len(steps)
-    turn = np.bincount(np.arange(len(row)) % marks, weights=row, minlength=marks)
+    turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)
     turned = np.arange(marks)[:, None] + np.arange(marks)
     return int(np.argmax(steps[turned % marks] @ turn))
 
@@ -81,6 +82,7 @@ def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]
     )
     off = np.concatenate(list(rows))
+    of, off = of[np.isfinite(off)], off[np.isfinite(off)]
     steps = np.array(
         [np.median(off[of == mark]) if np.any(of == mark) else 0.0 for mark in range(marks)]
     )

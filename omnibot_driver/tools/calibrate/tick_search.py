@@ -37,6 +37,13 @@ MOST_OFF: Final = 0.4
 """Ticks that a mark may be off its place."""
 LAGS: Final = 60
 """Ticks, over which the load is correlated."""
+MISSED: Final = 0.6
+"""A time that is longer by this part than expected, with the next one, holds a mark that the board
+has missed. Of one that it has noticed late the next time is as much too short."""
+SURE_TICKS: Final = 4
+"""Before these the wheel is slow, and misses none."""
+OUTLIER: Final = 5.0
+"""Standard deviations."""
 FEWEST_RECORDS: Final = 6
 """With fewer, their scatter tells nothing of the errors."""
 
@@ -80,6 +87,7 @@ class Search:
         self._off = np.zeros(1)
         self._sigma = SIGMA
         self._whitener: Column | None = None
+        self._good = np.ones(len(self._measured), dtype=bool)
 
     def roughly(self) -> Column:
         """Values of a second order, with even marks and independent noise."""
@@ -100,7 +108,29 @@ class Search:
         return self._best([np.array([*values[:2], *values[3:]])])
 
     def off(self, values: Column) -> list[Column]:
-        """How much longer each time was than with even marks, as a part of it, by record."""
+        """How much longer each time was than with even marks, as a part of it, by record; nan for
+        each way from mark to mark that was not measured by itself.
+        """
+        found = []
+        for row, count in zip(self._off_even(values), self._counts, strict=True):
+            alone = np.diff(count) == 1
+            one = np.full(count[-1], np.nan)
+            one[count[:-1][alone]] = row[alone]
+            found.append(one)
+        return found
+
+    def find_missed(self, values: Column) -> bool:
+        """From now on count the marks that the board has missed; whether there are any."""
+        any_missed = False
+        for place, row in enumerate(self._off_even(values)):
+            both = row + np.append(row[1:], 0.0)
+            missed = (row > MISSED) & (both > MISSED)
+            missed[:SURE_TICKS] = False
+            self._counts[place] = np.append(0, np.cumsum(1 + missed))
+            any_missed |= bool(missed.any())
+        return any_missed
+
+    def _off_even(self, values: Column) -> list[Column]:
         off = self._measured / self._told(values, np.zeros(1)) - 1.0
         return np.split(off, np.cumsum(self._lengths)[:-1])
 
@@ -120,6 +150,9 @@ class Search:
         Where the places of the marks are not known, it is theirs; else that of the load.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
+        every = np.concatenate(rows)
+        spread = 1.4826 * float(np.median(np.abs(every)))
+        self._good = np.abs(every) < OUTLIER * spread
         lags = LAGS if len(self._off) > 1 else 1
         self._whitener = _whitener(_correlation(rows, lags), max(self._lengths))
 
@@ -189,21 +222,21 @@ class Search:
         row = np.arange(times)
         pattern[row, own + np.repeat(np.arange(records), self._lengths)] = 1.0
         if self._marks:
-            marks = np.concatenate(
-                [
-                    one + count[:-1]
-                    for one, count in zip(self._first_marks, self._counts, strict=True)
-                ]
-            )
-            for end in (0, 1):
-                pattern[row, own + records + (marks + end) % self._marks] = 1.0
+            for end in (slice(None, -1), slice(1, None)):
+                marks = np.concatenate(
+                    [
+                        one + count[end]
+                        for one, count in zip(self._first_marks, self._counts, strict=True)
+                    ]
+                )
+                pattern[row, own + records + marks % self._marks] = 1.0
         return csr_matrix(pattern)
 
     def _relative(self, values: Column) -> Column:
         return np.asarray(self._measured / self._told(values) - 1.0)
 
     def _residuals(self, values: Column) -> Column:
-        found = self._relative(values) / self._sigma
+        found = np.where(self._good, self._relative(values) / self._sigma, 0.0)
         if self._whitener is None:
             return found
         rows = np.split(found, np.cumsum(self._lengths)[:-1])
