@@ -19,6 +19,8 @@ Column = NDArray[np.float64]
 ROUNDS: Final = 4
 LARGEST: Final = 0.5
 """A time that is off by more than this part does not tell where a mark is: an edge was missed."""
+OUTLIER: Final = 3.0
+"""Standard deviations; beyond them an edge was late."""
 EXPLAINED: Final = 0.4
 """Part of the variance that marks must explain to be believed. By chance they explain what they
 have parameters for: less than a fifth with three records of two turns."""
@@ -51,7 +53,9 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
     None where the times are not off in the same way in each turn.
     """
-    rows = [np.clip(row, -LARGEST, LARGEST) for row in rows]
+    spread = 1.4826 * float(np.nanmedian(np.abs(np.concatenate(list(rows)))))
+    limit = min(LARGEST, OUTLIER * spread)
+    rows = [np.where(np.abs(row) <= limit, row, np.nan) for row in rows]
     total = float(sum(np.nansum(row * row) for row in rows))
     if total == 0.0:
         return None

@@ -37,9 +37,10 @@ MOST_OFF: Final = 0.4
 """Ticks that a mark may be off its place."""
 LAGS: Final = 60
 """Ticks, over which the load is correlated."""
-MISSED: Final = 0.6
+MISSED: Final = 0.42
 """A time that is longer by this part than expected, with the next one, holds a mark that the board
-has missed. Of one that it has noticed late the next time is as much too short."""
+has missed. Of one that it has noticed late the next time is as much too short. (Its clock loses up
+to 6 ms then, so the time is not twice as long.)"""
 SURE_TICKS: Final = 4
 """Before these the wheel is slow, and misses none."""
 OUTLIER: Final = 5.0
@@ -124,7 +125,8 @@ class Search:
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
             both = row + np.append(row[1:], 0.0)
-            missed = (row > MISSED) & (both > MISSED)
+            missed = (row > MISSED / 2) & (both > MISSED)
+            missed[1:] &= ~missed[:-1]
             missed[:SURE_TICKS] = False
             self._counts[place] = np.append(0, np.cumsum(1 + missed))
             any_missed |= bool(missed.any())
@@ -152,8 +154,9 @@ class Search:
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)
         spread = 1.4826 * float(np.median(np.abs(every)))
-        self._good = np.abs(every) < OUTLIER * spread
-        lags = LAGS if len(self._off) > 1 else 1
+        lags = 1
+        if len(self._off) > 1:
+            lags, self._good = LAGS, np.abs(every) < OUTLIER * spread
         self._whitener = _whitener(_correlation(rows, lags), max(self._lengths))
 
     def left(self, values: Column) -> Column:

@@ -5,8 +5,7 @@
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_step.py 20
 
 About two minutes for each robot; a second number is the robot to begin with. The overshoot is that
-of the true speed, on a robot with the gains
-found and with marks in their places.
+of the true speed, on a robot with the gains found and with marks in their places.
 """
 
 import contextlib
