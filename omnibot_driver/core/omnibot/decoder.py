@@ -45,6 +45,9 @@ DOUBT_BYTES: Final = 170
 """100 ms of the nominal stream."""
 SHORTEST_RUN: Final = DELTA_LENGTH
 """Bytes; fewer hold no frame that the fast path takes. Adapters hand over pieces."""
+CALM_S: Final = 10.0
+"""A line that has lost no byte for so long loses few: a frame need not wait until it is sure that
+its last byte is its own."""
 FRAMES_TO_SETTLE: Final = 3
 """Number of certain frames behind a doubtful one after which nothing more will be learnt about
 it."""
@@ -87,7 +90,7 @@ class FrameDecoder:
         self._held = bytearray()
         self._in_step = False
         self.pauses = InterFrameGaps(byte_s)
-        self.last_arrival_s = -math.inf
+        self.last_arrival_s = self._damaged_at_s = -math.inf
 
     def feed(self, data: bytes, now: float) -> list[Frame]:
         """The frames that are complete with these bytes, in the order of the line.
@@ -215,10 +218,16 @@ class FrameDecoder:
 
         ``start``, ``length``: of the frame in hand; ``due``: another one may follow at once.
         """
-        pauses = self.pauses
+        pauses, calm = self.pauses, self.calm
         if self._arrived >= length:  # what is sent at once begins after a pause
-            return not (pauses.sharp or (pauses.collected and not due))
-        return due or not (pauses.sharp and (pauses.at_pace or pauses.in_its_tick(start)))
+            return not (pauses.sharp or (calm and pauses.collected and not due))
+        in_time = pauses.at_pace or (calm and pauses.in_its_tick(start))
+        return due or not (pauses.sharp and in_time)
+
+    @property
+    def calm(self) -> bool:
+        """Whether no damage has been seen for long."""
+        return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
         """Accept the frames of a run except the last two, which are in doubt; returns False."""
@@ -303,6 +312,7 @@ class FrameDecoder:
         """Drop the first held bytes, which are not frames."""
         if not count:
             return
+        self._damaged_at_s = self.last_arrival_s
         self.statistics.discarded_bytes += count
         self._dropped += count
         self.statistics.faults += self._in_step

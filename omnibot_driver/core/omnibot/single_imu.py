@@ -59,14 +59,15 @@ def take_pieces(
 ) -> ImuReading | None:
     """``take_single`` of a frame of which the pieces are the first part, and ``data`` the rest.
 
-    The last byte may be the next header's only where a frame may follow at once.
+    The last byte may be the next header's where a frame may follow at once, or bytes were lost.
     """
     first, came_at = pieces[0]
     last = decoder.context.imu
     if now - came_at >= GAP_S or last is None:
         return None
     if data[-1] in LENT and (
-        decoder.expectation.more_is_due(last, decoder.context)
+        not decoder.calm
+        or decoder.expectation.more_is_due(last, decoder.context)
         or not decoder.pauses.stands_out(came_at - decoder.last_arrival_s, len(first))
     ):
         return None

@@ -19,7 +19,7 @@ Column = NDArray[np.float64]
 ROUNDS: Final = 4
 LARGEST: Final = 0.5
 """A time that is off by more than this part does not tell where a mark is: an edge was missed."""
-OUTLIER: Final = 3.0
+OUTLIER: Final = 4.5
 """Standard deviations; beyond them an edge was late."""
 EXPLAINED: Final = 0.4
 """Part of the variance that marks must explain to be believed. By chance they explain what they

@@ -96,7 +96,7 @@ def test_noise_that_does_not_come_again_is_not_taken_for_marks() -> None:
 
 
 def test_marks_that_were_missed_or_timed_late_cost_little() -> None:
-    """The public firmware does so while it sends; a time is twice as long, or the next one short."""
+    """The public firmware does so while it sends: a time is doubled, or the next one is short."""
     records = starts(PLANT, 8)
     for number, record in enumerate(records):
         late, missed = 30 + 5 * number, 60 + 7 * number
