@@ -106,11 +106,13 @@ def drive(name: str, seconds: float, seed: int) -> Score:
 
 
 def _watch(bench: MartBench, score: Score) -> None:
-    """A tenth of a second, and all that was published in it."""
-    seen, told = len(bench.events), len(bench.odometry)
-    bench.run(0.1)
-    if len(bench.odometry) > told:
-        score.count("odom", nees(bench) > WRONG_NEES)
+    """A tenth of a second, and all that was published in it; a pose when it was."""
+    seen = len(bench.events)
+    for _ in range(10):
+        told = len(bench.odometry)
+        bench.run(0.01)
+        if len(bench.odometry) > told:
+            score.count("odom", nees(bench) > WRONG_NEES)
     truth = bench.truth
     for event in bench.events[seen:]:
         value = getattr(event, "value", None)

@@ -44,6 +44,9 @@ class Measuring(Starts):
             self.loop.volts = self.health.volts_or(self._settings.nominal_volts)
 
     def _counted(self, count: int, when: Moment, now: float) -> None:
+        spun = self.state is State.STILL and self.odometry.motion is Motion.SPIN
+        if spun and when.doubtful and now < self._rested_s + self._delay_s:
+            return  # maybe the angle, with which the server answers the stop
         wheel = self.odometry.wheel
         before = None if wheel.may_begin_anew else wheel.last
         reading = self.odometry.counted(count, when)

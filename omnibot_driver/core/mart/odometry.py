@@ -26,6 +26,8 @@ STARTS_MPS, STARTS_RADPS = 0.3, 0.6
 """A robot that starts may be so fast before its speed is counted."""
 BLIND_RADPS: Final = 1.5
 """A robot of which nothing is heard turns no faster."""
+FRESH_S: Final = 0.2
+"""A heading that is older does not tell how the robot turns now."""
 SPEED_STDDEV_MPS, SPEED_STDDEV_RADPS = 0.02, 0.03
 
 
@@ -73,6 +75,10 @@ class MartOdometry(Reckoning):
             ACCELERATION_MPS2 * square_s2 + (abs(speed_mps) + FASTER_MPS) * late_s,
             ACCELERATION_RADPS2 * square_s2 + (abs(rate_radps) + FASTER_RADPS) * late_s,
         )
+        stale_s = now - self.heading.told_s - FRESH_S
+        if self.motion is Motion.REFERENCE and stale_s > 0.0:
+            turn_rad = ACCELERATION_RADPS2 * stale_s * stale_s / 2
+            errors += anywhere(abs(speed_mps) * stale_s * min(1.0, turn_rad), turn_rad)
         if self.on_the_spot:
             errors += self.doubt.turn(self.spun_rad, self.told_rad)
         if len(self._track) < 2:

@@ -205,7 +205,7 @@ class Pilot(Measuring):
         elif word.kind is Kind.CHECK:
             self._checked(answer, now)
         elif word.kind is Kind.START:
-            self._started(reply, now)
+            self._started(answer, now)
         elif word.kind is Kind.CHANGE:
             if isinstance(reply, Fail):
                 self._halt(now, self._obstacle(reply, self.motion))

@@ -96,9 +96,10 @@ class Reckoning:
         self._motion_rad = self.spun_rad = self.moved_m = 0.0
         self.told_rad, self._guessed = None, False
 
-    def started(self, now: float) -> None:
-        """The server has answered that it has."""
-        self.wheel.started()
+    def started(self, now: float, *, sure: bool) -> None:
+        """The server has answered that it has. ``sure``: its answer is not another's."""
+        if sure:
+            self.wheel.started()
         self.heading.changed_s = now
 
     def stopping(self, now: float) -> None:

@@ -216,9 +216,9 @@ class Starts(Moves):
         else:
             self.odometry.left_over_right = None
 
-    def _started(self, reply: Ok | Fail, now: float) -> None:
-        if isinstance(reply, Fail):
-            self._start_failed(reply, now)
+    def _started(self, answer: Answer, now: float) -> None:
+        if isinstance(answer.reply, Fail):
+            self._start_failed(answer.reply, now)
             return
         if self.motion is Motion.REFERENCE:
             self.health.reference_fails = 0
@@ -226,7 +226,7 @@ class Starts(Moves):
         self.health.heading_changes = 0
         self.state = WHILE[self.motion]
         self._begun_s = now
-        self.odometry.started(now)
+        self.odometry.started(now, sure=not answer.when.doubtful)  # else maybe that of RST IMU
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
 

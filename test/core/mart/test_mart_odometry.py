@@ -15,6 +15,7 @@ from omnibot_driver.core.mart.speed_loop import SpeedLoop
 from omnibot_driver.core.mart.states import Motion
 from omnibot_driver.core.mart.stopping import REPEAT_S, Stopping
 from omnibot_driver.core.mart.words import Word
+from omnibot_driver.core.packets import Packet
 
 WRONG_NEES = 28.0
 """1 in 270,000 squares of three honest normal errors is beyond it."""
@@ -52,12 +53,42 @@ def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_la
         assert bench.error.way_m < 0.05
 
 
+def test_a_copy_of_an_ok_is_no_turn_where_the_start_was_lost() -> None:
+    """The ok of RST IMU comes twice, and L and all queries behind it are lost: the count is still
+    that of the motion before, and no turn by so many counts.
+    """
+    bench = MartBench("source", gyro_noise_dps=0.0).ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(2.0)
+    receive, advance, copies = bench.robot.receive, bench.robot.advance, 0
+
+    def lossy(data: bytes, now: float, channel: int) -> None:
+        nonlocal copies
+        if data.startswith(b"L "):
+            copies += 1
+        elif bench.board._pilot.state is not State.TURNING or data == b"SM":
+            receive(data, now, channel)
+
+    def doubled() -> list[Packet]:
+        nonlocal copies
+        out = [*advance(), *[(0, b"ok")] * copies]
+        copies = 0
+        return out
+
+    bench.robot.receive = lossy  # type: ignore[method-assign]
+    bench.robot.advance = doubled  # type: ignore[method-assign]
+    bench.command(0.0, 0.5, 2.0)
+    bench.run(2.0)
+    assert any(data.startswith(b"L ") for data in bench.said())
+    assert abs(bench.error.yaw_rad) < 0.02
+
+
 def reversed_by_1000() -> MartOdometry:
     """Moved once, and begun again; the encoder still reports the first motion."""
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.REVERSE, 1.0)
-    odometry.started(1.1)
+    odometry.started(1.1, sure=True)
     odometry.counted(-1000, at(3.0))
     odometry.stand(4.0)
     odometry.counted(-1000, at(4.5))
@@ -92,7 +123,7 @@ def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
 def test_a_count_that_stays_while_the_robot_is_driven_is_no_motion() -> None:
     """The reply to the start was a copy of another ok."""
     odometry = reversed_by_1000()
-    odometry.started(5.1)
+    odometry.started(5.1, sure=True)
     for at_s in (5.2, 5.3, 5.4):
         odometry.counted(-1000, at(at_s))
     odometry.stand(6.0)
@@ -208,7 +239,7 @@ def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.SPIN, 1.0)
-    odometry.started(1.06)
+    odometry.started(1.06, sure=True)
     odometry.counted(2, at(1.07))
     covariance = odometry.told(1.13, blind_since_s=None).covariance
     assert covariance.yaw_yaw > 0.03**2
