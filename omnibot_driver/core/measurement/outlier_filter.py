@@ -44,7 +44,7 @@ STILL: Final = 0.08
 END_OF_SCALE: Final = 0.99996
 """Part of full scale, just below the largest positive word."""
 MOST_HELD: Final = 10
-"""So many poses may follow a displacement that leaps; then no other displacement will come."""
+"""Poses that may follow a displacement that leaps; then no other displacement will come."""
 BACK: Final = 0.25
 """Part of a leap that may be left when a robot that drives is back where it was."""
 

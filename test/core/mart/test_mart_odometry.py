@@ -55,7 +55,7 @@ def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_la
 
 def test_a_copy_of_an_ok_is_no_turn_where_the_start_was_lost() -> None:
     """The ok of RST IMU comes twice, and L and all queries behind it are lost: the count is still
-    that of the motion before, and no turn by so many counts.
+    that of the motion before, and no turn.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.0, 2.0)
