@@ -17,7 +17,7 @@ FASTEST_RPM: Final = 19.5
 """A wheel that starts tells less; one that is faster ticks once more before it stands."""
 STEEP_RPM: Final = 25.0
 FASTEST_STEEP_RPM: Final = 23.5
-"""A wheel that has fallen by so much comes to rest within one tick from this speed."""
+"""A wheel that has fallen by this comes to rest within one tick from this speed."""
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9

@@ -46,7 +46,7 @@ DOUBT_BYTES: Final = 170
 SHORTEST_RUN: Final = DELTA_LENGTH
 """Bytes; fewer hold no frame that the fast path takes. Adapters hand over pieces."""
 CALM_S: Final = 10.0
-"""A line that has lost no byte for so long loses few: a frame need not wait until it is sure that
+"""A line that has lost no byte in this time loses few: a frame need not wait until it is sure that
 its last byte is its own."""
 FRAMES_TO_SETTLE: Final = 3
 """Number of certain frames behind a doubtful one after which nothing more will be learnt about
