@@ -131,7 +131,7 @@ class Robot(Listener):
                 "this needs the board's switch on velocity control and `control_method: velocity`"
             )
         self._begin(("nominal",))
-        self._unanswered.clear()
+        self._unanswered = +self._unanswered  # the last drive's may still be under way
         self._foreign = None
         stands = False
         try:
