@@ -11,6 +11,7 @@ from random import Random
 import pytest
 
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
+from omnibot_driver.core.omnibot.decoder import FrameDecoder
 from omnibot_driver.core.omnibot.gaps import BYTE_S
 from omnibot_driver.core.readings import ImuReading
 from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
@@ -81,3 +82,15 @@ def test_hardly_a_frame_waits_for_the_next_packet(
     assert heard > TICKS - 10
     assert late <= waits * (heard - SETTLED)
     assert board.figures.discarded_bytes == 0
+
+
+def test_a_line_that_lost_a_byte_is_not_calm_for_ten_seconds() -> None:
+    """There a frame waits until it is sure that its last byte is not the next header's."""
+    decoder = FrameDecoder()
+    lost_s, calm = 1.0, {}
+    for at, data in ticks():
+        decoder.feed(data[1:] if at == lost_s else data, at)
+        calm[at] = decoder.calm
+    assert calm[lost_s - 0.01]
+    assert not any(value for at, value in calm.items() if lost_s + 0.1 < at < lost_s + 9.9)
+    assert calm[(TICKS - 1) * 0.01]
