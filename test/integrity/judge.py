@@ -2,8 +2,10 @@
 
 """The judge: which frames that came out were sent there, and which intact ones are missing."""
 
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import accumulate
 
 from carriage import Chunks, Received
 from truth import Key
@@ -57,7 +59,9 @@ def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
     """Hand over the stream and compare, in order, what comes out with what was sent."""
     frames, intact = received.truth.frames, received.intact
     origins, data = received.origins, received.data
-    score = Score(intact=sum(intact))
+    ends = [end for _, _, end in frames]
+    intact_before = [0, *accumulate(intact)]
+    score = Score(intact=intact_before[-1])
     next_frame, start = 0, 0
     got = bytearray(len(frames))
     last = (len(data), chunks[-1][1] + 1.0)
@@ -67,13 +71,13 @@ def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
             horizon = _origin(origins, end - 1)
             nearest = _origin(origins, max(0, start - REACH_BYTES)) - 300
             for number, key in enumerate(found):
-                first = next_frame
-                while first < len(frames) and frames[first][2] < nearest:
-                    first += 1
+                first = bisect_left(ends, nearest, next_frame)
                 at = _place(received, key, first, horizon)
-                if sum(intact[first:at]) > MOST_DROPPED and number + 1 < len(found):
+                dropped = intact_before[at] - intact_before[first]
+                if dropped > MOST_DROPPED and number + 1 < len(found):
                     after = _place(received, found[number + 1], at + 1, horizon)
-                    at = at if sum(intact[at + 1 : after]) <= MOST_DROPPED else len(frames)
+                    skipped = intact_before[after] - intact_before[min(at + 1, after)]
+                    at = at if skipped <= MOST_DROPPED else len(frames)
                 score.out += 1
                 if at < len(frames):
                     got[at] = 1
