@@ -13,6 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
+from rclpy.time import Time
 from std_msgs.msg import String
 
 
@@ -79,6 +80,13 @@ class Probe:
         """Whether it did, in reasonable time."""
         with self._changed:
             return bool(self._changed.wait_for(predicate, PATIENCE_S))
+
+    def wait_for_later_stamp(self, messages: list[Any]) -> None:
+        """Until the last of these is of a second from now: older ones may be on their way."""
+        then_ns = self.node.get_clock().now().nanoseconds + 10**9
+        self.wait_for(
+            lambda: messages and Time.from_msg(messages[-1].header.stamp).nanoseconds > then_ns
+        )
 
     def wait_for_state(self, state: str) -> None:
         if "omnibot_driver/state" not in self._received:

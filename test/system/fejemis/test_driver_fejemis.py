@@ -36,8 +36,7 @@ def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> 
         robot.wait_until(lambda board: board.truth.yaw_rad < 0.5)
     robot.stands_for_good()
     truth = robot.do(lambda board: board.truth)
-    seen = len(odometry)
-    probe.wait_for(lambda: len(odometry) > seen + 10)
+    probe.wait_for_later_stamp(odometry)
     place = odometry[-1].pose.pose.position
     assert math.hypot(place.x - truth.x_m, place.y - truth.y_m) < 0.02
     stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in odometry]

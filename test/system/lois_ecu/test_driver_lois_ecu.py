@@ -55,8 +55,7 @@ def test_it_drives_and_odometry_tells_how_far(
         probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 1.0)
     ecu.stands_for_good()
     truth = ecu.do(lambda board: board.truth)
-    seen = len(odometry)
-    probe.wait_for(lambda: len(odometry) > seen + 10)
+    probe.wait_for_later_stamp(odometry)
     place = odometry[-1].pose.pose.position
     assert math.hypot(place.x - truth.x_m, place.y - truth.y_m) < 0.04
     assert joints[-1].name == ["left_wheel_joint", "right_wheel_joint"]
