@@ -22,6 +22,8 @@ STEP_S: Final = 0.001
 NOMINAL_S: Final = 0.2
 """Step of the controller by the manual, for which the board works its coefficients out."""
 STALE_S: Final = 0.5
+SENDS_S: Final = 9 * 14 * 10 / 115200
+"""The public firmware's ticks with the odometry behind them: nine lines of 14 characters."""
 MOST_PERCENT: Final = 100.0
 PHASE_POINTS: Final = 600
 
@@ -40,6 +42,7 @@ class Loop:
     """The control loop of a wheel. ``dead_s``: time until a duty shows in the speed.
 
     ``feed_forward``: percent for each RPM; ``low_pass``: of the set-point, 0..1 for each step.
+    ``sends_each_s``: how often the board sends its ticks.
     """
 
     period_s: float
@@ -49,6 +52,7 @@ class Loop:
     nominal_s: float = NOMINAL_S
     feed_forward: float = 0.0
     low_pass: float = 1.0
+    sends_each_s: float = 0.2
 
     @property
     def stretch(self) -> float:
@@ -65,21 +69,24 @@ def answer(
     *,
     dead_s: Array | None = None,
     begun: Array | float = 0.0,
+    sent_s: Array | None = None,
 ) -> Array:
     """Speed in RPM from standstill, (samples of STEP_S, *common shape of what follows).
 
     Gains; ``dead_s``: several dead times in place of the loop's; ``begun``: the part of the way
-    between two marks that lies behind the wheel at first.
+    between two marks that lies behind the wheel at first; ``sent_s``: when the board sends for the
+    first time, without which it sends nothing. A tick meanwhile waits until it has sent: its speed
+    is too low, and that of the next one too high.
     """
-    late = loop.dead_s if dead_s is None else dead_s
+    late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(
         *(
             np.asarray(one, dtype=np.float64)
-            for one in (gains.kp, gains.tn_s, gains.td_s, late, begun)
+            for one in (gains.kp, gains.tn_s, gains.td_s, late, begun, 0.0 if calm else sent_s)
         )
     )
     shape = every[0].shape
-    kp, tn_s, td_s, late_s, ticks = (one.ravel() for one in every)
+    kp, tn_s, td_s, late_s, ticks, sends_s = (one.ravel() for one in every)
     count, period = round(seconds / STEP_S), round(loop.period_s / STEP_S)
     dead, lanes = np.rint(late_s / STEP_S).astype(int), np.arange(len(kp))
     duties = np.zeros((count + int(dead.max()) + 1, len(kp)))
@@ -117,6 +124,8 @@ def answer(
         passed = np.floor(ticks) > np.floor(before)
         rate = np.maximum(rpm * per_rpm, 1e-9)
         at_s = now_s + STEP_S - (ticks - np.floor(ticks)) / rate
+        if not calm:
+            at_s = at_s + np.maximum(SENDS_S - (at_s - sends_s) % loop.sends_each_s, 0.0)
         seen = np.where(passed, 1.0 / (per_rpm * np.maximum(at_s - ticked_s, 1e-6)), seen)
         ticked_s = np.where(passed, at_s, ticked_s)
     return told.reshape((count, *shape))

@@ -109,7 +109,12 @@ class _Bench:
 
 def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[WheelTuned]:
     ticks = bench.ticks
-    loop = Loop(1.0 / arguments.control_frequency, ticks, LEAST_DEAD_S)
+    loop = Loop(
+        1.0 / arguments.control_frequency,
+        ticks,
+        LEAST_DEAD_S,
+        sends_each_s=bench.robot.parameters["ticks_period"],
+    )
     bench.set({"drive_mode": "rpm", "record_samples": arguments.samples, "ticks_period": QUIET_S})
     was = bench.steps([FIRST_RPM] * 2)
     corrections = _encoders(bench)
@@ -126,8 +131,8 @@ def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[W
         shown = bench.steps([tuned[side].target_rpm for side in SIDES])
         for side in SIDES:
             made[side].append((tuned[side].gains, tuned[side].target_rpm, shown[side]))
-            dead_s = dead_time_s(plants[side], loops[side], made[side])
-            loops[side] = replace(loops[side], dead_s=dead_s)
+        dead_s = dead_time_s([(plants[side], loops[side], made[side]) for side in SIDES])
+        loops = {side: replace(loops[side], dead_s=dead_s) for side in SIDES}
     return [
         WheelTuned(
             side,

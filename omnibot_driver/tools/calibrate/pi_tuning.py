@@ -18,6 +18,7 @@ import numpy as np
 
 from omnibot_driver.tools.calibrate.pi_loop import (
     STEP_S,
+    Array,
     Loop,
     PiGains,
     Traits,
@@ -36,6 +37,10 @@ DEAD_S: Final = np.arange(0.0, 0.101, 0.005)
 FIRST_BEGUN: Final = np.arange(0.05, 1.0, 0.1)
 BEGUN: Final = np.array([0.0, 0.4, 0.8])
 """Of the way between two marks: when ticks come, against the controller's steps, changes a step."""
+SENT: Final = np.arange(0.0, 1.0, 0.125)
+"""Of the time between two groups that the board sends: which ticks wait for them changes it too."""
+DISTURBED: Final = 0.02
+"""The worst step that is disturbed like this may overshoot by this much more than the goal."""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
@@ -79,9 +84,10 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
         kps, used = np.meshgrid(scale * np.geomspace(low, high, CANDIDATES), tds, indexing="ij")
         gains = PiGains(kps, tn_s, used)
         found = _foreseen(plant, gains, loop, goals)
+        tame = found.overshoot <= goals.overshoot
+        tame &= _disturbed(plant, gains, loop, goals) <= goals.overshoot + DISTURBED
         # Up to the first gain that overshoots too much: far above it, saturation hides it again.
-        tame = np.logical_and.accumulate(found.overshoot <= goals.overshoot, axis=0)
-        allowed = np.isfinite(found.settled_s) & tame
+        allowed = np.isfinite(found.settled_s) & np.logical_and.accumulate(tame, axis=0)
         if goals.phase_margin_deg is not None:
             margin = phase_margin_deg(plant, gains, loop, target)
             allowed &= margin >= goals.phase_margin_deg
@@ -124,21 +130,38 @@ def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
     and the mean error.
     """
     target = target_of(plant, goals)
-    apart = PiGains(*(np.asarray(one)[..., None] for one in (gains.kp, gains.tn_s, gains.td_s)))
-    rpm = answer(plant, apart, loop, target, SECONDS, begun=BEGUN)
+    rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=BEGUN)
     found = traits(rpm, target, goals.band)
     return Traits(found.overshoot.max(-1), found.settled_s.max(-1), found.error_s.mean(-1))
+
+
+def _disturbed(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Array:
+    """The worst overshoot of a step on a board that sends meanwhile."""
+    target = target_of(plant, goals)
+    begun, sent_s = (one.ravel() for one in np.meshgrid(BEGUN, loop.sends_each_s * SENT))
+    rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=begun, sent_s=sent_s)
+    return np.asarray(traits(rpm, target, goals.band).overshoot.max(-1))
+
+
+def _apart(gains: PiGains) -> PiGains:
+    return PiGains(*(np.asarray(one)[..., None] for one in (gains.kp, gains.tn_s, gains.td_s)))
 
 
 Steps = tuple[PiGains, float, Sequence[Column]]
 """Gains, the set-point in RPM, and what was recorded with them."""
 
 
-def dead_time_s(plant: Plant, loop: Loop, made: Sequence[Steps]) -> float:
-    """The dead time with which the loop answers its steps as these records show it.
+def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
+    """The dead time with which the loops of like wheels answer their steps as these records show.
 
     ``LEAST_DEAD_S`` at least: one that is taken for too short makes a step overshoot.
     """
+    costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
+    return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)
+
+
+def _costs(plant: Plant, loop: Loop, made: Sequence[Steps]) -> Array:
+    """Of each dead time: how unlike the model's answers are to those recorded."""
     costs = np.zeros(len(DEAD_S))
     for gains, target_rpm, records in made:
         shown = [response(record, loop.ticks_per_revolution) for record in records]
@@ -148,7 +171,7 @@ def dead_time_s(plant: Plant, loop: Loop, made: Sequence[Steps]) -> float:
         for place in range(len(DEAD_S)):
             models = [_recorded(one, loop.ticks_per_revolution) for one in ticks[:, place].T]
             costs[place] += sum(min(_unlike(one, model) for model in models) for one in shown)
-    return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)
+    return costs
 
 
 def _recorded(ticks: Column, ticks_per_revolution: int) -> Response:

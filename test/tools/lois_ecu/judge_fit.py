@@ -97,7 +97,7 @@ def judge(motor: MotorSettings, wheel: int, random: Random) -> str:
         target = tuned.target_rpm
         rpm = stepped(motor, tuned.gains, target)
         made.append((tuned.gains, target, [recorded(rpm)]))
-        loop = Loop(loop.period_s, TICKS, dead_time_s(plant, loop, made))
+        loop = Loop(loop.period_s, TICKS, dead_time_s([(plant, loop, made)]))
     own = (LEFT_GAINS, RIGHT_GAINS)[wheel]
     before = stepped(motor, PiGains(own.kp, own.tn, own.td), target)
     errors = [float(np.abs(one - target).sum()) * 0.01 / target for one in (rpm, before)]

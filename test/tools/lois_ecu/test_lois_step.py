@@ -3,6 +3,7 @@
 """``calibrate step`` of a LOIS ECU: encoders, plants and gains that were not known."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -145,6 +146,26 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
         assert found.phase_margin_deg >= margin
 
 
+@pytest.mark.parametrize("plant", [PLANT, Plant(0.7, 0.2, 0.06, 7.0), Plant(0.6, 0.45, 0.2, 3.0)])
+def test_a_board_that_sends_meanwhile_overshoots_by_three_points_more_at_most(plant: Plant) -> None:
+    """Whichever ticks wait until it has sent; the speeds that it sees of them are wrong."""
+    loop = replace(LOOP, dead_s=0.02)
+    found = tune(plant, loop, Goals(phase_margin_deg=60.0))
+    begun, sent_s = np.meshgrid(np.arange(0.0, 1.0, 0.1), np.arange(0.0, 0.2, 0.02))
+    rpm = answer(plant, found.gains, loop, found.target_rpm, 4.0, begun=begun, sent_s=sent_s)
+    overshoots = traits(rpm, found.target_rpm, 0.05).overshoot
+    assert found.overshoot + 0.005 < overshoots.max() < 0.08
+
+
+def test_a_board_that_sends_when_the_step_is_over_disturbs_nothing() -> None:
+    """The answer is the same to the last digit."""
+    loop, gains = replace(LOOP, sends_each_s=100.0), PiGains(0.8, 0.6, 0.1)
+    calm = answer(PLANT, gains, loop, 31.0, 3.0)
+    late = answer(PLANT, gains, loop, 31.0, 3.0, sent_s=np.array([50.0, 1.0]))
+    assert (late[:, 0] == calm).all()
+    assert (late[:, 1] != calm).any()
+
+
 def test_goals_that_nothing_meets_are_told() -> None:
     """A plant that is much faster than its controller."""
     slow = Loop(1.0, TICKS, 0.5)
@@ -171,7 +192,7 @@ def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
     rpm = answer(PLANT, gains, Loop(0.091, TICKS, dead_s), 31.0, 4.0, begun=0.6)
     ticks = 0.6 + np.cumsum(rpm) * 1e-3 * TICKS / 60
     at_s = np.interp(np.arange(1.0, ticks[-1]), ticks, 1e-3 * np.arange(1, len(ticks) + 1))
-    found = dead_time_s(PLANT, LOOP, [(gains, 31.0, [np.diff(at_s, prepend=0.0)])])
+    found = dead_time_s([(PLANT, LOOP, [(gains, 31.0, [np.diff(at_s, prepend=0.0)])])])
     assert found == pytest.approx(dead_s, abs=0.011)
 
 
