@@ -76,6 +76,8 @@ class Comparison:
     def __init__(self, motion: MotionFilter) -> None:
         self._motion = motion
         self._counted_m = [0.0, 0.0]
+        self._counted = [False, False]
+        """Whether the ticks of each wheel counted at the last group."""
         self._turned_m = 0.0
         self._told = [0.0, 0.0]
         self._repeats = [0, 0]
@@ -100,8 +102,9 @@ class Comparison:
         self._counted_m[index] += ticks * tick_m
         speed = motion.speed_mps(index)
         counts = wheel.counts(speed, signed=motion.signed)
-        if not counts and wheel.blind:
-            if ticks:  # counted before the target changed, or somebody pushes
+        counted, self._counted[index] = self._counted[index], bool(counts)
+        if not counts and wheel.blind and not counted:
+            if ticks:  # somebody pushes
                 self._counted_m[index] = estimate.mean[wheel.base + COUNT]
             return
         residual = self._counted_m[index] - estimate.mean[wheel.base + COUNT]
@@ -111,7 +114,7 @@ class Comparison:
         terms = [(wheel.base + COUNT, 1.0)]
         variance = TICK_VARIANCE * tick_m**2 + (COUNT_READ_S * speed) ** 2
         if residual**2 > DOUBT**2 * (estimate.variance_of(terms) + variance):
-            motion.doubt(index, abs(residual))
+            motion.doubt(index, abs(residual), counted=counted)
         estimate.measure(terms, residual, variance)
 
     # 0x20

@@ -157,9 +157,15 @@ class MotionFilter:
             self.filter.mean[state] += factor * way_m
         self.filter.disturb(terms, stddev_m**2)
 
-    def doubt(self, index: int, stddev_m: float) -> None:
-        """The way of this wheel may be off by this, and all that follows from it."""
-        self.filter.disturb(self._doubted(index), stddev_m**2)
+    def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
+        """The way of this wheel may be off by this, and all that follows from it; ``counted``: the
+        way before it stopped counting.
+        """
+        wheel = self.wheels[index]
+        terms = self._doubted(index)
+        if counted and not wheel.counts(self.speed_mps(index), signed=self.signed):
+            terms = [*self._way_terms(index), (wheel.base + COUNT, 1.0)]
+        self.filter.disturb(terms, stddev_m**2)
 
     def _doubted(self, index: int) -> Terms:
         """What depends on a way of this wheel that was not measured."""

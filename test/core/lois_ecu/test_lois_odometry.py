@@ -277,6 +277,26 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
     assert way_m == pytest.approx(20 * ours.tick_m, abs=4 * ours.tick_m)
 
 
+def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_say() -> None:
+    """Nothing was heard of the last half second, in which they should have rolled; what they roll
+    on when they are stopped is not counted.
+    """
+    ours = LoisEcuSettings()
+    odometry = LoisOdometry(ours)
+    odometry.wrote(SetRpm(20, 20), 0.0)
+    group = BoardOdometry(0.0, 0.0, 0.0, 0.28, 0.0, 0.0, appended=True)
+    for step in range(1, 21):
+        odometry.heard_ticks(Ticks(200 * step, 4 * step, 4 * step), 0.2 * step)
+        odometry.heard_odometry(group, 0.2 * step + 0.01)
+    odometry.wrote(SetRpm(0, 0), 4.5)
+    believed = odometry.predict(4.6)
+    for step in range(23, 28):
+        (last,) = odometry.heard_ticks(Ticks(200 * step, 82, 82), 0.2 * step)
+    assert believed is not None
+    assert believed.pose.x_m > 82 * ours.tick_m + 0.06
+    assert last.pose.x_m == pytest.approx(82 * ours.tick_m, abs=0.04)
+
+
 def test_a_velocity_that_is_no_number_is_no_speed() -> None:
     """The heading beside it is used."""
     odometry = LoisOdometry(LoisEcuSettings())
