@@ -8,7 +8,6 @@ Knows datagrams, chances and board time; not what they mean.
 import heapq
 from collections import Counter
 from dataclasses import dataclass
-from itertools import count
 from random import Random
 
 
@@ -39,7 +38,7 @@ class NetworkPath:
         self._faults = faults
         self._random = Random(seed)
         self._on_their_way: list[tuple[float, int, bytes]] = []
-        self._number = count()
+        self._sent = 0
 
     def send(self, datagram: bytes, at_s: float) -> None:
         """Give it to the network, at this board time."""
@@ -52,7 +51,8 @@ class NetworkPath:
             copies = 2
         for _ in range(copies):
             due_s = at_s + self._faults.delay_s * self._random.random()
-            heapq.heappush(self._on_their_way, (due_s, next(self._number), datagram))
+            heapq.heappush(self._on_their_way, (due_s, self._sent, datagram))
+            self._sent += 1
 
     def arrived(self, now_s: float) -> list[bytes]:
         """The datagrams that arrive up to this board time and have not been returned before."""

@@ -17,7 +17,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import cache
-from itertools import count, product
+from itertools import product
 from multiprocessing import Pool
 from typing import Final, Literal, NamedTuple
 
@@ -78,7 +78,7 @@ class Carrier:
         self.counting = False
         self.died_s = math.inf
         self._late: list[tuple[float, int, int, Packet]] = []
-        self._order = count()
+        self._carried = 0
 
     @property
     def stands(self) -> bool:
@@ -109,7 +109,8 @@ class Carrier:
                 self.board.server.imu.alive = False
                 self.died_s = now_s
         for at_s in times_s:
-            heapq.heappush(self._late, (at_s, next(self._order), way, packet))
+            heapq.heappush(self._late, (at_s, self._carried, way, packet))
+            self._carried += 1
 
     def receive(self, data: bytes, now: float, channel: int) -> None:
         self._put(0, (channel, data), data in POLLS)
