@@ -15,7 +15,8 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from omnibot_driver import messages
-from omnibot_driver.core.reporting.diagnosis import Diagnosis, Refusals, Status
+from omnibot_driver.core.reporting.diagnosis import Diagnosis, Refusals
+from omnibot_driver.core.reporting.status import Status
 from omnibot_driver.link import Link
 
 PERIOD_S: Final = 1.0

@@ -36,7 +36,7 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
-from omnibot_driver.core.reporting.diagnosis import Status
+from omnibot_driver.core.reporting.status import Status
 
 UNMEASURED_VARIANCE: Final = 1e6
 """For z, roll and pitch, of which a planar odometry says nothing, and for a twist not known."""

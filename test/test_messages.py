@@ -20,7 +20,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
-from omnibot_driver.core.reporting.diagnosis import Level, Status
+from omnibot_driver.core.reporting.status import Level, Status
 
 DEFAULTS = boards.check_all({})
 SETTINGS = messages.MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))

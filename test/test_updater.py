@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from omnibot_driver.core.reporting.diagnosis import Level, Status
+from omnibot_driver.core.reporting.status import Level, Status
 from omnibot_driver.diagnostics import _through_updater
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.reporting.diagnosis import Level, Status
+from omnibot_driver.core.reporting.status import Level, Status
 from omnibot_driver.tools.monitor.model import Flow, View
 from omnibot_driver.tools.monitor.teleop import DeadMan
 

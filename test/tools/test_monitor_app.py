@@ -11,7 +11,7 @@ from monitor_view import FakeRobot, view
 from textual import events
 from textual.pilot import Pilot
 
-from omnibot_driver.core.reporting.diagnosis import Level, Status
+from omnibot_driver.core.reporting.status import Level, Status
 from omnibot_driver.tools.monitor.app import Monitor
 from omnibot_driver.tools.monitor.teleop import HALT
 

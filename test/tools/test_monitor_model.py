@@ -11,7 +11,7 @@ from monitor_view import FINE, view
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.reporting.diagnosis import Level
+from omnibot_driver.core.reporting.status import Level
 from omnibot_driver.tools.monitor.model import LONGEST_PATH, Flow, Model, level
 from omnibot_driver.tools.monitor.rates import HISTORY_S, WINDOW_S, Rate
 

@@ -13,7 +13,7 @@ from monitor_view import FINE, view
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.reporting.diagnosis import Level, Status
+from omnibot_driver.core.reporting.status import Level, Status
 from omnibot_driver.tools.monitor import text
 from omnibot_driver.tools.monitor.model import Flow
 from omnibot_driver.tools.monitor.plot import draw_path, sparkline

@@ -8,17 +8,15 @@ know where they come from.
 """
 
 import math
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Final
 
 from omnibot_driver.core.board import RateName
 from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
+from omnibot_driver.core.reporting.recent import RecentFigures
+from omnibot_driver.core.reporting.status import RUNNING, Level, Status
 
-RECENT_S: Final = 10.0
-"""How long an event is shown."""
 RATE_TOLERANCE: Final = 0.05
 STUCK_READINGS: Final = 100
 LATE_S: Final = 0.005
@@ -33,32 +31,12 @@ BUSY_SHARE: Final = 0.1
 
 PUBLISHED_ODOMETRY: Final = "Published odometry (Hz)"
 """As the board's settings say; the rate of its readings is another one."""
-RUNNING: Final = ("nominal", "imu_only")
 OF_KIND: Final[Mapping[RateName, tuple[str, ...]]] = {
     "IMU": ("IMU frames lost", "IMU readings refused"),
     "Odometry": ("Odometry frames lost", "Odometry readings refused"),
     "Pose": ("Poses refused",),
 }
 """Figures that say nothing of a board which does not send this kind of reading."""
-
-
-class Level(IntEnum):
-    """The levels of diagnostic_msgs/DiagnosticStatus."""
-
-    OK = 0
-    WARN = 1
-    ERROR = 2
-    STALE = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Status:
-    """A diagnostic status: a verdict and its figures."""
-
-    name: str
-    level: Level
-    message: str
-    values: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,16 +55,14 @@ class Diagnosis:
 
     def __init__(self, to_check: str) -> None:
         self._to_check = to_check
-        self._counts: dict[str, tuple[int, float]] = {}
-        self._window: deque[tuple[float, SessionFigures]] = deque()
+        self._recent = RecentFigures()
         self._skewed_since = math.inf
-        self._waits: deque[tuple[float, float]] = deque()
 
     def judge(
         self, link: LinkFigures, session: SessionFigures, refusals: Refusals, now: float
     ) -> list[Status]:
         """All verdicts, of one board always of the same names in the same order."""
-        self._remember(session, now)
+        self._recent.remember(session, now)
         statuses = [
             self._link(link, now),
             self._board(link, session, now),
@@ -97,22 +73,6 @@ class Diagnosis:
         ]
         return [*statuses, self._imu(session)] if "IMU" in session.board.rates_hz else statuses
 
-    def _remember(self, session: SessionFigures, now: float) -> None:
-        """Note the state, unless it is the same as before."""
-        if self._window and self._window[-1][1].state != session.state:
-            self._window.clear()
-        self._window.append((now, session))
-        while now - self._window[0][0] > RECENT_S:
-            self._window.popleft()
-
-    def _grew(self, name: str, count: int, now: float) -> bool:
-        """Whether this count has grown lately."""
-        before, at = self._counts.get(name, (count, -math.inf))
-        if count != before:
-            at = now
-        self._counts[name] = (count, at)
-        return now - at < RECENT_S
-
     def _link(self, link: LinkFigures, now: float) -> Status:
         reconnects = max(0, link.opened - 1)
         level, message = Level.OK, "connected"
@@ -120,7 +80,7 @@ class Diagnosis:
             level, message = Level.ERROR, link.trouble
         elif not link.opened:
             level, message = Level.STALE, "the port is being opened"
-        elif self._grew("reconnects", reconnects, now):
+        elif self._recent.grew("reconnects", reconnects, now):
             level = Level.WARN
             message = "the port was lost and is open again: check cable, hub and power"
         values = {
@@ -151,7 +111,7 @@ class Diagnosis:
         }[session.state]
         if session.state == "connecting" and link.trouble:
             level, message = Level.STALE, "not known while one of its lines is missing"
-        if self._grew("restarts", restarts, now) and level is Level.OK:
+        if self._recent.grew("restarts", restarts, now) and level is Level.OK:
             level = Level.WARN
             message = "the board has restarted: unless you reset it, check its power supply"
         if session.board.trouble and session.state in RUNNING:
@@ -164,18 +124,18 @@ class Diagnosis:
     def _stream(self, link: LinkFigures, session: SessionFigures, now: float) -> Status:
         tally, refused = session.tally, session.refused
         readings_refused = refused.imu + refused.displacements + refused.poses
-        damaged = self._grew("faults", session.board.faults, now)
-        lossy = self._grew("gaps", tally.gaps, now)
-        overran = self._grew("overruns", link.overruns or 0, now)
-        waiting = self._waiting_share(link, now)
-        doubtful = self._grew("refused", readings_refused, now)
-        rates, wanted = self._rates_hz(), session.board.rates_hz
+        damaged = self._recent.grew("faults", session.board.faults, now)
+        lossy = self._recent.grew("gaps", tally.gaps, now)
+        overran = self._recent.grew("overruns", link.overruns or 0, now)
+        waiting = self._recent.waiting_share(link, now)
+        doubtful = self._recent.grew("refused", readings_refused, now)
+        rates, wanted = self._recent.rates_hz(), session.board.rates_hz
         odom_hz = session.board.odom_hz
         level, message = Level.OK, "complete"
         if session.state not in RUNNING:
             level, message = Level.STALE, "the board sends no measurements"
         elif rates and any(
-            abs(rates[name] - want) > RATE_TOLERANCE * want + 1.0 / self._span_s
+            abs(rates[name] - want) > RATE_TOLERANCE * want + 1.0 / self._recent.span_s
             for name, want in wanted.items()
             if name == "IMU" or session.state == "nominal"
         ):
@@ -230,43 +190,15 @@ class Diagnosis:
             {key: value for key, value in values.items() if key not in absent},
         )
 
-    def _waiting_share(self, link: LinkFigures, now: float) -> float:
-        """The part of the recent time in which the reader was ready to run and did not."""
-        if link.waited_s is None:
-            return 0.0
-        self._waits.append((now, link.waited_s))
-        while now - self._waits[0][0] > RECENT_S:
-            self._waits.popleft()
-        since, before_s = self._waits[0]
-        return (link.waited_s - before_s) / (now - since) if now > since else 0.0
-
-    @property
-    def _span_s(self) -> float:
-        return self._window[-1][0] - self._window[0][0]
-
-    def _rates_hz(self) -> dict[RateName, float] | None:
-        """Rates of the readings in this state; None until there was time to count."""
-        if not self._span_s:
-            return None
-        old, new = self._window[0][1].tally, self._window[-1][1].tally
-        counts: dict[RateName, int] = {
-            "IMU": new.imu - old.imu,
-            "Odometry": new.displacements - old.displacements,
-            "Pose": new.poses - old.poses,
-        }
-        return {name: count / self._span_s for name, count in counts.items()}
-
     def _time(self, session: SessionFigures, now: float) -> Status:
-        old, new = self._window[0][1].tally, self._window[-1][1].tally
-        reads = new.reads - old.reads
         skewed = session.state in RUNNING and abs(session.skew_ppm) > LARGEST_SKEW_PPM
         self._skewed_since = min(self._skewed_since, now) if skewed else math.inf
-        if session.state not in RUNNING or not reads:
+        delay = self._recent.delay_s()
+        if session.state not in RUNNING or delay is None:
             return Status(
                 "Time", Level.STALE, "no measurements, so the board's time is unknown", {}
             )
-        delay_s = (new.delay_s - old.delay_s) / reads
-        variance = (new.squared_delay_s2 - old.squared_delay_s2) / reads - delay_s * delay_s
+        delay_s, jitter_s = delay
         level, message = Level.OK, "stamps are sampling times"
         if now - self._skewed_since > SKEW_KNOWN_S:
             level = Level.WARN
@@ -282,16 +214,16 @@ class Diagnosis:
         values = {
             "Clock skew (ppm)": f"{session.skew_ppm:.1f}",
             "Delay above minimum (ms)": f"{1e3 * delay_s:.2f}",
-            "Jitter (ms rms)": f"{1e3 * math.sqrt(max(0.0, variance)):.2f}",
+            "Jitter (ms rms)": f"{1e3 * jitter_s:.2f}",
         }
         return Status("Time", level, message, values)
 
     def _commands(self, session: SessionFigures, refusals: Refusals, now: float) -> Status:
         commands, saturated = session.commands, session.board.saturated
-        refused = self._grew("refusals", refusals.count, now)
-        too_large = self._grew("saturated", saturated, now)
-        limited = self._grew("limited", commands.limited, now)
-        tripped = self._grew("trips", commands.trips, now)
+        refused = self._recent.grew("refusals", refusals.count, now)
+        too_large = self._recent.grew("saturated", saturated, now)
+        limited = self._recent.grew("limited", commands.limited, now)
+        tripped = self._recent.grew("trips", commands.trips, now)
         level = Level.OK
         if commands.interlock:
             level, message = Level.ERROR, f"motion is refused: {commands.interlock}"

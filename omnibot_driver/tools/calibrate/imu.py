@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from omnibot_driver.core.reporting.diagnosis import RUNNING
+from omnibot_driver.core.reporting.status import RUNNING
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.log import Imu
 from omnibot_driver.tools.calibrate.rest import Rest, rest, still

@@ -15,7 +15,7 @@ from textual.containers import Horizontal
 from textual.screen import ModalScreen
 from textual.widgets import Footer, Static
 
-from omnibot_driver.core.reporting.diagnosis import Level
+from omnibot_driver.core.reporting.status import Level
 from omnibot_driver.tools.monitor import text
 from omnibot_driver.tools.monitor.model import View
 from omnibot_driver.tools.monitor.plot import ARROWS, draw_path

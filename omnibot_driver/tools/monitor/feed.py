@@ -30,7 +30,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from omnibot_driver.core.geometry.quaternion import yaw_of
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.reporting.diagnosis import Status
+from omnibot_driver.core.reporting.status import Status
 from omnibot_driver.messages import UNMEASURED_VARIANCE
 from omnibot_driver.tools.drivers import running_drivers
 from omnibot_driver.tools.monitor.model import (

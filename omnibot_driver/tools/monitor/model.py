@@ -15,7 +15,7 @@ from typing import Final
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.readings import Vector3
-from omnibot_driver.core.reporting.diagnosis import RUNNING, Level, Status
+from omnibot_driver.core.reporting.status import RUNNING, Level, Status
 from omnibot_driver.tools.monitor.rates import Rate
 
 IMU_TOPIC: Final = "imu/data_raw"

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.reporting.diagnosis import Level, Status
+from omnibot_driver.core.reporting.status import Level, Status
 from omnibot_driver.tools.monitor.model import IMU_TOPIC, ODOM_TOPIC, Flow, View
 from omnibot_driver.tools.monitor.plot import sparkline
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from omnibot_driver.core.reporting.diagnosis import RUNNING
+from omnibot_driver.core.reporting.status import RUNNING
 from omnibot_driver.tools.report.log import Array, Log
 
 X, Y, Z, COMMAND, RED, GREY = "#0072B2", "#D55E00", "#009E73", "#222222", "#C0272D", "#8A8F98"

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from omnibot_driver.core.reporting.diagnosis import RUNNING
+from omnibot_driver.core.reporting.status import RUNNING
 from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Mask, Series, Span
 

@@ -11,7 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from omnibot_driver.core.reporting.diagnosis import PUBLISHED_ODOMETRY, RUNNING
+from omnibot_driver.core.reporting.diagnosis import PUBLISHED_ODOMETRY
+from omnibot_driver.core.reporting.status import RUNNING
 from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import Array, Log, Series, Span
 

@@ -10,13 +10,15 @@ import pytest
 from omnibot_driver.core.board import BoardFigures, RateName
 from omnibot_driver.core.measurement.outlier_filter import Refused
 from omnibot_driver.core.measurement.statistics import StreamStatistics
-from omnibot_driver.core.reporting.diagnosis import RECENT_S, Diagnosis, Level, Refusals, Status
+from omnibot_driver.core.reporting.diagnosis import Diagnosis, Refusals
 from omnibot_driver.core.reporting.figures import (
     CommandFigures,
     ImuFigures,
     LinkFigures,
     SessionFigures,
 )
+from omnibot_driver.core.reporting.recent import RECENT_S
+from omnibot_driver.core.reporting.status import Level, Status
 
 NAMES = ["Link", "Board", "Stream", "Time", "Commands", "E-stop", "IMU"]
 Change = Callable[["Robot"], None]

@@ -1,0 +1,75 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the verdicts are about: the last ten seconds of the figures."""
+
+import math
+from collections import deque
+from typing import Final
+
+from omnibot_driver.core.board import RateName
+from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
+
+RECENT_S: Final = 10.0
+"""How long an event is shown."""
+
+
+class RecentFigures:
+    """Those of the present state, as far as they are recent; asked about once a second."""
+
+    def __init__(self) -> None:
+        self._counts: dict[str, tuple[int, float]] = {}
+        self._window: deque[tuple[float, SessionFigures]] = deque()
+        self._waits: deque[tuple[float, float]] = deque()
+
+    def remember(self, session: SessionFigures, now: float) -> None:
+        """Note the figures; those of another state are forgotten."""
+        if self._window and self._window[-1][1].state != session.state:
+            self._window.clear()
+        self._window.append((now, session))
+        while now - self._window[0][0] > RECENT_S:
+            self._window.popleft()
+
+    def grew(self, name: str, count: int, now: float) -> bool:
+        """Whether this count has grown lately."""
+        before, at = self._counts.get(name, (count, -math.inf))
+        if count != before:
+            at = now
+        self._counts[name] = (count, at)
+        return now - at < RECENT_S
+
+    def waiting_share(self, link: LinkFigures, now: float) -> float:
+        """The part of the recent time in which the reader was ready to run and did not."""
+        if link.waited_s is None:
+            return 0.0
+        self._waits.append((now, link.waited_s))
+        while now - self._waits[0][0] > RECENT_S:
+            self._waits.popleft()
+        since, before_s = self._waits[0]
+        return (link.waited_s - before_s) / (now - since) if now > since else 0.0
+
+    @property
+    def span_s(self) -> float:
+        """From the first to the last figures of this state."""
+        return self._window[-1][0] - self._window[0][0]
+
+    def rates_hz(self) -> dict[RateName, float] | None:
+        """Rates of the readings in this state; None until there was time to count."""
+        if not self.span_s:
+            return None
+        old, new = self._window[0][1].tally, self._window[-1][1].tally
+        counts: dict[RateName, int] = {
+            "IMU": new.imu - old.imu,
+            "Odometry": new.displacements - old.displacements,
+            "Pose": new.poses - old.poses,
+        }
+        return {name: count / self.span_s for name, count in counts.items()}
+
+    def delay_s(self) -> tuple[float, float] | None:
+        """Mean and standard deviation of the delay of the reads above the least one, if any."""
+        old, new = self._window[0][1].tally, self._window[-1][1].tally
+        reads = new.reads - old.reads
+        if not reads:
+            return None
+        mean_s = (new.delay_s - old.delay_s) / reads
+        variance = (new.squared_delay_s2 - old.squared_delay_s2) / reads - mean_s * mean_s
+        return mean_s, math.sqrt(max(0.0, variance))
