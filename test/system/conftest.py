@@ -13,6 +13,8 @@ import rclpy
 from driver_process import Driver
 from probe import Probe
 
+from omnibot_driver.shared_session import WAITED
+
 if TYPE_CHECKING:
     from omnibot_driver.simulator.omnibot import PtyBoard
 
@@ -51,7 +53,14 @@ def start_driver(stack: ExitStack) -> Callable[..., Driver]:
 
 @pytest.fixture
 def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
-    return lambda driver: stack.enter_context(Probe(driver.namespace))
+    """On a busy computer a driver may stall: what it asks for then is published again."""
+
+    def start(driver: Driver) -> Probe:
+        probe = stack.enter_context(Probe(driver.namespace))
+        driver.answers[WAITED] = probe.publish_again
+        return probe
+
+    return start
 
 
 @pytest.fixture

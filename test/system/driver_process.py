@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -62,6 +62,8 @@ class Driver:
         else:
             self.process = _nursery.start(arguments, environment)
         self.lines: list[str] = []
+        self.answers: dict[str, Callable[[], None]] = {}
+        """What to do at each line in which one of these texts is found."""
         self._said = threading.Condition()
         self._listener = threading.Thread(target=self._listen)
         self._listener.start()
@@ -124,5 +126,7 @@ class Driver:
             with self._said:
                 self.lines.append(line)
                 self._said.notify_all()
+            for answer in [answer for text, answer in self.answers.items() if text in line]:
+                answer()
         with self._said:
             self._said.notify_all()

@@ -4,17 +4,21 @@
 
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any, Self
 
 from driver_process import PATIENCE_S
 from geometry_msgs.msg import Twist
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 from rclpy.time import Time
 from std_msgs.msg import String
+
+from omnibot_driver.stall_detector import SETTLE_S
 
 
 class Probe:
@@ -25,6 +29,7 @@ class Probe:
         self._received: dict[str, list[Any]] = {}
         self._clients: dict[str, Any] = {}
         self._changed = threading.Condition()
+        self._publish_again: Callable[[], None] = lambda: None
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._stopping = Future()
@@ -98,7 +103,23 @@ class Probe:
         """A publisher that somebody already listens to."""
         publisher = self.node.create_publisher(kind, topic, qos)
         self.wait_for_graph(publisher.get_subscription_count)
+        publish = publisher.publish
+
+        def keep_and_publish(message: Any) -> None:
+            self._publish_again = partial(publish, message)
+            publish(message)
+
+        publisher.publish = keep_and_publish
         return publisher
+
+    def publish_again(self) -> None:
+        """Publish the newest message of the probe's publishers, once a stall is over for sure."""
+
+        def publish() -> None:
+            with suppress(InvalidHandle):  # the test has ended or removed its publisher
+                self._publish_again()
+
+        threading.Timer(2 * SETTLE_S, publish).start()
 
     @contextmanager
     def commanding(self, vx: float, yaw_rate: float = 0.0) -> Iterator[None]:

@@ -175,6 +175,7 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
     wait_until(
         lambda: commands.publish(nothing) or "NaN or infinity" in driver.output
     )  # it hears us
+    driver.answers.clear()  # it is not published again
     mark = hang(driver, board)
     stamped = TwistStamped(twist=twist(0.2))
     stamped.header.stamp = probe.node.get_clock().now().to_msg()
@@ -184,6 +185,19 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
     driver.wait_for_line("motion command refused: it waited")
     with board.lock:
         assert "velocity" not in [command.kind for command in board.board.commands]
+
+
+def test_a_command_that_waited_while_the_driver_hung_is_obeyed_when_it_is_sent_again(
+    board: PtyBoard, driver: Driver, probe: Probe
+) -> None:
+    """The probe does what the refusal asks for."""
+    commands = probe.publisher(Twist, "cmd_vel")
+    mark = hang(driver, board)
+    commands.publish(twist(0.2))
+    assert board.wait_for(lambda b: LAST_WORDS in bytes(b.received[mark:]), PATIENCE_S)
+    driver.process.send_signal(signal.SIGCONT)
+    driver.wait_for_line("motion command refused: it waited.*send it again")
+    assert board.wait_for(lambda b: b.truth.vx_mps > 0.1, PATIENCE_S)
 
 
 def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(

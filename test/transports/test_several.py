@@ -82,8 +82,8 @@ def test_what_is_read_and_written_keeps_its_channel(ends: Ends, lines: Several) 
     os.write(ends.far[1], b"front")
     assert next_packets(lines, 2) == {(0, b"drive"), (1, b"front")}
     lines.write(((1, b"a"), (0, b"b"), (1, b"c")))
-    assert os.read(ends.far[0], 99) == b"b"
-    assert os.read(ends.far[1], 99) == b"ac"
+    assert heard(ends.far[0], b"b") == b"b"
+    assert heard(ends.far[1], b"ac") == b"ac"
 
 
 def read_on(lines: Several) -> NoReturn:
@@ -134,7 +134,7 @@ def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Severa
         lines.write(((0, b"old"), (1, b"stop")))
     finally:
         select.poll = poll  # type: ignore[misc]
-    assert os.read(ends.far[1], 99) == b"stopstop"
+    assert heard(ends.far[1], b"stopstop") == b"stopstop"
     assert changed(lines) == {0: "it has accepted no data for 0.2 s"}
     lines.write(((0, b"new"), (1, b"stop")))
     assert heard(ends.far[0], b"new").strip(b"x") == b"new"
