@@ -239,7 +239,7 @@ class Starts(Moves):
             self.motion = Motion.UNKNOWN
             why = "another motion is in progress"
         elif word is words.RM and self._is_of_another(reply, now):
-            why = "no reason of its own is known"
+            why = "the driver tries again"
             self.health.reference_fails += reply.reason == ""
         else:
             why = self._obstacle(reply, self.motion)
