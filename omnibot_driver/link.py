@@ -141,10 +141,10 @@ class Link:
                 self._shared.leaving = True
                 self._shared.on_exit = on_exit
                 self._stop_for_good()
-                self._shared.write(self._session.shutdown_sequence(on_exit, time.monotonic()))
+                self._shared.write(self._session.shutdown.sequence(on_exit, time.monotonic()))
                 if self._shared.port is not None:
                     told = self._shared.write_error is None and not self._shared.port.missing
-                    self._shared.stood = told and self._session.stands
+                    self._shared.stood = told and self._session.shutdown.stands
                     self._shared.port.interrupt()
                     self._shared.port = None  # nothing may follow the last words
             self._shared.closing.set()
@@ -168,23 +168,25 @@ class Link:
 
     def _stop_for_good(self) -> None:
         """Under the lock, wait until the robot stands while the pacer repeats Stop."""
-        self._session.leave(now := time.monotonic())
+        self._session.shutdown.begin(now := time.monotonic())
         self._shared.settle()
         alone = (
             self._shared.port is not None
             and self._shared.keeper is None
             and not self._shared.port.ends_with_us
         )
-        proof_s = self._session.proof_takes_s + self._session.board.traits.stops_within_s
+        proof_s = self._session.shutdown.proof_takes_s + self._session.board.traits.stops_within_s
         self._await_standstill(now + max(UNGUARDED_S if alone else STANDS_WITHIN_S, proof_s))
-        if self._session.stands and self._session.fall_silent(now := time.monotonic()):
+        if self._session.shutdown.stands and self._session.shutdown.fall_silent(
+            now := time.monotonic()
+        ):
             self._await_standstill(now + max(SILENCE_S, proof_s))
 
     def _await_standstill(self, until: float) -> None:
         while (
             self._shared.port is not None
             and self._shared.write_error is None
-            and not self._session.stands
+            and not self._session.shutdown.stands
         ):
             if (left_s := until - time.monotonic()) <= 0.0:
                 break

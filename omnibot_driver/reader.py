@@ -102,7 +102,7 @@ class Reader:
     def _attach_anew(self, port: Transport) -> None:
         """Its lines have changed: all begins again, on those that are there now."""
         with self._lock:
-            self._shared.write(self._session.broken_off())
+            self._shared.write(self._session.shutdown.broken_off())
             self._session.closed(now := time.monotonic())
             self._session.opened(now, missing="a line of the board was connected or lost")
             keeper = self._shared.keeper
@@ -139,7 +139,7 @@ class Reader:
                 self._wait_s = self.reconnect_interval_s
                 self.received_bytes += len(data)
                 self._count(port, now)
-                measured = self._session.hear(data, now, channel)
+                measured = self._session.inbound.hear(data, now, channel)
                 if not measured:
                     self._process(now)
                 elif not (claimed := self._outbox.claim()):
@@ -159,7 +159,7 @@ class Reader:
     def _process(self, now: float) -> None:
         """With the lock held: what comes of the bytes, but for what was measured at once."""
         stopped = self._shared.heed_stall()
-        if self._session.process(now) or stopped:
+        if self._session.inbound.process(now) or stopped:
             self._shared.settle()
         else:
             self._shared.tell_guard()
@@ -178,10 +178,10 @@ class Reader:
         with self._lock:
             if self._shared.write_error is None:
                 self._shared.write(
-                    self._session.shutdown_sequence(self._shared.on_exit, time.monotonic())
+                    self._session.shutdown.sequence(self._shared.on_exit, time.monotonic())
                 )
             else:  # Stop, right behind whatever is out of the kernel's reach
-                port.write_if_room(self._session.broken_off())
+                port.write_if_room(self._session.shutdown.broken_off())
             lines = len(port.descriptors or ())  # of several, some may be there to be stopped
             stopped = self._shared.stood if self._closing.is_set() else comes_back and lines < 2
             keeper, self._shared.port, self._shared.keeper = self._shared.keeper, None, None

@@ -154,4 +154,4 @@ class Replay:
 
 def _hear(packet: Packet, session: Session, now: float) -> None:
     channel, data = packet
-    session.receive(data, now, channel)
+    session.inbound.receive(data, now, channel)

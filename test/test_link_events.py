@@ -25,7 +25,7 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
     """Callers, the reader and the pacer, with a listener that is now and then slow."""
     happened: list[Event] = []
     ours, listener = session(), Listener()
-    hear, take_events, deliver = ours.hear, ours.take_events, listener.deliver
+    hear, take_events, deliver = ours.inbound.hear, ours.take_events, listener.deliver
 
     def heard(data: bytes, now: float, _channel: int) -> list[ImuEstimate]:
         estimates = hear(data, now)
@@ -50,7 +50,7 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
         session.estop(active, now, by=by)
 
     random = Random(4)
-    ours.hear, ours.take_events = heard, taken  # type: ignore[method-assign]
+    ours.inbound.hear, ours.take_events = heard, taken  # type: ignore[method-assign]
     listener.deliver = slowly  # type: ignore[method-assign]
     link = link_to(board.path, listener, ours)
     link.start()

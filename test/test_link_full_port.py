@@ -87,7 +87,7 @@ def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: 
         session_closed.set()
         closed(now)
 
-    ours.hear, ours.closed = defective, tell_and_close  # type: ignore[method-assign]
+    ours.inbound.hear, ours.closed = defective, tell_and_close  # type: ignore[method-assign]
     os.write(terminal.far, b"x")
     assert session_closed.wait(PATIENCE_S)
     terminal.read_until(5 * joined(LAST_WORDS[0]))

@@ -176,7 +176,7 @@ def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     def read(data: bytes) -> None:
         nonlocal now
         now += 0.01
-        session.receive(data, now)
+        session.inbound.receive(data, now)
         publishing.publish(session.take_events(), 0)
 
     session.opened(now)

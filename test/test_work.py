@@ -98,7 +98,7 @@ def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:
-        session.receive(data, now)
+        session.inbound.receive(data, now)
         session.take_output(now)
         assert session.wake_at > now
         session.take_events()
@@ -112,10 +112,10 @@ def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:
-        assert session.hear(data, now) or now < SETTLED * TICK_S
+        assert session.inbound.hear(data, now) or now < SETTLED * TICK_S
 
     def rest(now: float) -> None:
-        session.process(now)
+        session.inbound.process(now)
         session.take_events()
 
     assert most_calls(work, rest)[kind] <= bound
@@ -126,7 +126,7 @@ def test_a_command_calls_no_more_than_it_did() -> None:
     session, board, now = opened_session(), SimulatedBoard(BoardSettings(running=True)), 0.0
     for tick in range(SETTLED):
         now = tick * TICK_S
-        session.receive(board.step(), now)
+        session.inbound.receive(board.step(), now)
         session.take_output(now)
     data = LITTLE_ENDIAN + struct.pack("<6d", 0.1, 0.0, 0.0, 0.0, 0.0, 0.1)
     written = []

@@ -6,15 +6,15 @@ The shell around it calls an input, then takes ``take_output`` to the port and `
 its caller, and calls ``tick`` when ``wake_at`` has come. Not thread-safe, reads no clock, does
 not log: whatever a user should hear of is an event.
 
-It knows in which order its parts have their turn, and keeps next to nothing itself: ``liveness``
-when the board was heard, ``safety`` what stops the robot, ``interlocks`` what is refused,
-``reporter`` what there is to tell. Must not know bytes or threads.
+It puts its parts together and keeps nothing itself: ``inbound`` takes what the board says,
+``safety`` knows what stops the robot, ``interlocks`` what is refused, ``reporter`` what there is
+to tell, ``shutdown`` the end. Must not know bytes or threads.
 """
 
 import math
 from collections.abc import Sequence
 
-from omnibot_driver.core.board import Board, Mode
+from omnibot_driver.core.board import Board
 from omnibot_driver.core.commands.interlocks import Interlocks
 from omnibot_driver.core.commands.pipeline import Command, CommandPipeline
 from omnibot_driver.core.commands.shaping import ControlMethod
@@ -22,25 +22,20 @@ from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import Event
 from omnibot_driver.core.geometry.se2 import Pose, Signs
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.inbound import Inbound
 from omnibot_driver.core.liveness import Liveness
 from omnibot_driver.core.long_task import LongTask
 from omnibot_driver.core.measurement.outlier_filter import Refused
 from omnibot_driver.core.measurement.pipeline import MeasurementPipeline
 from omnibot_driver.core.mode_manager import CLOSED, ModeManager
 from omnibot_driver.core.packets import NO_PACKETS, Packets
-from omnibot_driver.core.readings import (
-    NoticeReading,
-    OdometryReading,
-    PausedReading,
-    Reading,
-    Vector3,
-)
+from omnibot_driver.core.readings import Vector3
 from omnibot_driver.core.reporter import Reporter
 from omnibot_driver.core.reporting.figures import SessionFigures
-from omnibot_driver.core.requests import OnExit, Request
+from omnibot_driver.core.requests import Request
 from omnibot_driver.core.safety import SafetyStops
 from omnibot_driver.core.settings import SessionSettings
+from omnibot_driver.core.shutdown import Shutdown
 
 
 class Session:
@@ -74,11 +69,11 @@ class Session:
         self._interlocks = Interlocks(board, modes, commanding, self._calibration, liveness)
         self._task = LongTask()
         reporter = self._reporter = Reporter(board, modes, measurement, commanding, self._task)
-        self._safety = SafetyStops(
+        safety = self._safety = SafetyStops(
             board, modes, measurement, commanding, liveness, reporter, self._task
         )
-        self._last: Reading | None = None
-        """Of those that were heard and not processed yet."""
+        self.inbound = Inbound(board, modes, measurement, commanding, liveness, reporter, safety)
+        self.shutdown = Shutdown(board, modes, self._commands, self._interlocks)
 
     # What is so
 
@@ -155,76 +150,20 @@ class Session:
 
     def closed(self, now: float) -> None:
         """End the connection, as the port is lost."""
-        if readings := self._board.flush(now):
-            self._last = readings[-1]
-        self._reporter.events += self._measurement.hear(readings, now)
-        self.process(now)
-        self._safety.react(self._measurement.release(), now)
+        self.inbound.end(now)
         self._mode_manager.closed()
         for given_up in (self._calibration.give_up, self._task.give_up):
             given_up("the port was lost meanwhile; call again once it is back")
         self._commands.discard(now)
 
-    def receive(self, data: bytes, now: float, channel: int = 0) -> None:
-        """Process bytes that arrived at ``now``."""
-        self._reporter.events += self.hear(data, now, channel)
-        self.process(now)
-
-    def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
-        """``receive``, but for what can wait until these are published: ``process`` is to follow.
-
-        A command that arrives in between is handled as if it came before the bytes. That must not
-        be where they change the mode, so there nothing waits; nor does it where anything else is
-        asked for.
-        """
-        self._liveness.came_at = now
-        before = self._board.mode
-        if readings := self._board.receive(data, now, channel):
-            self._liveness.heard_at, self._last = now, readings[-1]
-        estimates = self._measurement.hear(readings, now)
-        after = self._board.mode
-        if after is before:
-            return estimates
-        self._reporter.events += estimates
-        self._reporter.news_at = now
-        self.process(now)
-        if after.running and not before.running:
-            self._safety.set_out(now)
-        return []
-
     def overran(self, count: int) -> None:
         """Note how often the port has lost bytes since it was opened."""
         self._reporter.overruns = count
 
-    def process(self, now: float) -> bool:
-        """What comes of the bytes that were heard last. False: nothing to write or to tell."""
-        last, self._last = self._last, None
-        if (
-            now < self._reporter.news_at
-            and now < self._board.wake_at
-            and not self._measurement.undigested
-            and not self._reporter.events
-            and self._mode_manager.at_rest
-        ):
-            return False
-        if last is None:
-            return True
-        if self._measurement.undigested:
-            measured = self._measurement.flush()
-            refused = self._measurement.refused_displacements
-            if news := self._commanding.count_refused(refused, now):
-                self._reporter.notify(news)
-            self._safety.react(measured, now)
-        if now >= self._reporter.news_at:
-            self._reporter.look_for_news(now)
-        if self._board.mode.running and not isinstance(last, PausedReading):
-            self._mode_manager.heard_data(now)
-        return True
-
     def tick(self, now: float) -> None:
         """Time passed."""
         if now >= self._board.wake_at:
-            self._elapse(now)
+            self.inbound.elapse(now)
         self._safety.tick(now)
         self._mode_manager.tick(now)
         self._calibration.tick(now)
@@ -256,7 +195,7 @@ class Session:
         """Start, pause or reset; answered by a RequestDone. Raises RequestRefused at once."""
         if reason := self._interlocks.why_not_request():
             raise RequestRefused(reason)
-        self.process(now)  # what came before is not an answer
+        self.inbound.process(now)  # what came before is not an answer
         self._mode_manager.request(request, token, now)
         if request is Request.START:
             self._commanding.interlock.start()
@@ -296,57 +235,15 @@ class Session:
     def reset_odometry(self, now: float) -> None:
         """Begin the odometry frame at the robot's present pose; a goal in the old one is
         dropped."""
-        self.process(now)
+        self.inbound.process(now)
         self._board.reset_odometry()
         self._reporter.events += self._odometry.reset()
         self._reporter.notify(self._commanding.check_goal([], now))
-
-    def leave(self, now: float) -> None:
-        """Begin the shutdown: refuse everything, and repeat Stop."""
-        self._interlocks.leaving = True
-        self._board.leave()
-        self._commands.halt(now)
-
-    def fall_silent(self, now: float) -> bool:
-        """Stop is not repeated any more: the last one may have been damaged, so it is proved anew.
-
-        Whether the board can show that.
-        """
-        if self._board.mode is not Mode.NOMINAL or self.estop_active:
-            return False
-        if not self._board.shows_standstill:
-            return False
-        self._commands.fall_silent(now)
-        return True
 
     @property
     def board(self) -> Board:
         """The board, for its own profile."""
         return self._board
-
-    @property
-    def stands(self) -> bool:
-        """The board has shown that the robot stands, and no motion was commanded since."""
-        return self._commands.proof.proved
-
-    @property
-    def proof_takes_s(self) -> float:
-        """How long to wait until the robot is seen to stand, from Stop on."""
-        return self._commands.proof.takes_s
-
-    def shutdown_sequence(self, on_exit: OnExit, now: float) -> Packets:
-        """The last packets to write before the port is closed."""
-        proved = self._commands.quiet and self.stands
-        packets = self._mode_manager.shutdown_sequence(on_exit, proved=proved)
-        self._commands.discard(now)
-        return packets + self._estop_again()
-
-    def broken_off(self) -> Packets:
-        """What is to follow a write that failed half-way, before the port is closed."""
-        return self._board.wake() + self._estop_again()
-
-    def _estop_again(self) -> Packets:
-        return self._board.emergency_stop() if self.estop_active else NO_PACKETS
 
     # What comes of it
 
@@ -374,19 +271,6 @@ class Session:
     def take_events(self) -> list[Event]:
         """Return and forget the events since the last call, in order."""
         return self._reporter.take()
-
-    def _elapse(self, now: float) -> None:
-        """What becomes known without bytes; odometry that is predicted does not count as heard."""
-        before = self._board.mode
-        readings = self._board.elapse(now)
-        self._reporter.events += self._measurement.hear(readings, now)
-        if all(isinstance(reading, OdometryReading | NoticeReading) for reading in readings):
-            self._safety.react(self._measurement.flush(), now)
-        else:
-            self._liveness.heard_at, self._last = now, readings[-1]
-            self.process(now)
-        if self._board.mode.running and not before.running:
-            self._safety.set_out(now)
 
     def _command(self, wish: Command, now: float) -> None:
         motion, expires_at = wish

@@ -123,9 +123,9 @@ def cold(ticks: int) -> str:
         if forgotten and tick >= SETTLED:
             other[:] = bytes(OTHERS_BYTES)
         begun = time.perf_counter()
-        session.hear(data, now)
+        session.inbound.hear(data, now)
         passed = time.perf_counter() - begun
-        session.process(now)
+        session.inbound.process(now)
         session.take_output(now)
         session.take_events()
         if tick >= SETTLED and len(data) == 14:
@@ -151,7 +151,7 @@ def memory(hours: float = 1.0) -> str:
         start = 0
         for end in ends:
             now += (end - start) / BYTES_PER_S
-            session.receive(data[start:end], now)
+            session.inbound.receive(data[start:end], now)
             session.take_output(now)
             events += len(session.take_events())
             start = end

@@ -17,8 +17,8 @@ from typing import Any
 
 from rclpy.publisher import Publisher
 
+from omnibot_driver.core.inbound import Inbound
 from omnibot_driver.core.omnibot.decoder import FrameDecoder
-from omnibot_driver.core.session import Session
 from omnibot_driver.publishing import Publishing
 from omnibot_driver.transports.serial_port import SerialPort
 
@@ -50,8 +50,8 @@ def timed(owner: type, name: str, stage: str) -> None:
 
 timed(SerialPort, "read", "read")
 timed(FrameDecoder, "feed", "decode")
-timed(Session, "hear", "measure (clock, plausibility, odometry, IMU)")
-timed(Session, "process", "measure (clock, plausibility, odometry, IMU)")
+timed(Inbound, "hear", "measure (clock, plausibility, odometry, IMU)")
+timed(Inbound, "process", "measure (clock, plausibility, odometry, IMU)")
 timed(Publishing, "deliver", "convert (stamps, serialising)")
 timed(Publisher, "publish", "publish")
 timed(threading.Thread, "run", "the rest of the reader (lock, commands due, state)")

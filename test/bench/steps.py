@@ -101,8 +101,8 @@ class Relay:
     def measure(self, data: bytes) -> None:
         """... stamped, checked and integrated; and the session gets the rest."""
         now = time.monotonic()
-        self.publish(list(self._session.hear(data, now)))
-        self._session.process(now)
+        self.publish(list(self._session.inbound.hear(data, now)))
+        self._session.inbound.process(now)
         self._session.take_output(now)
         told = self._session.take_events()
         self.publish([each for each in told if isinstance(each, OdometryEstimate)])

@@ -221,7 +221,7 @@ class AnyBench:
             self.now += TICK_S
             for channel, data in self.robot.advance():
                 if self.speaks:
-                    self.session.receive(data, self.now, channel)
+                    self.session.inbound.receive(data, self.now, channel)
             if self.now >= self.session.wake_at:
                 self.session.tick(self.now)
             self.settle()

@@ -85,7 +85,7 @@ class Bench:
             self.now += TICK_S
             data = self.board.step()
             if data and self.speaks:
-                self.session.receive(data, self.now)
+                self.session.inbound.receive(data, self.now)
             if self.now >= self.session.wake_at:
                 self.session.tick(self.now)
             self.settle()
@@ -139,7 +139,7 @@ class Bench:
 
     def last_words(self, on_exit: OnExit) -> bytes:
         """What is written before the port is closed."""
-        return joined(self.session.shutdown_sequence(on_exit, self.now))
+        return joined(self.session.shutdown.sequence(on_exit, self.now))
 
     def written_since(self, mark: int) -> bytes:
         """What was written after the first ``mark`` writes."""

@@ -79,7 +79,7 @@ def tell(bench: AnyBench, *readings: Reading) -> None:
     board = bench.session.board
     assert isinstance(board, Teller)
     board.next += readings
-    bench.session.receive(b"", bench.now, 1)
+    bench.session.inbound.receive(b"", bench.now, 1)
     bench.settle()
 
 

@@ -34,7 +34,7 @@ def told(piece: int, lost: float) -> str:
         for at in range(0, len(data), piece):
             part = data[at : at + piece]
             now_s = now + (at + len(part)) * 10 / 115200 + random.expovariate(5000)
-            session.receive(part, now_s)
+            session.inbound.receive(part, now_s)
             if now_s >= session.wake_at:
                 session.tick(now_s)
             said.update(repr((session.take_output(now_s), session.take_events())).encode())

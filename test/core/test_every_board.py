@@ -53,7 +53,7 @@ def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: A
     assert not bench.robot.stands
     bench.run(0.6)
     assert_stands_for_good(bench)
-    assert bench.session.stands
+    assert bench.session.shutdown.stands
 
 
 def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
@@ -153,10 +153,10 @@ def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
 def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
     """Stop is sent until the robot is seen to stand, then the last words."""
     bench.drive_on()
-    bench.session.leave(bench.now)
+    bench.session.shutdown.begin(bench.now)
     bench.settle()
-    bench.run_until(lambda: bench.session.stands)
-    for channel, data in bench.session.shutdown_sequence("stop", bench.now):
+    bench.run_until(lambda: bench.session.shutdown.stands)
+    for channel, data in bench.session.shutdown.sequence("stop", bench.now):
         bench.robot.receive(data, bench.now, channel)
     bench.speaks = bench.hears = False
     assert_stands_for_good(bench)

@@ -44,8 +44,8 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(drives: bool
         board.receive(joined(session.take_output(now)))
         told += len(session.take_events())
         if data:
-            session.hear(data, now)
-            if not session.process(now):
+            session.inbound.hear(data, now)
+            if not session.inbound.process(now):
                 nothing_left += 1
                 assert session.take_output(now) == ()
                 assert session.take_events() == []
@@ -59,11 +59,11 @@ def test_data_from_before_a_request_do_not_answer_it() -> None:
     """Heard, but not yet heeded: running is only what runs afterwards."""
     session, board = opened(), SimulatedBoard(BoardSettings(running=True))
     for tick in range(200):
-        session.receive(board.step(), tick * TICK_S)
+        session.inbound.receive(board.step(), tick * TICK_S)
     session.take_events()
-    session.hear(board.step(), 2.0)
+    session.inbound.hear(board.step(), 2.0)
     session.request(Request.START, "asked", 2.0)
-    session.process(2.0)
+    session.inbound.process(2.0)
     assert not any(isinstance(event, RequestDone) for event in session.take_events())
-    session.receive(board.step(), 2.01)
+    session.inbound.receive(board.step(), 2.01)
     assert RequestDone("asked", True, "running (nominal)") in session.take_events()

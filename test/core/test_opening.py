@@ -63,7 +63,7 @@ def test_garbage_is_not_an_understood_board() -> None:
     bench.speaks = False
     bench.open()
     for _ in range(300):
-        bench.session.receive(b"\x00\x55\xff\x13" * 4, bench.now)
+        bench.session.inbound.receive(b"\x00\x55\xff\x13" * 4, bench.now)
         bench.run(0.01)
     assert bench.session.state == "connecting"
     assert [text for text in bench.notices if "baudrate" in text] == bench.notices

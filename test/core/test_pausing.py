@@ -73,7 +73,7 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     for late in (data, notice):
         bench.settle()
-        bench.session.receive(late, bench.now)
+        bench.session.inbound.receive(late, bench.now)
     bench.settle()
     assert bench.board.mode is BoardMode.NOMINAL
     asked_at, done = bench.now, RequestDone(token, True, "paused")
@@ -96,7 +96,7 @@ def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_p
     bench.run(0.2)
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     bench.settle()
-    bench.session.receive(notice, bench.now)
+    bench.session.inbound.receive(notice, bench.now)
     bench.settle()
     asked_at, done = bench.now, RequestDone(token, True, "paused")
     while done not in bench.events:
@@ -109,13 +109,13 @@ def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> 
     """It said P and slept for three seconds; what it reads then was sent before P was obeyed."""
     on_its_way = b"".join(bench.board.step() for _ in range(10))
     bench.session.request(Request.PAUSE, token := object(), bench.now)
-    bench.session.receive(on_its_way[:80], bench.now)
+    bench.session.inbound.receive(on_its_way[:80], bench.now)
     bench.settle()
     assert bench.board.mode is BoardMode.PAUSED
     backlog = on_its_way[80:] + b"".join(bench.board.step() for _ in range(300))
     bench.now += 3.0
     for byte in backlog:
-        bench.session.receive(bytes([byte]), bench.now)
+        bench.session.inbound.receive(bytes([byte]), bench.now)
         bench.settle()
     bench.run(0.2)
     assert RequestDone(token, True, "paused") in bench.events

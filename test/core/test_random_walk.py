@@ -64,7 +64,7 @@ class Walk(Bench):
         for _ in range(round(seconds / TICK_S)):
             self.step_board()
             while self.from_board and self.from_board[0][0] <= self.now:
-                self.session.receive(self.from_board.popleft()[1], self.now)
+                self.session.inbound.receive(self.from_board.popleft()[1], self.now)
                 self.settle()
             if self.now >= self.session.wake_at:
                 self.session.tick(self.now)

@@ -26,17 +26,17 @@ node.OmniBotDriver._on_estop_topic = end
 """
 IN_THE_READER: Final = """
 import omnibot_driver.node as node
-from omnibot_driver.core.session import Session
+from omnibot_driver.core.inbound import Inbound
 def end(self, message):
     def hear(self, data, now, channel):
         raise ZeroDivisionError("a defect in the reader")
-    Session.hear = hear
+    Inbound.hear = hear
 node.OmniBotDriver._on_estop_topic = end
 """
 HANGS: Final = """
 import time
-from omnibot_driver.core.session import Session
-Session.shutdown_sequence = lambda self, on_exit, now: time.sleep(60.0)
+from omnibot_driver.core.shutdown import Shutdown
+Shutdown.sequence = lambda self, on_exit, now: time.sleep(60.0)
 """
 GROUP: Final = "import os; os.setpgid(0, 0)"
 TERMINAL: Final = """

@@ -88,7 +88,7 @@ def drive(sums: bool, seed: int, seconds: float) -> Stream:
         stream.append(both)
         for channel, data in both.items():
             if data:
-                ours.receive(data, now, channel)
+                ours.inbound.receive(data, now, channel)
         if now >= ours.wake_at:
             ours.tick(now)
         for channel, data in ours.take_output(now):
@@ -105,7 +105,7 @@ def play(stream: Stream) -> Iterator[Event]:
         now += READ_S
         for channel, data in both.items():
             if data:
-                ours.receive(data, now, channel)
+                ours.inbound.receive(data, now, channel)
         if now >= ours.wake_at:
             ours.tick(now)
         ours.take_output(now)

@@ -128,7 +128,7 @@ class _Rehearsal:
             elif now == read_s:
                 tick += 1
                 shown = changes.get(tick, shown)
-                session.receive(self._teller.step(shown), now)
+                session.inbound.receive(self._teller.step(shown), now)
             self._settle(now)
         if scene.exits_s < scene.ends_s:
             self._leave(changes, shown, tick)
@@ -151,11 +151,11 @@ class _Rehearsal:
         guard.
         """
         session, now = self._session, self._scene.exits_s
-        session.leave(now)
+        session.shutdown.begin(now)
         self._settle(now)
         for patience_s in (STANDS_WITHIN_S, SILENCE_S):
             gives_up_s = now + patience_s
-            while not session.stands:
+            while not session.shutdown.stands:
                 read_s = (tick + 1) * TICK_S + READ_S
                 now = min(read_s, max(now + CLOCK_S, session.wake_at), gives_up_s)
                 if now == gives_up_s:
@@ -163,12 +163,12 @@ class _Rehearsal:
                 if now == read_s:
                     tick += 1
                     shown = changes.get(tick, shown)
-                    session.receive(self._teller.step(shown), now)
+                    session.inbound.receive(self._teller.step(shown), now)
                 self._settle(now)
-            if not (session.stands and session.fall_silent(now)):
+            if not (session.shutdown.stands and session.shutdown.fall_silent(now)):
                 break
-        stands = session.stands
-        self._writes.append(Write(now, joined(session.shutdown_sequence(self._scene.on_exit, now))))
+        stands = session.shutdown.stands
+        self._writes.append(Write(now, joined(session.shutdown.sequence(self._scene.on_exit, now))))
         if not stands:
             self._writes += self._guards_words(now)
 

@@ -133,7 +133,7 @@ class RoughDrive(Bench):
             self._kept += self.board.step()
             if self.board.tick % self._in_late_ticks == 0:
                 data, self._kept = self._kept, b""
-                self.session.receive(data, self.now)
+                self.session.inbound.receive(data, self.now)
             if self.now >= self.session.wake_at:
                 self.session.tick(self.now)
             self.settle()

@@ -65,9 +65,9 @@ def test_a_shutdown_under_estop_repeats_the_estop(bench: Bench) -> None:
 
 def left(bench: Bench) -> None:
     """Leave as the link does it: wait until the robot is seen to stand."""
-    bench.session.leave(bench.now)
+    bench.session.shutdown.begin(bench.now)
     bench.settle()
-    while not bench.session.stands:
+    while not bench.session.shutdown.stands:
         bench.run(TICK_S)
 
 
@@ -75,11 +75,11 @@ def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends(
     """Then nothing more is said that the line could damage."""
     bench = driving()
     left(bench)
-    assert bench.session.fall_silent(bench.now)
+    assert bench.session.shutdown.fall_silent(bench.now)
     start = len(bench.written)
-    assert not bench.session.stands
+    assert not bench.session.shutdown.stands
     bench.run(0.2)
-    assert bench.session.stands
+    assert bench.session.shutdown.stands
     assert bench.written_since(start) == b""
     assert bench.last_words("stop") == b""
 
@@ -89,9 +89,9 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
     bench = driving()
     left(bench)
     bench.board.receive(bytes(8) + bytes.fromhex("FF FE 02 00 20 00 20 00 20"))
-    assert bench.session.fall_silent(bench.now)
+    assert bench.session.shutdown.fall_silent(bench.now)
     bench.run(0.2)
-    assert not bench.session.stands
+    assert not bench.session.shutdown.stands
     assert bench.last_words("stop") == 3 * STOP
 
 
@@ -99,5 +99,5 @@ def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
     """The motors of a paused board are off."""
     bench = paused()
     left(bench)
-    assert not bench.session.fall_silent(bench.now)
-    assert bench.session.stands
+    assert not bench.session.shutdown.fall_silent(bench.now)
+    assert bench.session.shutdown.stands

@@ -74,7 +74,7 @@ class Bench:
         for channel, data in self.robot.advance():
             data = self.carry(channel, data)
             if channel in self.speaks and data:
-                self.session.receive(data, self.now, channel)
+                self.session.inbound.receive(data, self.now, channel)
                 self.settle()
         if self.now >= self.session.wake_at:
             self.session.tick(self.now)

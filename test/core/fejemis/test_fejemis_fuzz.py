@@ -60,7 +60,7 @@ def test_no_input_raises_or_keeps_the_session_busy(seed: int) -> None:
                     bench.board.services.lift(chance.uniform(-20, 20), bench.now)
                 case _:
                     channel = chance.choice([DRIVE, FRONT])
-                    session.receive(any_line(chance), bench.now, channel)
+                    session.inbound.receive(any_line(chance), bench.now, channel)
         bench.settle()
         for _ in range(3):
             if bench.now >= session.wake_at:
@@ -76,8 +76,8 @@ def test_bytes_that_come_before_anything_is_known_move_nothing() -> None:
     bench = Bench()
     bench.open()
     for line in (b"fwl 10.50 0x0 0x3c2\n", b"pose 1.0 0 0 0\n", b"gyro 1 2 3\nacc 0 0 9.8\n"):
-        bench.session.receive(line, bench.now, DRIVE)
-        bench.session.receive(line, bench.now, FRONT)
+        bench.session.inbound.receive(line, bench.now, DRIVE)
+        bench.session.inbound.receive(line, bench.now, FRONT)
     bench.settle()
     assert bench.session.state == "connecting"
     assert not bench.odometry
@@ -87,7 +87,9 @@ def test_many_lines_that_are_not_understood_are_told_once() -> None:
     """Help text, or a cable that damages them."""
     bench = nominal()
     for _ in range(3):
-        bench.session.receive(60 * b"   veri and 'sub ver N'    get version\n", bench.now, DRIVE)
+        bench.session.inbound.receive(
+            60 * b"   veri and 'sub ver N'    get version\n", bench.now, DRIVE
+        )
         bench.run(0.5)
     assert sum("not understood" in text for text in bench.notices) == 1
     assert bench.session.state == "nominal"

@@ -267,6 +267,6 @@ def test_a_board_that_says_that_it_starts_when_the_port_opens_has_restarted() ->
     bench = nominal()
     bench.close()
     bench.session.opened(bench.now)
-    bench.session.receive(b"# Starting main loop\n", bench.now, DRIVE)
+    bench.session.inbound.receive(b"# Starting main loop\n", bench.now, DRIVE)
     bench.run(3.0)
     assert any("drive board has restarted" in text for text in bench.notices)

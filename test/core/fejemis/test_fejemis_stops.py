@@ -248,7 +248,7 @@ def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
         bench.drive_on(seconds=0.4)
         stop, emergency = bench.board.last_words()
         last = {"guard": stop, "guard latched": emergency}.get(words)
-        packets = last or bench.session.shutdown_sequence("stop", bench.now)
+        packets = last or bench.session.shutdown.sequence("stop", bench.now)
         for channel, data in packets:
             bench.robot.receive(data, bench.now, channel)
         bench.hears = bench.speaks = set()

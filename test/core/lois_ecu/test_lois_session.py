@@ -138,7 +138,7 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
     while not bench.board._uart.sending:
         bench.run(0.01)
     bench.lois.advance = lambda: []  # type: ignore[method-assign]
-    bench.session.receive(b":1200", bench.now)
+    bench.session.inbound.receive(b":1200", bench.now)
     bench.run(2.0)
     said = " ".join(str(event) for event in bench.events)
     assert "no data from the board" in said
@@ -170,7 +170,7 @@ def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> No
             late += [data for _, data in bench.robot.advance()]
             if step % 10 == 0:
                 bench.drive(0.3)
-        bench.session.receive(b"".join(late), bench.now)
+        bench.session.inbound.receive(b"".join(late), bench.now)
         bench.session.tick(bench.now)
         bench.settle()
     bench.run(2.0)
@@ -186,6 +186,6 @@ def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
     bench.run_until(lambda: bench.session.state == "nominal")
     bench.drive_on(0.3, 0.3)
     bench.written.clear()
-    bench.session.leave(bench.now)
+    bench.session.shutdown.begin(bench.now)
     bench.run(2.0)
     assert {data for _, data in bench.written} == {encode_command(SetDuty(0, 0))}

@@ -36,8 +36,8 @@ def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, senten
     bench.open()
     for _ in range(500):
         bench.run(TICK_S)
-        bench.session.receive(data[:40], bench.now)
-        bench.session.receive(data[40:], bench.now)
+        bench.session.inbound.receive(data[:40], bench.now)
+        bench.session.inbound.receive(data[40:], bench.now)
         bench.settle()
     assert bench.session.state == "connecting"
     with pytest.raises(CommandRefused, match="connecting"):

@@ -108,7 +108,7 @@ class MartBench(AnyBench):
             packets = self.robot.advance()
             for channel, data in packets:
                 if self.speaks:
-                    self.session.receive(data, self.now, channel)
+                    self.session.inbound.receive(data, self.now, channel)
             if packets or self.now >= self._wake_s:
                 if self.now >= self.session.wake_at:
                     self.session.tick(self.now)

@@ -61,7 +61,7 @@ def drive(faults: NetworkFaults, seed: int) -> Outcome:
             longest_s = max(longest_s, bench.until_it_stands())
             bench.estop(False)
             bench.run(random.uniform(0.0, 1.5))
-    bench.session.leave(bench.now)
+    bench.session.shutdown.begin(bench.now)
     bench.settle()
     longest_s = max(longest_s, bench.until_it_stands())
     bench.run(3.0)

@@ -119,7 +119,7 @@ def test_another_server_is_refused_by_its_name() -> None:
     bench.open()
     bench.run(0.5)
     for _ in range(30):
-        bench.session.receive(b"ok ROVER", bench.now)
+        bench.session.inbound.receive(b"ok ROVER", bench.now)
         bench.run(0.1)
     assert "ROVER" in bench.session.board.refusal
     assert any("ROVER" in notice for notice in bench.notices)

@@ -26,7 +26,7 @@ def test_a_stop_leaves_the_robot_standing_within_half_a_second(
     assert bench.until_it_stands() < 0.5
     bench.run(2.0)
     assert bench.robot.stands
-    assert bench.session.stands
+    assert bench.session.shutdown.stands
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
@@ -69,7 +69,7 @@ def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
         bench.command(vx, yaw_rate, 2.5)
     bench.go_to(0.5, 0.5, 1.0)
     bench.run(4.0)
-    bench.session.leave(bench.now)
+    bench.session.shutdown.begin(bench.now)
     bench.settle()
     bench.run(1.0)
     assert bench.until_it_stands() < 2.0

@@ -193,7 +193,7 @@ def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
         data = bench.board.step()
         bench.now += 0.01
         if len(data) == 14:  # deltas are lost
-            bench.session.receive(data, bench.now)
+            bench.session.inbound.receive(data, bench.now)
         bench.settle()
         states.append(bench.session.state)
     assert set(states[: min(50, schedule.imus_alone - schedule.imus_per_delta)]) == {"nominal"}

@@ -31,7 +31,7 @@ def test_what_was_commanded_before_it_ends_with_stop(
             bench.session.tick(bench.now)
         bench.settle()
     start = len(bench.written)
-    bench.session.receive(held, bench.now)
+    bench.session.inbound.receive(held, bench.now)
     bench.settle()
     assert imu_only or STOP in bench.written_since(start)
     bench.run(0.9)

@@ -33,7 +33,7 @@ def through_a_stall(ticks: int, frame: str, vx: float, yaw_rate: float) -> Bench
             bench.session.tick(bench.now)
         bench.settle()
     bench.hears = True
-    bench.session.receive(held[:HELD], bench.now)
+    bench.session.inbound.receive(held[:HELD], bench.now)
     bench.settle()
     bench.run(2.0)
     return bench
