@@ -71,10 +71,10 @@ def main(args: list[str] | None = None) -> int:
     cannot break into the shutdown.
     """
     args = sys.argv if args is None else args
-    if {"-h", "--help"}.intersection(args[1:]):
-        print(HELP)
-        return 0
     with UnblockedOutput():
+        if {"-h", "--help"}.intersection(args[1:]):
+            print(HELP)
+            return 0
         try:
             return _main(args)
         except ModuleNotFoundError as error:

@@ -2,6 +2,7 @@
 
 """Parameters and arguments of the running node: refused at the start, changed later."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -96,6 +97,16 @@ def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
     assert ended.stdout.startswith("usage: ros2 run omnibot_driver driver ")
     assert "--ros-args -p port:=/dev/ttyUSB0\n" in ended.stdout
     assert "config/omnibot.yaml" in ended.stdout
+
+
+def test_help_that_is_not_read_to_its_end_is_no_error() -> None:
+    """As by a pager that is left."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-c", WITHOUT_ROS, "--help"]
+    ended = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False)
+    os.close(writing)
+    assert (ended.returncode, ended.stderr) == (0, b"")
 
 
 OPENS_NOTHING = "import serial; serial.serial_for_url = None"
