@@ -9,6 +9,7 @@ with its last command. So what is printed goes through a pipe that would rather 
 
 import contextlib
 import os
+import select
 import sys
 import threading
 from types import TracebackType
@@ -42,13 +43,21 @@ class UnblockedOutput:
         traceback: TracebackType | None,
     ) -> None:
         if sys.stdout is not None:  # it was closed
-            sys.stdout.flush()
-        for descriptor, original in zip(STANDARD, self._originals, strict=True):
-            os.dup2(original, descriptor)  # closes the pipe's last writing end
-        for copier, original in zip(self._copiers, self._originals, strict=True):
+            with contextlib.suppress(BlockingIOError):
+                sys.stdout.flush()
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        for descriptor in STANDARD:
+            os.dup2(nothing, descriptor)  # closes the pipe's last writing end
+        os.close(nothing)
+        for descriptor, copier, original in zip(
+            STANDARD, self._copiers, self._originals, strict=True
+        ):
             copier.join(LAST_WORDS_S)
-            if not copier.is_alive():
-                os.close(original)
+            if copier.is_alive():
+                continue
+            if select.select([], [original], [], 0)[1]:  # else Python's last words would block it
+                os.dup2(original, descriptor)
+            os.close(original)
 
 
 def _fill_gaps() -> None:

@@ -63,6 +63,43 @@ with UnblockedOutput():
     os.close(pipe)
 
 
+@pytest.mark.parametrize("lines", [16, 100])
+def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
+    """Python prints what it ignores, and its own traceback, once the context has ended. The pipe is
+    exactly full, or more waits for it.
+    """
+    program = f"""
+import contextlib, os, time
+from omnibot_driver.output import UnblockedOutput
+with UnblockedOutput():
+    for _ in range({lines}):
+        time.sleep(1e-3)
+        with contextlib.suppress(BlockingIOError):
+            os.write(2, bytes(4096))
+raise SystemExit("the last words")
+"""
+    unread, pipe = os.pipe()
+    done = subprocess.run(
+        [sys.executable, "-c", program], stderr=pipe, timeout=PATIENCE_S, check=False
+    )
+    assert done.returncode == 1
+    os.close(unread)
+    os.close(pipe)
+
+
+def test_what_is_printed_at_the_end_is_seen_where_it_is_read() -> None:
+    """Behind what was printed before."""
+    program = """
+import os
+from omnibot_driver.output import UnblockedOutput
+with UnblockedOutput():
+    os.write(2, b"first, ")
+raise SystemExit("then the last words")
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
+    assert done.stderr == b"first, then the last words\n"
+
+
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
     """What is printed would go to the board."""
