@@ -12,6 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from omnibot_driver.core.mart.motor_line import MotorLine
 from omnibot_driver.core.mart.settings import MartSettings
 
 MOST_UNITS: Final = 127
@@ -29,6 +30,8 @@ LEARN_TRIPS, LESS_PER_S = 4, 10.0
 LOWEST_GAIN, HIGHEST_GAIN = 0.4, 2.5
 SLOWEST_MPS: Final = 0.03
 """Of a wheel whose gain can be learned."""
+SLOWEST_TURN_RADPS: Final = 0.05
+"""On the spot, of which anything is learned."""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
 """A change of the turn rate takes this time; its lag is not an error to correct."""
@@ -76,6 +79,7 @@ class SpeedLoop:
         self.volts = settings.nominal_volts
         self.trip_s = 0.0
         self._right, self._left = _Side(), _Side()
+        self._line = MotorLine()
         self.begin(0, False, 0.0)
 
     def begin(self, units: int, reverse: bool, now: float) -> None:
@@ -98,17 +102,13 @@ class SpeedLoop:
     def spin_units(self, rate_radps: float) -> int:
         """For a turn on the spot."""
         rim_mps = abs(rate_radps) * self.settings.track_m / 2
-        gain = (self._right.gain + self._left.gain) / 2
-        return max(2, min(MOST_UNITS, round(rim_mps / (self._per_unit_mps * gain))))
+        return max(2, min(MOST_UNITS, round(self._line.units(rim_mps / self._per_unit_mps))))
 
     def spun(self, units: int, rate_radps: float) -> None:
         """A turn with these units had this mean rate: both sides together."""
-        nominal_radps = 2 * units * self._per_unit_mps / self.settings.track_m
-        if nominal_radps > 0.0 and abs(rate_radps) > 0.05:
-            seen = min(HIGHEST_GAIN, max(LOWEST_GAIN, abs(rate_radps) / nominal_radps))
-            ratio = seen / ((self._right.gain + self._left.gain) / 2)
-            for side in (self._right, self._left):
-                side.gain *= 1.0 + LEARNED * (ratio - 1.0)
+        if abs(rate_radps) > SLOWEST_TURN_RADPS:
+            rim_mps = abs(rate_radps) * self.settings.track_m / 2
+            self._line.learn(units, rim_mps / self._per_unit_mps)
 
     @property
     def left_over_right(self) -> float:
@@ -153,6 +153,7 @@ class SpeedLoop:
             self._error_rad = max(-HOLD_MOST_RAD, min(HOLD_MOST_RAD, error_rad))
         if now < self._window_from_s:
             return
+        self._window_s += seconds
         half = self._direction * rate_radps * self.settings.track_m / 2
         along_mps = self._direction * speed_mps
         for side, rim_mps in ((self._right, along_mps + half), (self._left, along_mps - half)):
@@ -167,7 +168,16 @@ class SpeedLoop:
                 self._left.gain *= self._right.gain / before
             else:
                 self._left.learn(self._per_unit_mps, part)
+                self._learn_line()
             self._clear(now)
+
+    def _learn_line(self) -> None:
+        """From the window that is over: of both motors, as a turn on the spot needs both."""
+        seconds = self._window_s
+        if min(self._right.window_m, self._left.window_m) > SLOWEST_MPS * seconds:
+            units = (self._right.window_units_s + self._left.window_units_s) / (2 * seconds)
+            speed_mps = (self._right.window_m + self._left.window_m) / (2 * seconds)
+            self._line.learn(units, speed_mps / self._per_unit_mps, 1.0 + LESS_PER_S * self.trip_s)
 
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:
         """What to add to right and left, positive along the motion; None for nothing.
@@ -215,6 +225,7 @@ class SpeedLoop:
     def _clear(self, from_s: float) -> None:
         """A new window begins."""
         self._window_from_s = from_s
+        self._window_s = 0.0
         for side in (self._right, self._left):
             side.window_units_s = side.window_m = 0.0
 

@@ -1,0 +1,59 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What is learned of motors that have no regulator."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from omnibot_driver.core.mart import MartSettings
+from omnibot_driver.core.mart.motor_line import MotorLine
+from omnibot_driver.core.mart.speed_loop import SpeedLoop
+
+SLOPES, DEAD = st.floats(0.6, 1.5), st.floats(0.0, 8.0)
+STEP_S = 0.1
+
+
+def test_before_anything_is_measured_a_motor_is_taken_for_ideal() -> None:
+    """Units and speed are the same number."""
+    assert MotorLine().units(12.0) == 12.0
+
+
+@given(SLOPES, DEAD)
+def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
+    """Of a drive and of a turn."""
+    line = MotorLine()
+    for units in (40.0, 40.0, 16.0, 40.0, 16.0):
+        line.learn(units, slope * (units - dead))
+    assert line.units(slope * (10.0 - dead)) == pytest.approx(10.0, abs=0.8)
+
+
+@given(SLOPES, DEAD, st.floats(0.15, 1.0))
+def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
+    slope: float, dead: float, rate_radps: float
+) -> None:
+    """Within one unit, on a robot whose motors need some before they turn."""
+    settings = MartSettings()
+    per_unit_mps = settings.speed_per_unit * slope
+    loop, now = SpeedLoop(settings), 0.0
+    loop.begin(45, False, now)
+    for _ in range(30):
+        now += STEP_S
+        loop.measured((45 - dead) * per_unit_mps, 0.0, 0.0, now)
+    for wanted_radps in (0.5, rate_radps):
+        units = loop.spin_units(wanted_radps)
+        turned_radps = 2 * max(0.0, units - dead) * per_unit_mps / settings.track_m
+        loop.spun(units, turned_radps)
+    one_unit_radps = 2 * per_unit_mps / settings.track_m
+    assert abs(turned_radps - rate_radps) <= one_unit_radps
+
+
+@given(st.lists(st.tuples(st.floats(1.0, 127.0), st.floats(0.0, 400.0)), max_size=40))
+def test_whatever_is_measured_the_units_rise_with_the_speed(
+    measured: list[tuple[float, float]],
+) -> None:
+    """They stay finite and positive."""
+    line = MotorLine()
+    for units, speed in measured:
+        line.learn(units, speed)
+    assert 0.0 < line.units(5.0) < line.units(50.0) < 200.0
