@@ -226,6 +226,17 @@ class AnyBench:
                 self.session.tick(self.now)
             self.settle()
 
+    def stall(self, seconds: float) -> None:
+        """The process stalls, and reads all that waits at once then."""
+        waiting: list[Packet] = []
+        for _ in range(round(seconds / TICK_S)):
+            self.now += TICK_S
+            waiting += self.robot.advance()
+        self.session.stood_still(seconds, self.now)
+        for channel, data in waiting:
+            self.session.inbound.receive(data, self.now, channel)
+        self.settle()
+
     def run_until(self, predicate: Callable[[], bool], limit_s: float = 12.0) -> None:
         end = self.now + limit_s
         while not predicate():

@@ -66,6 +66,20 @@ def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seconds", [0.5, 2.0, 4.0, 9.0])
+def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
+    bench: AnyBench, seconds: float
+) -> None:
+    """However much waits to be read then; a guard stops the robot meanwhile, here nothing does."""
+    for _ in range(2):
+        bench.drive_on()
+        bench.stall(seconds)
+        assert_stands_for_good(bench)
+        bench.drive_on(seconds=3.0)
+        assert not bench.robot.stands
+
+
+@pytest.mark.slow
 def test_an_estop_stops_the_robot_and_nothing_moves_it_until_a_newer_command(
     bench: AnyBench,
 ) -> None:

@@ -26,6 +26,10 @@ LATEST_S: Final = 0.25
 UNKNOWN_S: Final = 0.012
 """Standard deviation of an arrival as long as the clock is not known."""
 LEAST_S: Final = 0.001
+SAME_READ_S: Final = 0.02
+"""Groups that arrive nearer to each other than this were read together, after a stall: the last of
+them is the least late.
+"""
 Point = tuple[float, float]
 """An arrival, and how far the board's time is behind it."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
@@ -75,7 +79,10 @@ class BoardTime:
             return 0.0
         for index, sending_s in enumerate((0.0, lines * LINE_S)):
             self._behind_s[index] += arrived_s - passed_s - sending_s
-            self._kept[index].append((now, self._behind_s[index]))
+            kept = self._kept[index]
+            if kept and now - kept[-1][0] < SAME_READ_S:
+                kept.pop()
+            kept.append((now, self._behind_s[index]))
         if len(self._kept[0]) < FEWEST:
             return 0.0
         late = min(map(_above_line, self._kept), key=max)

@@ -5,6 +5,8 @@
 from random import Random
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from omnibot_driver.core.lois_ecu.board_time import BoardTime
 
@@ -54,3 +56,34 @@ def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
         board.late_s(200 * step, "ms", 0.2 * step)
     assert board.late_s(0, "ms", 4.0) == 0.0
     assert board.stddev_s == 0.012
+
+
+def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
+    """They say nothing of the clock's rate; the groups after them are timed as before."""
+    board = BoardTime()
+    found = []
+    for step in range(90):
+        read_s = 14.0 if 50 <= step < 70 else 0.2 * step
+        found.append(board.late_s(200 * step, "ms", read_s))
+    assert found[69] < 0.25
+    assert max(found[80:]) < 0.01
+    assert board.stddev_s < 0.015
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([0.0, 1e-6, 0.01, 0.2, 4.0]), st.integers(0, 400)), min_size=8
+    )
+)
+def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
+    reads: list[tuple[float, int]],
+) -> None:
+    """Reads of any length of time, and clocks of any rate."""
+    board, now, counts, taken_s = BoardTime(), 10.0, 0, 0.0
+    for seconds, passed in reads * 3:
+        now, counts = now + seconds, counts + passed
+        late_s = board.late_s(counts, "ms", now)
+        assert 0.0 <= late_s < 0.25
+        assert now - late_s >= taken_s
+        assert board.stddev_s < 10.0
+        taken_s = now - late_s
