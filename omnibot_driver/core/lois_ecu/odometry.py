@@ -19,11 +19,11 @@ from omnibot_driver.core.lois_ecu.comparison import Comparison
 from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry, Source
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Stream, Ticks
 from omnibot_driver.core.lois_ecu.misconfiguration import own_gains
-from omnibot_driver.core.lois_ecu.motion_filter import LONGEST_STEP_S, MotionFilter
+from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.plausibility import wrapped
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.size_errors import LoisOdometrySettings, SizeErrors
-from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
+from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S, CommandKind
 from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, UNSETTLED_S, WAY, X, Y
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, Uncertainty
 
@@ -59,6 +59,9 @@ class LoisOdometry:
         self._lone_ticks, self._uncounted_m = 0, 0.0
         self._ticks: Ticks | None = None
         self._begun = False
+        self._may_roll_mps = [0.0, 0.0]
+        """The greatest speed that each wheel may have had since the board was last heard."""
+        self._heard_at_s = self._lost_s = -math.inf
         self._uncertainty = Uncertainty(OdometryNoise())
         self._source: Source = "standing"
         self.late_stddev_s = LATE_S
@@ -112,6 +115,7 @@ class LoisOdometry:
 
     def connect(self) -> None:
         """The line is new: counters may have begun anew, the pose goes on."""
+        self._lost_s = max(self._heard_at_s, self._lost_s)
         self._ticks = None
         self._board.begin()
         self._at_s = self._odometry_at_s = self._heard_at_s = -math.inf
@@ -121,6 +125,7 @@ class LoisOdometry:
         """The board started anew ``age_s`` ago, if that is known: it has no set-point since."""
         self._motion.restart(self._heard_at_s if age_s is None else now - age_s)
         self.connect()
+        self._lost_s = -math.inf
         self._ticks = Ticks(0, 0, 0)
         self._comparison.begin_counts()
 
@@ -128,15 +133,16 @@ class LoisOdometry:
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
         """A set-point went to the board."""
-        left, right = (wheel.course for wheel in self._motion.wheels)
         if isinstance(command, SetRpm):
+            kind: CommandKind = "rpm"
             unit = self._settings.rim_mps_per_rpm
-            left.command(now, "rpm", command.left_rpm * unit)
-            right.command(now, "rpm", command.right_rpm * unit)
-            return
-        scale = self._settings.duty_scale
-        left.command(now, "duty", command.left_percent / scale)
-        right.command(now, "duty", command.right_percent / scale)
+            speeds_mps = command.left_rpm * unit, command.right_rpm * unit
+        else:
+            kind, scale = "duty", self._settings.duty_scale
+            speeds_mps = command.left_percent / scale, command.right_percent / scale
+        for index, speed_mps in enumerate(speeds_mps):
+            self._motion.wheels[index].course.command(now, kind, speed_mps)
+            self._may_roll_mps[index] = max(self._may_roll_mps[index], abs(speed_mps))
 
     def halted(self, now: float) -> None:
         """The board has set both set-points to zero by itself: its button."""
@@ -147,6 +153,8 @@ class LoisOdometry:
     def heard_ticks(self, ticks: Ticks, now: float, late_s: float = 0.0) -> list[FusedOdometry]:
         """0x12, ``late_s`` later than it usually comes."""
         before, from_s = self._ticks, self._at_s
+        if now > max(self._heard_at_s, self._lost_s) + self._unheard_s > -math.inf:
+            self._after_silence(now)
         self._advance(now)
         self._ticks = ticks
         self._lone_ticks += 1
@@ -199,16 +207,24 @@ class LoisOdometry:
 
     def _keep(self, now: float) -> None:
         """This was heard: what is predicted from now on may be taken back."""
-        self._heard_at_s = now
+        self._heard_at_s, self._lost_s = now, -math.inf
+        for index, wheel in enumerate(self._motion.wheels):
+            speed_mps = abs(self._motion.speed_mps(index))
+            self._may_roll_mps[index] = max(speed_mps, abs(wheel.course.target_mps))
         self._motion.history.keep(now)
 
     def _after_silence(self, now: float) -> None:
-        """What the wheels did in a long silence is not known; nor what 0x20 was compared with."""
-        self._advance(self._heard_at_s + self._unheard_s)
-        unheard_s = min(now - self._at_s, LONGEST_STEP_S)
-        for index in range(2):
-            self._motion.doubt(index, abs(self._motion.speed_mps(index)) * unheard_s)
-        self._at_s = now
+        """What the wheels did in a long silence is not known; nor what 0x20 was compared with.
+
+        The stop may not have reached the board, so each wheel may have kept its speed.
+        """
+        heard_s = max(self._heard_at_s, self._lost_s)
+        if self._at_s > -math.inf:
+            self._advance(heard_s + self._unheard_s)
+        for index, speed_mps in enumerate(self._may_roll_mps):
+            self._motion.shift(index, 0.0, speed_mps * (now - heard_s))
+        self._at_s = self._heard_at_s = now
+        self._lost_s = -math.inf
         self._comparison.begin_odometry()
 
     def _advance(self, now: float) -> None:
@@ -295,7 +311,9 @@ class LoisOdometry:
     def _covariance(self, yaw_rad: float, twist: BodyTwist, unheard_s: float) -> Covariance:
         filtered = self._motion.pose_covariance()
         whole = self._uncertainty.total(Pose()) + self._sizes.covariance(yaw_rad) + filtered
-        late_s = math.hypot(self.late_stddev_s, unheard_s)
-        late_m, late_rad = late_s * twist.vx_mps, late_s * twist.yaw_rate_radps
+        left_m, right_m = (speed_mps * unheard_s for speed_mps in self._may_roll_mps)
+        late_m = math.hypot(self.late_stddev_s * twist.vx_mps, (left_m + right_m) / 2)
+        turned_rad = math.hypot(left_m, right_m) / self._settings.track_m
+        late_rad = math.hypot(self.late_stddev_s * twist.yaw_rate_radps, turned_rad)
         along = (late_m**2, math.cos(yaw_rad), math.sin(yaw_rad), 0.0)
         return whole.with_errors([along, (late_rad**2, 0.0, 0.0, 1.0)])

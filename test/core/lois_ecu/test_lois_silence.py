@@ -1,0 +1,71 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A line that is lost while the robot drives: the board has no watchdog, so the wheels go on."""
+
+import math
+
+import pytest
+from any_board import AnyBench, nominal
+
+FIRMWARES = ("lois_ecu", "lois_ecu as documented")
+
+
+def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> AnyBench:
+    """The robot drives, the line is lost in both directions, and comes back; the robot stands."""
+    bench = nominal(firmware)
+    bench.drive_on(vx, 4.0)
+    bench.speaks = bench.hears = False
+    if reopened:
+        bench.close()
+    bench.run(seconds)
+    bench.speaks = bench.hears = True
+    if reopened:
+        bench.open()
+    bench.run(4.0)
+    bench.drive_on(vx, 3.0)
+    bench.run(3.0)
+    return bench
+
+
+def off_by(bench: AnyBench) -> tuple[float, float]:
+    """Error of the position in m, and its standard deviation by the covariance."""
+    estimate, truth = bench.odometry[-1], bench.robot.board.truth  # type: ignore[attr-defined]
+    error_m = math.hypot(estimate.pose.x_m - truth.x_m, estimate.pose.y_m - truth.y_m)
+    return error_m, math.sqrt(estimate.covariance.xx + estimate.covariance.yy)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize("vx", [0.3, -0.3])
+@pytest.mark.parametrize(("seconds", "reopened"), [(3.0, False), (8.0, False), (4.0, True)])
+def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
+    firmware: str, vx: float, seconds: float, reopened: bool
+) -> None:
+    """The stop did not reach the board either, so the robot went on by metres."""
+    error_m, sigma_m = off_by(lost_line(firmware, vx, seconds, reopened=reopened))
+    assert error_m <= 3.0 * sigma_m
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize("seconds", [1.0, 3.0])
+def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
+    firmware: str, seconds: float
+) -> None:
+    """Forward, where both firmwares count."""
+    bench = lost_line(firmware, 0.3, seconds, reopened=False)
+    error_m, _ = off_by(bench)
+    assert error_m <= 0.1 * bench.robot.way_m
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_the_covariance_grows_while_the_board_is_silent(firmware: str) -> None:
+    """By the speed at which the robot may still drive."""
+    bench = nominal(firmware)
+    bench.drive_on(0.3, 4.0)
+    bench.speaks = bench.hears = False
+    before = bench.robot.way_m
+    bench.run(1.4)
+    error_m, sigma_m = off_by(bench)
+    assert bench.robot.way_m - before > 0.3
+    assert error_m <= 3.0 * sigma_m
