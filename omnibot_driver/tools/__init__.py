@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Programs for people who own the robot: they talk to a running driver or read its bags."""
+"""Tools for a robot's users: they talk to a running driver or read its bags."""

@@ -1,16 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Which drivers there are, by the topics that every one of them has, whatever its board."""
+"""Find drivers by the topics that every driver publishes, whatever its board."""
 
 from collections.abc import Iterable
 from typing import Any, Final
 
 SIGNS: Final = {"state": "std_msgs/msg/String", "estop_active": "std_msgs/msg/Bool"}
-"""Under a driver's own name: topics, and their types."""
+"""Topics under a driver's own name, and their types."""
 
 
 def drivers_among(topics: Iterable[tuple[str, str]]) -> list[str]:
-    """Full names of the drivers, from pairs of topic and type."""
+    """Return the full names of the drivers among these pairs of topic and type."""
     pairs = set(topics)
     names = {topic.rpartition("/")[0] for topic, _kind in pairs}
     return sorted(
@@ -21,7 +21,7 @@ def drivers_among(topics: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def running_drivers(node: Any) -> list[str]:
-    """Full names of those that publish now, as far as this rclpy node knows."""
+    """Return the full names of the drivers that publish now, as far as this rclpy node knows."""
     found = node.get_topic_names_and_types()
     return [
         name

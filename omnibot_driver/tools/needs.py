@@ -1,17 +1,17 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the tools need beyond the driver, and the sentence for who has not got it."""
+"""Import the libraries that the tools need beyond the driver's, or say how to install them."""
 
 from importlib import import_module
 from types import ModuleType
 
 
 class ToolError(Exception):
-    """A reason why a tool cannot go on, as a sentence with a remedy."""
+    """An error that ends a tool; its message is a sentence with a remedy."""
 
 
 def need(module: str) -> ModuleType:
-    """This library of the extra ``tools``; raises ToolError where it is not installed."""
+    """Import a library of the extra ``tools``. Raises ToolError where it is not installed."""
     try:
         return import_module(module)
     except ModuleNotFoundError as error:

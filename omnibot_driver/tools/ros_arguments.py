@@ -1,12 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A command line that is partly ROS's. Needs no ROS."""
+"""Separate ROS's arguments from the program's own on a command line. Needs no ROS."""
 
 from collections.abc import Sequence
 
 
 def split_ros_arguments(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Ours, and what stands between ``--ros-args`` and ``--`` (or the end), with that marker."""
+    """Return the program's own arguments, and those of ROS.
+
+    ROS's stand between ``--ros-args`` and ``--`` (or the end); both markers are kept with them.
+    """
     own: list[str] = []
     ros: list[str] = []
     into = own

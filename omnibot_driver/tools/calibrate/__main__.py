@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Runs a calibration: ``python -m omnibot_driver.tools.calibrate imu|scale|geometry|...``.
+"""Run a calibration: ``python -m omnibot_driver.tools.calibrate imu|scale|geometry|...``.
 
 Each subcommand is a module of this package with ``run(robot, console, arguments) -> Result``.
 """
@@ -19,10 +19,9 @@ LIBRARIES: Final = ("numpy", "scipy", "rich", "matplotlib")
 
 
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
-    """Return 0 when a calibration was found, 1 with a sentence when not, 2 for wrong usage, 130
-    when interrupted.
+    """Return 0 on success, 1 if nothing was found, 2 on wrong usage, 130 when interrupted.
 
-    ``read`` answers questions.
+    After 1 a sentence on stderr gives the reason. ``read`` answers questions.
     """
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)

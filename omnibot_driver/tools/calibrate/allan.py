@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Allan deviation of a sensor at rest, and what it says of the noise.
+"""The Allan deviation of a sensor at rest, and the noise terms that fit it. Pure.
 
 Overlapping estimator: NIST Special Publication 1065; noise terms and the deviation of an estimate:
-IEEE Std 952-1997, annex C. Pure.
+IEEE Std 952-1997, annex C.
 """
 
 from dataclasses import dataclass
@@ -15,15 +15,16 @@ from scipy.optimize import nnls
 from omnibot_driver.tools.calibrate.log import Column
 
 FEWEST_CLUSTERS: Final = 9
-"""Averages are taken over a ninth of the rest at the most; longer ones say little."""
+"""Least number of averages in a rest, so the longest averaging time is a ninth of the rest."""
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 60.0
-"""A shorter rest says nothing of how a bias wanders."""
+"""Least length of a rest, in s, for fitting how a bias wanders."""
 
 
 @dataclass(frozen=True, slots=True)
 class Allan:
-    """``tau_s``: (n,) averaging times; ``deviation``, ``sigma``: (n,), as the readings."""
+    """An Allan deviation with its ``sigma``, in the readings' unit, by averaging time; each
+    (n,)."""
 
     tau_s: Column
     deviation: Column
@@ -32,8 +33,10 @@ class Allan:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Noise of readings with unit U: ``density`` in U/√Hz (random walk of the integral), with its
-    ``sigma``; ``instability`` in U, the flicker floor; ``walk`` in U/√s, of the bias itself.
+    """Noise of readings with unit U.
+
+    ``density`` in U/√Hz (random walk of the integral), with its ``sigma``; ``instability`` in U,
+    the flicker floor; ``walk`` in U/√s, the random walk of the bias.
     """
 
     density: float
@@ -42,13 +45,14 @@ class Noise:
     walk: float
 
     def deviation(self, tau_s: Column) -> Column:
-        """The Allan deviation that these make."""
+        """Return the Allan deviation of this noise."""
         variance = self.density**2 / tau_s + FLICKER * self.instability**2
         return np.asarray(np.sqrt(variance + self.walk**2 * tau_s / 3))
 
 
 def allan(readings: Column, period_s: float) -> Allan:
-    """Allan deviation of (n,) evenly spaced readings, at times a quarter octave apart."""
+    """Return the Allan deviation of (n,) evenly spaced readings, at times a quarter octave
+    apart."""
     whole = np.concatenate(([0.0], np.cumsum(readings - readings.mean()) * period_s))
     longest = len(readings) // FEWEST_CLUSTERS
     octaves = np.arange(0.0, np.log2(max(1, longest)) + 1e-9, 0.25)
@@ -65,7 +69,7 @@ def allan(readings: Column, period_s: float) -> Allan:
 
 
 def noise(curve: Allan) -> Noise:
-    """The terms that fit the curve best; in a rest of seconds all of it is white noise."""
+    """Return the noise terms that fit the curve best; for a short rest white noise alone."""
     tau_s, variance = curve.tau_s, curve.deviation**2
     terms = [1 / tau_s]
     if tau_s[-1] * FEWEST_CLUSTERS >= WALK_FROM_S:

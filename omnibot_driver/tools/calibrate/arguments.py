@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The command line. Must not import what the calibrations need: ``--help`` works without it."""
+"""The command line. Must not import the calibrations' libraries: ``--help`` works without them."""
 
 import argparse
 import math
@@ -15,7 +15,7 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""A driver that has it lets the gains of a wheel's controller be set, and records its ticks."""
+"""A parameter of drivers whose board records ticks and takes the gains of a wheel's controller."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),
@@ -29,12 +29,11 @@ NEEDS: Final = {
     ),
     "step": (("linear_scale", GAINS), "a firmware whose control of a wheel it knows"),
 }
-"""By subcommand: parameters one of which a driver has where this can be done, and what they stand
-for."""
+"""For each subcommand the parameters, of which the driver must have one, and their meaning."""
 
 
 def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:
-    """Raises ToolError where the board of the driver with these parameters lacks what is needed."""
+    """Raise ToolError if the driver with these parameters has a board unfit for this subcommand."""
     wanted, thing = NEEDS[subcommand]
     if not any(parameter in parameters for parameter in wanted):
         raise ToolError(
@@ -43,7 +42,7 @@ def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:
 
 
 def command_line() -> argparse.ArgumentParser:
-    """Parse the command line; exits with 2 and a message on wrong usage."""
+    """Return the parser of the command line; it exits with 2 and a message on wrong usage."""
     parser = argparse.ArgumentParser(
         prog="calibrate",
         description="Finds what the driver's parameters ought to be, with uncertainties.",
@@ -204,7 +203,7 @@ def _step(parser: argparse.ArgumentParser) -> None:
 
 
 def _positive(text: str) -> float:
-    """A number above 0."""
+    """Return a number above 0."""
     try:
         value = float(text)
     except ValueError:
@@ -215,7 +214,7 @@ def _positive(text: str) -> float:
 
 
 def _whole(text: str) -> int:
-    """A whole number from 1."""
+    """Return a whole number of at least 1."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1")
     return int(text)

@@ -1,9 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The running driver as a ROS node: found, its parameters, its services. Must not know motions.
-
-Everything runs in the caller's thread, which spins while it waits.
-"""
+"""Find the running driver, and call its parameters and services. Must not know motions."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -27,8 +24,10 @@ ANSWER_WITHIN_S: Final = 12.0
 
 
 class Client:
-    """``driver``: the full name of the driver's node; ``parameters``: its own, by name, which are
-    those of ``table``.
+    """A ROS client of one running driver.
+
+    ``driver`` is the full name of the driver's node. ``parameters`` are its values by name;
+    ``table`` describes them.
     """
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
@@ -60,7 +59,7 @@ class Client:
         )
 
     def _require_alone(self) -> None:
-        """Raise ToolError if another driver has the same namespace: both would obey."""
+        """Raise ToolError if another driver has the same namespace, as both would obey commands."""
         here = [
             name
             for name in self._here()
@@ -80,7 +79,7 @@ class Client:
         return self._node.get_namespace().rstrip("/")
 
     def _table(self) -> Table:
-        """The parameter table of the driver's board."""
+        """Return the parameter table of the driver's board."""
         board = self._get_parameters(["board"])["board"]
         if board not in boards.PROFILES:
             raise ToolError(
@@ -120,9 +119,9 @@ class Client:
             self.set_parameters(changeable)
 
     def call(self, service: str, on: bool | None = None) -> str:
-        """A service of the driver, with ``data`` where it takes any; what it answers.
+        """Call a service of the driver, with ``on`` as the data of a SetBool; return its message.
 
-        Raises ToolError where the driver says that it failed.
+        Raises ToolError where the driver reports a failure.
         """
         kind = Trigger if on is None else SetBool
         request = Trigger.Request() if on is None else SetBool.Request(data=on)
@@ -144,7 +143,7 @@ class Client:
             self._node.destroy_client(client)
 
     def _wait(self, done: Callable[[], object], seconds: float) -> bool:
-        """Whether the condition came true in time."""
+        """Wait for the condition; return whether it became true in time."""
         deadline_s = time.monotonic() + seconds
         while not (held := done()) and time.monotonic() < deadline_s:
             self._spin(0.05)

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate commission``: a guided walk that finds which way round everything is.
+"""``calibrate commission``: a guided procedure that finds how motors and IMU are oriented.
 
-What the board's data can tell is taken from them; a person is asked for the rest, which is what the
-wheels really do, and to hold the robot. An impossible answer is explained, and the question
-repeated.
+Whatever the board's data show is taken from them. A person is asked how the wheels really turn, and
+to hold the robot. A contradictory answer is explained, and the question repeated.
 """
 
 import argparse
@@ -47,10 +46,11 @@ from omnibot_driver.tools.needs import ToolError
 TRIES: Final = 3
 JOG_S: Final = 2.0
 WHEEL_RADPS: Final = 2.0
-"""docs/commissioning.md, step 5; the axes too."""
+"""Speed of a wheel that is shown, in rad/s: docs/commissioning.md, step 5, as for the axes."""
 AXIS_SPEEDS: Final[tuple[Vector3, ...]] = ((0.05, 0.0, 0.0), (0.0, 0.05, 0.0), (0.0, 0.0, 0.3))
 SLOW_LSB, FAST_LSB = 4, 8
-"""Of Vx, 0.06 and 0.11 m/s by default: whole words, so that one is exactly twice the other."""
+"""Values of Vx, 0.06 and 0.11 m/s by default: whole words, so that one is exactly twice the other.
+"""
 TURN_RADPS: Final = 0.5
 TURN_RAD: Final = 1.6
 HELD_S: Final = 1.5
@@ -61,7 +61,7 @@ T = TypeVar("T")
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Raises ToolError where an answer stays impossible."""
+    """Run the selected parts. Raises ToolError where an answer stays contradictory."""
     walk = Walk(robot, console)
     found = Found(before=robot.parameters)
     if "board" in arguments.only or "wheels" in arguments.only:
@@ -79,16 +79,16 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 class Walk:
-    """The conversation, with a robot in it."""
+    """The guided procedure with the user and the robot."""
 
     def __init__(self, robot: Any, console: Console) -> None:
         self._robot, self._console = robot, console
         self._obeys = True
 
-    # What the data tell
+    # Found from the board's data
 
     def board(self, found: Found) -> None:
-        """Find the position of the switch and the meaning of the deltas."""
+        """Find the position of the board's switch and the meaning of the deltas."""
         say = self._console.say
         slow_mps = SLOW_LSB / self._robot.parameters["linear_scale"]
         say("The mode switch: forward slowly, then twice as fast.")
@@ -132,7 +132,7 @@ class Walk:
         verdict = "as before" if right else "and by the deltas it went elsewhere"
         say(f"Turned by {turned_rad:.2f} rad, {verdict}: the deltas are {found.delta_frame}.")
 
-    # What eyes tell
+    # Found by looking at the wheels
 
     def wheels(self, found: Found) -> None:
         """Find the order of the wheels and the signs of the axes."""
@@ -177,7 +177,7 @@ class Walk:
         return sign
 
     def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
-        """Repeat a motion until the answer is a valid pattern."""
+        """Repeat a motion until the answer is a valid pattern; return the pattern."""
         while True:
             self._console.say(f"\n{what}:")
             self._drive([(JOG_S, command)], topic=topic, obeys=self._obeys)
@@ -191,7 +191,7 @@ class Walk:
                 a, b, c = seen
                 return a, b, c
 
-    # What gravity tells
+    # Found from gravity
 
     def imu(self) -> Mounting:
         """Find the mounting of the IMU."""
@@ -219,10 +219,11 @@ class Walk:
         self._console.say(f"Turned to the left by {turn_rad:.1f} rad: gyro and gravity agree.")
         return found
 
-    # Both
+    # Common to all parts
 
     def _until_possible(self, find: Callable[[], T]) -> T:
-        """Repeat a measurement until its result is possible. Raises ToolError after a few times."""
+        """Repeat a measurement until its result is possible. Raises ToolError after three
+        attempts."""
         for _ in range(TRIES):
             try:
                 return find()
@@ -248,5 +249,5 @@ class Walk:
 
 
 def _understand(answer: str) -> tuple[int, ...] | None:
-    """A pattern, or nothing to see it again."""
+    """Return the pattern of an answer; an empty one asks for a repetition."""
     return () if answer == "r" else understand(answer)

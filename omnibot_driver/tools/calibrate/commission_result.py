@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What ``calibrate commission`` found, for the table, the file and the reader."""
+"""The result of ``calibrate commission``, for the table, the file and the user."""
 
 import math
 from dataclasses import dataclass
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WHEEL_BEARINGS_RAD: Final = (-math.pi / 3, math.pi / 3, math.pi)
-"""Of A, B, C, from the front to the left (manual, Control equation)."""
+"""Bearings of wheels A, B, C, in rad, from the front to the left (manual, Control equation)."""
 SEEN_FROM_ABOVE: Final = 0.3
 COLOURS: Final = {"x": "C3", "y": "C2", "z": "C0"}
 
 
 @dataclass(slots=True)
 class Found:
-    """``before``: the driver's parameters; the rest is None until it is found."""
+    """What a commissioning found, None where nothing; ``before``: the driver's parameters."""
 
     before: dict[str, Any]
     control_method: str | None = None
@@ -36,7 +36,7 @@ class Found:
 
 
 def result_of(found: Found) -> Result:
-    """Parameters for the driver; the IMU's mounting is for the robot's description."""
+    """Return the result: parameters for the driver, and the IMU's mounting for the description."""
     parameters: dict[str, Value] = {}
     for name in ("control_method", "delta_frame", "axis_signs"):
         value = getattr(found, name)

@@ -2,7 +2,7 @@
 
 """The dialogue with the user beside the robot: questions, progress, the table.
 
-``read`` is what answers; tests answer themselves.
+``read`` asks a question and returns the answer; tests replace it.
 """
 
 import math
@@ -21,12 +21,15 @@ from omnibot_driver.tools.needs import ToolError
 T = TypeVar("T")
 
 PLAIN_WIDTH: Final = 100
-"""Of what goes into a pipe or a file."""
+"""Width of output into a pipe or a file, in columns."""
 
 
 class Console:
-    """``yes``: yes to every question; figures are still asked for, since only the user knows
-    them."""
+    """The dialogue on a terminal.
+
+    ``yes`` answers every question with yes; numbers are still asked for, since only the user knows
+    them.
+    """
 
     def __init__(
         self, *, yes: bool = False, read: Callable[[str], str] = input, file: object = None
@@ -49,12 +52,12 @@ class Console:
         self.rich.print(text, markup=False, soft_wrap=True)
 
     def confirm(self, question: str) -> None:
-        """Raises ToolError unless the answer is yes."""
+        """Ask for a confirmation. Raises ToolError unless the answer is yes."""
         if not self.asks(question):
             raise ToolError("you said no, so nothing was moved or written")
 
     def asks(self, question: str) -> bool:
-        """Ask for yes or no; no answer means no."""
+        """Ask for yes or no; an empty answer means no."""
         if self._yes:
             self.say(f"{question} yes (--yes)")
             return True
@@ -72,7 +75,7 @@ class Console:
             self.say(f"Please answer one of: {', '.join(answers)}.")
 
     def number(self, question: str, unit: str, low: float, high: float) -> float:
-        """A figure in this unit and range."""
+        """Ask for a number in this unit and range."""
         while True:
             answer = self._answer(f"{question} in {unit}: ")
             try:
@@ -84,18 +87,18 @@ class Console:
             self.say(f"Please type a number of {unit} from {low:g} to {high:g}.")
 
     def ask(self, question: str, understand: Callable[[str], T | None], otherwise: str) -> T:
-        """Ask until the answer has a meaning; ``otherwise`` is printed after one without."""
+        """Ask until the answer can be understood; print ``otherwise`` after one that cannot."""
         while (meant := understand(self._answer(f"{question} "))) is None:
             self.say(otherwise)
         return meant
 
     def wait(self, request: str) -> None:
-        """Wait until the user has done what no program can do."""
+        """Print a request, and wait until the user confirms it with Enter."""
         self._answer(f"{request} [Enter] ")
 
     @contextmanager
     def progress(self, what: str) -> Iterator[Callable[[float], None]]:
-        """Shows how far it is; the caller tells the part done, from 0 to 1."""
+        """Show the progress of a task; the caller reports the completed part, from 0 to 1."""
         if not self.rich.is_terminal:
             self.say(f"{what} ...")
             yield lambda _part: None
@@ -127,7 +130,7 @@ class Console:
 
 
 def digits(finding: Finding) -> tuple[str, str, str]:
-    """Value, uncertainty and the value before, to two figures of the uncertainty."""
+    """Return value, uncertainty and previous value, to two digits of the uncertainty."""
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None
     if sigma and math.isfinite(sigma):

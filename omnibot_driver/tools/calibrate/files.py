@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Where a calibration goes: the driver's calibration file, and a picture."""
+"""Files of a calibration: the driver's calibration file, and a picture."""
 
 import os
 from pathlib import Path
@@ -19,7 +19,7 @@ PICTURES = (".png", ".svg", ".pdf")
 
 
 def output_file(given: str | None, drivers: str, table: Table) -> Path:
-    """The file to write: the one given, else the driver's own, else one in this folder.
+    """Return the file to write: the given one, else the driver's, else one in this folder.
 
     Raises ToolError where it cannot be written or holds something else.
     """
@@ -39,7 +39,7 @@ def output_file(given: str | None, drivers: str, table: Table) -> Path:
 
 
 def picture_file(given: str | None, subcommand: str) -> Path:
-    """The file to draw into; a folder, or none given, gets ``calibrate_<subcommand>.png``."""
+    """Return the file to draw into; a folder, or None, gets ``calibrate_<subcommand>.png``."""
     path = Path(given or ".").expanduser()
     if path.is_dir():
         path = path / f"calibrate_{subcommand}.png"
@@ -54,7 +54,7 @@ def picture_file(given: str | None, subcommand: str) -> Path:
 
 
 def save(result: Result, output: Path, table: Table) -> None:
-    """Save the result; raises ToolError, and then the file is unchanged."""
+    """Save the result. Raises ToolError, which leaves the file unchanged."""
     try:
         for name, value in result.parameters.items():
             table.by_name[name].check(value)
@@ -65,7 +65,7 @@ def save(result: Result, output: Path, table: Table) -> None:
 
 
 def draw(result: Result, output: Path, picture: Path) -> None:
-    """Draw the picture; a ToolError says that the result is saved nevertheless."""
+    """Draw the picture. Raises ToolError on failure; its message says that the result is saved."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -75,7 +75,7 @@ def draw(result: Result, output: Path, picture: Path) -> None:
         result.draw(figure)
         picture.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(picture, dpi=110)
-    except Exception as error:  # whatever it is, it costs the picture alone
+    except Exception as error:  # any failure here costs only the picture
         saved = f"saved to {output}, but " if result.parameters or result.record else ""
         raise ToolError(f"{saved}{picture} is not drawn: {error}") from error
 

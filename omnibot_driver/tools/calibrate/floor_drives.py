@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Drives on the floor, one after the other, each of which the user measures with a tape.
+"""Make drives on the floor, one after the other, each of which the user measures with a tape.
 
 Must not know what is computed from them.
 """
@@ -19,7 +19,7 @@ from omnibot_driver.tools.needs import ToolError
 
 
 class Planned(Protocol):
-    """A drive, with the name by which the user knows it."""
+    """A planned drive; ``name`` is shown to the user."""
 
     @property
     def name(self) -> str: ...
@@ -36,7 +36,10 @@ def measured(
     go: Callable[[Drive], Column],
     measure: Callable[[Drive, Column], Measured],
 ) -> list[Measured]:
-    """What ``measure`` makes of each drive and the poses that ``go`` returns; raises ToolError."""
+    """Make the drives, and return what ``measure`` makes of each one's poses from ``go``.
+
+    Raises ToolError.
+    """
     console.confirm(
         f"The robot will make {len(drives)} drives, within {arguments.side:g} m of where each one"
         f" begins, at up to {arguments.speed:g} m/s. Is there room for it?"
@@ -49,7 +52,10 @@ def measured(
 
 
 def speeds(robot: Any, arguments: argparse.Namespace) -> tuple[float, float]:
-    """The speed in m/s and the yaw rate in rad/s, within the driver's limits. Raises ToolError."""
+    """Return the speed in m/s and the yaw rate in rad/s, within the driver's limits.
+
+    Raises ToolError where one of them is 0.
+    """
     now = robot.parameters
     speed = min(arguments.speed, now["max_linear_speed"])
     turning = min(arguments.turning, now["max_angular_speed"])
@@ -68,9 +74,9 @@ def driven(
     turn_rad: float,
     seconds: float,
 ) -> Column:
-    """The poses of a drive; raises ToolError.
+    """Drive, and return the poses of the odometry; raises ToolError.
 
-    ``turn_rad``: its heading at the end; ``seconds``: how long it takes if nothing goes wrong.
+    ``turn_rad``: the heading at the end; ``seconds``: the expected duration.
     """
     speed, turning = speeds(robot, arguments)
     bounds = Bounds(
@@ -89,7 +95,7 @@ def driven(
 
 
 def turned_past_mark(console: Console) -> float:
-    """The user's answer in rad, positive to the left."""
+    """Ask how far the front points past its mark; return the angle in rad, positive to the left."""
     return math.radians(
         console.number(
             "How far past its mark does the front point, left +, right -", "degrees", -170.0, 170.0

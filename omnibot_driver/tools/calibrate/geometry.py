@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate geometry``: lines, turns and squares, and a tape measure: wheel and base radius."""
+"""``calibrate geometry``: find wheel and base radius from drives measured with a tape."""
 
 import argparse
 import math
@@ -22,7 +22,7 @@ from omnibot_driver.tools.calibrate.seen import WHEELS
 from omnibot_driver.tools.calibrate.waypoints import square, visit
 
 PLAIN: Final = 0.005
-"""A wheel that differs from the others by more is worth a word."""
+"""A wheel whose radius differs from the mean by more than this part is reported to the user."""
 INTRODUCTION: Final = (
     "You need a tape measure, something to mark the floor with, and a plumb or a fixed point under"
     " the robot's centre. Before each drive mark where the centre is and where the front points;"
@@ -33,7 +33,7 @@ INTRODUCTION: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """``places`` to go through; ``heading``: whether the heading is measured, else the place."""
+    """One drive through ``places``; ``heading``: measure its heading, else its position."""
 
     name: str
     places: list[Pose]
@@ -41,7 +41,7 @@ class Drive:
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Raises ToolError."""
+    """Make the drives and find the geometry. Raises ToolError."""
     if "base_radius" not in robot.parameters:
         return odometry_scale.run(robot, console, arguments)
     console.say(INTRODUCTION)
@@ -59,10 +59,10 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def believed(now: Mapping[str, Any]) -> dict[str, float]:
-    """Sizes in m and scales that make ``odom`` what it is, by the names of their parameters.
+    """Return the sizes in m and the scales on which ``odom`` is based, by parameter name.
 
-    The board computes with sizes of its own, those of the manual, and the driver scales what comes
-    of it; from wheel counts the driver computes by itself.
+    With wheel counts the driver computes the odometry with its own parameters. Otherwise the board
+    computes it with the manual's sizes, and the driver scales the result.
     """
     if now["delta_frame"] == "wheel_counts":
         return {name: now[name] for name in ("wheel_radius", "base_radius")}
@@ -78,7 +78,7 @@ def believed(now: Mapping[str, Any]) -> dict[str, float]:
 
 
 def plan(side_m: float, turns: int, *, squares: bool) -> list[Drive]:
-    """The drives in their order."""
+    """Return the drives in their order."""
     angle_rad = math.tau * turns
     number = f"{turns} turns" if turns > 1 else "1 turn"
     drives = [
@@ -128,7 +128,7 @@ def _reading(
 
 
 def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any]) -> Result:
-    """The findings of a geometry, to show and to write; ``now`` are the driver's parameters."""
+    """Return the findings for a geometry, to show and write; ``now``: the driver's parameters."""
     wheels_sigma, base_sigma = map(float, np.sqrt(np.diag(found.covariance)[:2]))
     factors = {
         "wheel_radius": (found.wheels, wheels_sigma, "m"),
@@ -177,8 +177,9 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
 def misses(
     readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> tuple[float, float]:
-    """Mean distance in m of measured places from those of the odometry, before and after. The
-    driver has one radius for all wheels, so their differences are not made use of.
+    """Return the odometry's mean distance, in m, from the measured ends, before and after.
+
+    The driver has one radius for all wheels, so differences between wheels are not used.
     """
     before: list[float] = []
     after: list[float] = []

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The picture of ``calibrate geometry``."""
+"""Draw the picture of ``calibrate geometry``."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -17,8 +17,9 @@ if TYPE_CHECKING:
 def draw(
     figure: "Figure", readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> None:
-    """Where the odometry believed to be, where it would now, and where the tape found the robot;
-    then how far each reading is off, before and after, in its own standard deviations.
+    """Draw the drives by the odometry before and after, with the ends that were measured by tape.
+
+    Beside them draw the error of each reading, before and after, in its standard deviations.
     """
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     placed = [one for one in readings if not np.isnan(one.end[:2]).any()]

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From where the odometry believed to be and where the tape found the robot, to its geometry. Pure.
+"""Fit the robot's geometry to ends by the odometry and ends measured with a tape. Pure.
 
-Every way of the odometry is taken back to what the wheels rolled, and rolled again with wheels and
-a base of other sizes; the sizes that end where the tape says are the ones. So any mixture of lines,
-turns and squares will do, as far as it tells the sizes apart. After J. Borenstein and L. Feng,
-"UMBmark: a benchmark test for measuring odometry errors in mobile robots" (1995), for three wheels.
+Each path of the odometry is converted to how far the wheels rolled, and calculated again with
+wheels and a base of other sizes. The sizes that lead to the measured ends are the result. So any
+mixture of lines, turns and squares will do, as far as it determines the sizes. After J. Borenstein
+and L. Feng, "UMBmark: a benchmark test for measuring odometry errors in mobile robots" (1995), for
+three wheels.
 """
 
 import math
@@ -22,16 +23,18 @@ from omnibot_driver.tools.calibrate.log import Column
 from omnibot_driver.tools.needs import ToolError
 
 WHEELS_ALIKE: Final = 0.01
-"""Relative standard deviation of one wheel's radius from the mean, as wheels are made."""
+"""Relative standard deviation of one wheel's radius from the mean, by manufacture."""
 UNKNOWN: Final = 0.2
-"""Sizes further from the expected ones are mistakes."""
+"""Largest relative deviation of a size from the expected one; beyond it a reading is a mistake."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """``path``: (n, 3) poses of the odometry, the last one at rest; ``end``: (3,) where the robot
+    """One measured drive.
+
+    ``path``: (n, 3) poses of the odometry, the last one at rest; ``end``: (3,) where the robot
     truly ended, seen from where it began, in m, m and unwrapped rad, NaN where it was not measured;
-    ``sigma``: (3,) of the measurement.
+    ``sigma``: (3,) standard deviation of the measurement.
     """
 
     name: str
@@ -42,9 +45,11 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """Sizes over the believed ones: ``wheels`` (the mean radius), ``base``, and by how much each
-    wheel exceeds the mean (``unlike``: (3,), relative). ``covariance``: (4, 4), of wheels, base and
-    the first two of ``unlike``; ``excess``: misfit over what was to be expected (1: as expected).
+    """Sizes relative to the assumed ones.
+
+    ``wheels``: the mean radius; ``base``; ``unlike``: (3,), by how much each wheel exceeds the
+    mean, relative. ``covariance``: (4, 4), of wheels, base and the first two of ``unlike``;
+    ``excess``: misfit over the expected one (1: as expected).
     """
 
     wheels: float
@@ -72,10 +77,10 @@ class Geometry:
 
 
 def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geometry:
-    """The geometry that explains the readings best; ``base_radius_m``: the believed one;
-    ``drift``: standard deviation in m of a wheel's way after 1 m, for it slips now and then.
+    """Return the geometry that explains the readings best.
 
-    Raises ToolError for readings that no such robot can have made.
+    ``base_radius_m``: the assumed one; ``drift``: standard deviation in m of a wheel's way after 1
+    m, caused by slip. Raises ToolError for readings that no such robot can have made.
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]
@@ -103,8 +108,10 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
 
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
-    """The (n, 3) poses, from the identity on, of the same turns of wheels whose radii are
-    ``factors`` times as large, (3,) or step by step (n - 1, 3), on a base ``base`` times as large.
+    """Return the (n, 3) poses, from the identity on, of the same wheel turns with other sizes.
+
+    Wheel radii are ``factors`` times as large, (3,) or step by step (n - 1, 3); the base is
+    ``base`` times as large.
     """
     rims = rims_of(path, base_radius_m) * factors
     body = rims @ np.linalg.inv(_rims(base * base_radius_m)).T
@@ -117,7 +124,7 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
 
 
 def rims_of(path: Column, base_radius_m: float) -> Column:
-    """(n - 1, 3): how far each rim rolled from pose to pose."""
+    """Return how far each rim rolled from pose to pose, in m: (n - 1, 3)."""
     steps = np.diff(path, axis=0)
     middle = path[:-1, 2] + steps[:, 2] / 2
     cos, sin = np.cos(middle), np.sin(middle)
@@ -126,7 +133,8 @@ def rims_of(path: Column, base_radius_m: float) -> Column:
 
 
 def _weights(reading: Reading, base_radius_m: float, drift: float) -> Column:
-    """Weights that make the measured errors independent, with a standard deviation of one."""
+    """Return weights that make the measured errors independent, with a standard deviation of
+    one."""
     path = reading.path
     x, y, yaw = np.linalg.inv(_rims(base_radius_m))
     middle = (path[:-1, 2] + path[1:, 2]) / 2
@@ -143,7 +151,7 @@ def _weights(reading: Reading, base_radius_m: float, drift: float) -> Column:
 
 
 def _rims(base_radius_m: float) -> Column:
-    """(3, 3): from a body's twist to the speeds of its rims."""
+    """Return the (3, 3) matrix from a body's twist to the speeds of its rims."""
     wheels = OmniKinematics(1.0, base_radius_m)
     columns = [BodyTwist(1.0, 0.0, 0.0), BodyTwist(0.0, 1.0, 0.0), BodyTwist(0.0, 0.0, 1.0)]
     return np.array([wheels.wheel_rates(column) for column in columns]).T

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate imu``: the robot rests, the IMU says what it says of nothing."""
+"""``calibrate imu``: find biases, noise and level of the IMU while the robot rests."""
 
 import argparse
 import math
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 AXES: Final = "xyz"
 COLOURS: Final = ("tab:red", "tab:green", "tab:blue")
 DRAWN: Final = 1000
-"""Readings at the most; of more the picture is larger, not clearer."""
+"""Largest number of readings drawn; more make the picture larger, but not clearer."""
 GRAVITY_SIGMA: Final = 0.01
-"""m/s²: how well a user knows the local value."""
+"""Standard deviation of the local gravity as a user knows it, in m/s²."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Raises ToolError."""
+    """Record the IMU at rest and evaluate it. Raises ToolError."""
     if robot.parameters["auto_gyro_bias"]:
         raise ToolError(
             "auto_gyro_bias is on, so the driver changes the bias meanwhile: start it without"
@@ -53,7 +53,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> Result:
-    """The findings of a rest, to show and to write; ``now`` are the driver's parameters."""
+    """Return the findings of a rest, to show and to write; ``now`` are the driver's parameters."""
     too_long_mps2 = found.gravity_mps2 - gravity_mps2
     accel_bias = too_long_mps2 * found.up
     along_sigma = math.hypot(GRAVITY_SIGMA, float(found.force_sigma.max()))
@@ -126,7 +126,7 @@ def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> R
 
 
 def draw(figure: "Figure", found: Rest, imu: Imu) -> None:
-    """Rates and forces over time; the Allan deviation with its fit."""
+    """Draw rates and forces over time, and the Allan deviation with its fit."""
     grid = figure.add_gridspec(2, 2)
     rates, forces = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[1, 0])
     seconds = imu.stamp_s - imu.stamp_s[0]

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Ctrl-C, a lost SSH session and kill: told when somebody asks, except while a person is asked.
+"""Handle Ctrl-C, a lost SSH session and kill: the request is noted, and `check` raises it.
 
-Inside ROS an exception at any place would leave the executor half done.
+An exception at an arbitrary place inside ROS would leave the executor in an undefined state. Only
+while a person is asked, a signal raises at once.
 """
 
 import signal
@@ -22,7 +23,8 @@ class Interrupted(ToolError):
 
 
 class Interruption:
-    """While it is entered, the signals are its own. Outside the main thread it hears nothing."""
+    """A context that handles the signals of ``SIGNALS``; outside the main thread it handles
+    none."""
 
     def __init__(self) -> None:
         self._requested = self._asking = self._deferred = False
@@ -43,13 +45,13 @@ class Interruption:
             signal.signal(number, handler)
 
     def check(self) -> None:
-        """Raises Interrupted once a signal has come."""
+        """Raise Interrupted once a signal was received."""
         if self._requested and not self._deferred:
             raise Interrupted("interrupted; the robot is stopped, nothing was written")
 
     @contextmanager
     def deferred(self) -> Iterator[None]:
-        """A context that is completed before a signal takes effect."""
+        """A context in which a received signal has no effect until its end."""
         self._deferred = True
         try:
             yield
@@ -57,7 +59,7 @@ class Interruption:
             self._deferred = False
 
     def reading(self, read: Callable[[str], str]) -> Callable[[str], str]:
-        """The same way of asking, but a signal ends it."""
+        """Return a function that reads as ``read`` does, but that a signal interrupts."""
 
         def ask(question: str) -> str:
             self.check()

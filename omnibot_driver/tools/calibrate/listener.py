@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a calibration hears of the robot, and whether that is as it should be. Commands nothing."""
+"""Receive a robot's data for a calibration, and check them. Sends no commands."""
 
 import math
 import time
@@ -24,14 +24,14 @@ from omnibot_driver.tools.needs import ToolError
 
 IMU, ODOMETRY = TOPICS = "imu/data_raw", "odom"
 LOST_S: Final = 0.3
-"""After this time without data from it a robot is not driven any further."""
+"""After this time without data, in s, the robot is not driven any further."""
 AT_ONCE: Final = 100
-"""Messages that may wait to be read."""
+"""Number of messages that are read at once."""
 LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Listener(Client):
-    """``log`` is of the motion or rest that is under way, or was last."""
+    """A client that records the robot's data; ``log`` is of the present or last motion or rest."""
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
         super().__init__(node, context, interruption)
@@ -90,7 +90,8 @@ class Listener(Client):
         self._estop = message.data
 
     def _begin(self, states: Sequence[str]) -> None:
-        """Hear the robot anew: while a person was asked, nothing was heard."""
+        """Start a new log, with newly received data, as none is received while a person is
+        asked."""
         self._require_alone()
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
         self._wait(lambda: min(self._heard_s.values()) > 0, 1.0)
@@ -114,7 +115,8 @@ class Listener(Client):
             )
 
     def _lost(self) -> list[str]:
-        """Topics that are silent; what waits to be read is read first, for we may be slow."""
+        """Return the topics without data, after reading pending messages, as this program may
+        lag."""
         wanted = (IMU,) if self._states[-1] == "imu_only" else self._topics
         if silent(self._heard_s, wanted, time.monotonic()):
             for _ in range(AT_ONCE):
@@ -123,7 +125,7 @@ class Listener(Client):
 
 
 def silent(heard_s: Mapping[str, float], wanted: Sequence[str], now_s: float) -> list[str]:
-    """The wanted topics without a recent message."""
+    """Return the wanted topics without a recent message."""
     return [topic for topic in wanted if now_s - heard_s[topic] > LOST_S]
 
 

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What was heard of a robot and told to it during one motion or one rest, as columns.
+"""A log of what a robot sent and was commanded during one motion or one rest, as columns.
 
-Times are in seconds by ROS's clock; those of measurements are when the board sampled. Knows no ROS.
+Times are in seconds by ROS's clock; a measurement's time is that of the board's sampling. Knows no
+ROS.
 """
 
 from collections.abc import Sequence
@@ -17,7 +18,7 @@ Row = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """IMU data: ``force_mps2`` and ``rate_radps`` of shape (n, 3), in the sensor's axes."""
+    """IMU readings: ``force_mps2`` and ``rate_radps`` of shape (n, 3), in the sensor's axes."""
 
     stamp_s: Column
     force_mps2: Column
@@ -26,7 +27,8 @@ class Imu:
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """``pose``: (n, 3), m, m and unwrapped rad; ``twist``: (n, 3), m/s and rad/s in the body."""
+    """Odometry: ``pose`` (n, 3) in m, m and unwrapped rad; body ``twist`` (n, 3) in m/s and
+    rad/s."""
 
     stamp_s: Column
     pose: Column
@@ -35,7 +37,8 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True)
 class Wheels:
-    """``angle_rad`` and ``rate_radps``: (n, wheels), in the order of ``joint_states``."""
+    """Wheel data: ``angle_rad`` and ``rate_radps``, (n, wheels), in the order of
+    ``joint_states``."""
 
     stamp_s: Column
     angle_rad: Column
@@ -44,7 +47,7 @@ class Wheels:
 
 @dataclass(frozen=True, slots=True)
 class Commands:
-    """``values``: (n, 3), a twist in m/s and rad/s or wheel rates in rad/s, when it was sent."""
+    """Commands by sending time: ``values`` (n, 3) in m/s and rad/s, or wheel rates in rad/s."""
 
     stamp_s: Column
     values: Column
@@ -52,7 +55,7 @@ class Commands:
 
 @dataclass(slots=True)
 class Log:
-    """Rows in order of arrival; columns for calculations."""
+    """Received and sent data: rows in order of arrival, with columns for calculations."""
 
     imu_rows: list[Row] = field(default_factory=list)
     odometry_rows: list[Row] = field(default_factory=list)
@@ -61,13 +64,13 @@ class Log:
 
     @property
     def imu(self) -> Imu:
-        """The IMU rows: a stamp, three forces and three rates each."""
+        """The IMU rows as columns; a row is a timestamp, three forces and three rates."""
         rows = _columns(self.imu_rows, 7)
         return Imu(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
 
     @property
     def odometry(self) -> Odometry:
-        """The odometry rows: a stamp, a pose and a twist each."""
+        """The odometry rows as columns; a row is a timestamp, a pose and a twist."""
         rows = _columns(self.odometry_rows, 7)
         pose = rows[:, 1:4].copy()
         pose[:, 2] = np.unwrap(pose[:, 2])
@@ -75,14 +78,14 @@ class Log:
 
     @property
     def wheels(self) -> Wheels:
-        """Rows of a stamp, angles and as many rates (NaN where the driver gave none)."""
+        """The wheel rows as columns; a row is a timestamp, angles and rates (NaN: not reported)."""
         wheels = len(self.wheel_rows[0]) // 2 if self.wheel_rows else 0
         rows = _columns(self.wheel_rows, 1 + 2 * wheels)
         return Wheels(rows[:, 0], rows[:, 1 : 1 + wheels], rows[:, 1 + wheels :])
 
     @property
     def commands(self) -> Commands:
-        """The command rows: a time and three values each."""
+        """The command rows as columns; a row is a time and three values."""
         rows = _columns(self.command_rows, 4)
         return Commands(rows[:, 0], rows[:, 1:4])
 

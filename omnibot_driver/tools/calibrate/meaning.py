@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the board's commands and deltas mean, told by what the wheels do. Pure calculation.
+"""Find the meaning of the board's commands and deltas from its own odometry. Pure calculation.
 
-Nothing here needs eyes or floor: the board's own odometry is enough, whatever its signs and scales.
+This needs neither a person nor a floor: the odometry is enough, whatever its signs and scales.
 """
 
 import math
@@ -17,15 +17,17 @@ from omnibot_driver.tools.needs import ToolError
 ControlMethod = Literal["velocity", "position"]
 
 STANDS_PART: Final = 0.1
-"""Slower than this part of what is commanded is standing."""
+"""Below this part of the commanded speed the robot stands."""
 STEADY_PART: Final = 0.25
 DOUBLED: Final = (1.6, 2.5)
-"""What may come of twice the command, friction and rounding considered."""
+"""Range of the speed ratio after the command was doubled, including friction and rounding."""
 PURE_TURN: Final = 0.5
-"""Of sideways motion to rim speed, in a turn on the spot: 0 if the deltas are understood, else 2
-or more."""
+"""Largest ratio of sideways motion to rim speed in a turn on the spot.
+
+It is 0 if the deltas are understood, else 2 or more.
+"""
 ALIKE: Final = 0.35
-"""Of a turn: directions that differ by less are the same, by 1 minus it or more another."""
+"""Part of a turn's angle by which two directions may differ and still be the same."""
 
 
 LEAST_M: Final = 1e-3
@@ -33,9 +35,9 @@ LEAST_M: Final = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Mean velocity of a while, as the driver understands it: the body's axes, m/s and rad/s.
+    """Mean velocity over a time by the driver's odometry: in the body's axes, m/s and rad/s.
 
-    ``early`` and ``late`` are the speeds of its two halves.
+    ``early_mps`` and ``late_mps`` are the speeds of the two halves of the time.
     """
 
     vx_mps: float
@@ -46,17 +48,17 @@ class Drift:
 
     @property
     def speed_mps(self) -> float:
-        """The speed in any direction."""
+        """The speed regardless of direction, in m/s."""
         return math.hypot(self.vx_mps, self.vy_mps)
 
     @property
     def direction_rad(self) -> float:
-        """Direction of the motion in the body's plane."""
+        """Direction of the motion in the body's plane, in rad."""
         return math.atan2(self.vy_mps, self.vx_mps)
 
 
 def drift(odometry: Odometry, begin_s: float, end_s: float) -> Drift:
-    """Between two times by the stamps. Raises ToolError where nothing was heard."""
+    """Return the mean velocity between two timestamps. Raises ToolError for too little data."""
     within = (odometry.stamp_s >= begin_s) & (odometry.stamp_s < end_s)
     twist = odometry.twist[within]
     if len(twist) < 4:
@@ -67,7 +69,7 @@ def drift(odometry: Odometry, begin_s: float, end_s: float) -> Drift:
 
 
 def require_motion(odometry: Odometry) -> None:
-    """Raises ToolError for a robot that has not moved at all."""
+    """Raise ToolError if the robot has not moved at all."""
     if not len(odometry.pose) or np.ptp(odometry.pose[:, :2], axis=0).max() < LEAST_M:
         raise ToolError(
             "the robot does not move when commanded: check the motors' power, and what the driver"
@@ -76,10 +78,10 @@ def require_motion(odometry: Odometry) -> None:
 
 
 def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod:
-    """Where the switch stands, by what came of ``slow_mps`` and of twice as much.
+    """Return the position of the board's switch, from the motion at ``slow_mps`` and at twice that.
 
-    Velocities are held and doubled. As a pose the same words are a place a few millimetres from the
-    origin of the board's frame: it is driven to, and not any further.
+    Velocities are held and doubled. In positional control the same command is a place a few
+    millimetres from the origin of the board's frame: the robot drives there and stops.
     """
     least_mps = STANDS_PART * slow_mps
     held = all(
@@ -93,15 +95,15 @@ def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod:
 
 
 def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
-    """Whether a turn on the spot looks like one."""
+    """Whether the odometry shows a turn on the spot as one."""
     return turning.speed_mps < PURE_TURN * base_radius_m * abs(turning.yaw_rate)
 
 
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
-    """Whether the same command goes the same way in the body's axes after a turn by this angle.
+    """Whether a command leads in the same body direction after a turn by this angle.
 
-    In the wrong one of the frames "earth" and "body" its direction has turned as well. Raises
-    ToolError where it has done neither.
+    With the wrong one of the frames "earth" and "body" its direction has turned as well. Raises
+    ToolError where neither is the case.
     """
     change_rad = abs(math.remainder(after.direction_rad - before.direction_rad, math.tau))
     if change_rad < ALIKE * abs(turned_rad):

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a robot is moved for a calibration: laws, their bounds, and whether the robot obeys.
+"""Move a robot for a calibration: laws, their bounds, and whether the robot obeys.
 
-Pure. A law says what is commanded at a time, given where the odometry is; None ends the motion.
+Pure. A law returns the command at a time, given the pose by the odometry; None ends the motion.
 """
 
 import math
@@ -19,28 +19,30 @@ Topic = Literal["cmd_vel", "wheel_cmd"]
 HALT: Final[Vector3] = (0.0, 0.0, 0.0)
 
 Law = Callable[[float, Pose], Vector3 | None]
-"""Seconds since the motion began, and the pose since then (yaw unwrapped), to a command: m/s, m/s
-and rad/s for ``cmd_vel``, rad/s of A, B, C for ``wheel_cmd``."""
+"""A function of the seconds and the pose since the motion began (yaw unwrapped), to a command.
+
+The command is in m/s, m/s and rad/s for ``cmd_vel``, in rad/s of A, B, C for ``wheel_cmd``.
+"""
 
 LOOK_S: Final = 1.0
-"""How long a robot is watched before it is said not to obey."""
+"""Time, in s, in which a robot must move before it is reported not to obey."""
 SLOW_LOOK_S: Final = 3.0
-"""Where the odometry is predicted from rare measurements."""
+"""The same time, in s, where the odometry is predicted from rare measurements."""
 OBEYED_PART: Final = 0.2
-"""A robot that does less than this part of its command counts as standing."""
+"""A robot that moves by less than this part of its command counts as standing."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
-"""Slower commands may be lost in friction: m/s and rad/s, rad/s of a wheel."""
+"""Commands slower than this may be lost in friction: m/s and rad/s, or rad/s of a wheel."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """What one motion must not exceed. Linear in m and m/s, turning in rad and rad/s.
+    """Limits of one motion. Linear in m and m/s, turning in rad and rad/s.
 
-    ``speed``, ``turning``: of commands (for wheels, ``speed`` is the fastest one's, in rad/s);
-    ``way``, ``turn``: from where it began, by the odometry; ``seconds``: altogether;
-    ``acceleration``, ``angular_acceleration``: how fast a command is changed (for wheels, the
-    first). Infinite is at once.
+    ``speed``, ``turning``: of commands (for wheels, ``speed`` is the fastest wheel's, in rad/s);
+    ``way``, ``turn``: from the start, by the odometry; ``seconds``: the duration; ``acceleration``,
+    ``angular_acceleration``: how fast a command is changed (for wheels, the first one). An infinite
+    one changes commands at once.
     """
 
     speed: float
@@ -52,7 +54,7 @@ class Bounds:
     angular_acceleration: float = 0.8
 
     def require_allowed(self, topic: Topic, command: Vector3) -> None:
-        """Raises ToolError for a command that is too fast or not finite."""
+        """Raise ToolError if a command is too fast or not finite."""
         if topic == "wheel_cmd":
             allowed = max(map(abs, command)) <= self.speed
         else:
@@ -65,7 +67,7 @@ class Bounds:
             )
 
     def require_within(self, seconds: float, pose: Pose) -> None:
-        """Raises ToolError for a robot that is further, or drives longer, than it should."""
+        """Raise ToolError if the robot is too far from its start, or drives for too long."""
         if not pose.finite:
             raise ToolError(
                 "the robot was stopped, `odom` does not say where it is (NaN or infinite): see who"
@@ -85,7 +87,7 @@ class Bounds:
         )
 
     def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:
-        """The command after this time on the straight way to the wanted one."""
+        """Return the command after this time on the straight way to the wanted command."""
         if topic == "wheel_cmd":
             a, b, c = _step(now, wanted, self.acceleration * seconds)
             return a, b, c
@@ -95,10 +97,10 @@ class Bounds:
 
 
 class Obedience:
-    """Whether the robot roughly follows its commands, second by second."""
+    """Checks that the robot roughly follows its commands, interval by interval."""
 
     def __init__(self, topic: Topic, parameters: Mapping[str, object]) -> None:
-        """Take the driver's ``parameters``, which show what its board has."""
+        """Watch commands on this topic; the driver's ``parameters`` show what its board has."""
         self._topic = topic
         self._look_s = SLOW_LOOK_S if "odom_rate" in parameters else LOOK_S
         self._has_scales = "linear_scale" in parameters
@@ -106,9 +108,9 @@ class Obedience:
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
 
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
-        """Raises ToolError once the robot has not moved for a while although it was commanded to.
+        """Raise ToolError once the robot has not moved for a while although it was commanded to.
 
-        ``seconds`` since the last look; ``measured`` has the units of ``command``.
+        ``seconds``: since the last call; ``measured`` has the units of ``command``.
         """
         if math.isnan(self._began_s):
             self._began_s = now_s
@@ -136,12 +138,12 @@ class Obedience:
 
 
 def steady(command: Vector3, seconds: float) -> Law:
-    """The same command for this time."""
+    """Return a law that commands the same for this time."""
     return lambda now_s, _pose: command if now_s < seconds else None
 
 
 def stairs(steps: list[tuple[float, Vector3]]) -> Law:
-    """Commands one after the other, each for its seconds."""
+    """Return a law that gives these commands one after the other, each for its seconds."""
 
     def law(now_s: float, _pose: Pose) -> Vector3 | None:
         for seconds, command in steps:

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How the IMU is mounted, from gravity in three postures and from one turn. Pure calculation.
+"""Find the IMU's mounting from gravity in three postures and from one turn. Pure calculation.
 
-Level, nose up and left side up, by some unknown angle each: what is straight up in the body is then
-known but for that angle, and the angle is that between two measured directions. The rotation that
-fits the three pairs best is the mounting (Wahba's problem, solved by singular values).
+The postures are level, nose up and left side up. The two tilt angles are unknown, but each is the
+angle between two measured directions of gravity. With them the direction of up in the body is known
+in each posture. The mounting is the rotation that fits the three pairs of directions best (Wahba's
+problem, solved by singular values).
 """
 
 import math
@@ -22,25 +23,28 @@ from omnibot_driver.tools.calibrate.seen import Contradiction
 Array = NDArray[np.float64]
 
 STILL_RADPS: Final = 0.1
-"""Of the rate's deviations: a hand trembles less."""
+"""Largest standard deviation of the rate in a hand-held posture, in rad/s; a hand trembles less."""
 GRAVITY_PART: Final = 0.15
 LEAST_TILT_RAD: Final = math.radians(10)
 MOST_TILT_RAD: Final = math.radians(75)
 SQUARE_RAD: Final = math.radians(35)
-"""How far from a right angle two tilts by hand may be."""
+"""Largest deviation from a right angle between two tilts made by hand."""
 LEAST_TURN_RAD: Final = math.radians(30)
 SNAP_RAD: Final = math.radians(15)
-"""A sensor so close to right angles is mounted at right angles."""
+"""A sensor within this angle of a right-angled mounting is taken as mounted at right angles."""
 HAND_RAD: Final = math.radians(2)
-"""No hand tilts straighter than this, whatever the two tilts say of each other."""
+"""Least standard deviation of a tilt's direction by hand, even if both tilts agree better."""
 LEVEL_WEIGHT: Final = 20.0
-"""The floor is more level than a hand is straight."""
+"""Weight of the level posture over a tilted one, as a floor is more exact than a hand."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """``rotation``: from the sensor's axes to the body's; ``yaw_sigma_rad``: of its turn about
-    the vertical, which hands have told; ``tilts_rad``: how far it was tilted."""
+    """The IMU's mounting: ``rotation`` from the sensor's axes to the body's.
+
+    ``yaw_sigma_rad``: standard deviation of the yaw, which depends on tilts made by hand;
+    ``tilts_rad``: the two angles by which the robot was tilted.
+    """
 
     rotation: Array
     yaw_sigma_rad: float
@@ -48,11 +52,11 @@ class Mounting:
 
     @property
     def rpy_rad(self) -> tuple[float, float, float]:
-        """Fixed-axis roll, pitch and yaw of the sensor in the body, as a URDF has them."""
+        """Fixed-axis roll, pitch and yaw of the sensor in the body, in rad, as in a URDF."""
         return rpy(self.rotation)
 
     def snapped(self) -> "Mounting | None":
-        """The nearest right-angled mounting; None if none is near."""
+        """Return the nearest right-angled mounting; None if none is near."""
         nearest = max(_right_angles(), key=lambda one: float(np.trace(one.T @ self.rotation)))
         cosine = (float(np.trace(nearest.T @ self.rotation)) - 1.0) / 2.0
         if math.acos(max(-1.0, min(1.0, cosine))) > SNAP_RAD:
@@ -61,7 +65,7 @@ class Mounting:
 
 
 def up(imu: Imu) -> Array:
-    """The mean specific force: straight up, in the sensor's axes. Raises Contradiction."""
+    """Return the direction of up in the sensor's axes, as a unit vector. Raises Contradiction."""
     if not len(imu.stamp_s):
         raise Contradiction("nothing was measured")
     trembling = float(np.max(np.std(imu.rate_radps, axis=0)))
@@ -77,12 +81,12 @@ def up(imu: Imu) -> Array:
 
 
 def bias(imu: Imu) -> Array:
-    """The gyro's mean reading at rest."""
+    """Return the gyro's mean reading at rest, in rad/s."""
     return np.asarray(np.mean(imu.rate_radps, axis=0))
 
 
 def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
-    """The mounting from three unit vectors that point up. Raises Contradiction."""
+    """Return the mounting from three unit vectors that point up. Raises Contradiction."""
     nose_rad, left_rad = _tilt(level, nose_up, "front"), _tilt(level, left_up, "left side")
     forward, left = _level_part(level, nose_up), _level_part(level, left_up)
     square_rad = math.atan2(float(level @ np.cross(forward, left)), float(forward @ left))
@@ -107,7 +111,7 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
 
 
 def require_left_turn(imu: Imu, bias_radps: Array, level: Array) -> float:
-    """The turn about straight up, in rad, of one to the left. Raises Contradiction."""
+    """Return the angle of a turn to the left about the vertical, in rad. Raises Contradiction."""
     rate = (imu.rate_radps - bias_radps) @ level
     turn_rad = float(np.sum((rate[1:] + rate[:-1]) / 2 * np.diff(imu.stamp_s)))
     if abs(turn_rad) < LEAST_TURN_RAD:
@@ -121,7 +125,7 @@ def require_left_turn(imu: Imu, bias_radps: Array, level: Array) -> float:
 
 
 def rpy(rotation: Array) -> tuple[float, float, float]:
-    """Fixed-axis roll, pitch and yaw; of a pitch of 90°, where they are not unique, roll 0."""
+    """Return fixed-axis roll, pitch and yaw, in rad; at a pitch of 90° roll is set to 0."""
     sine = max(-1.0, min(1.0, -float(rotation[2, 0])))
     if abs(sine) > 1.0 - 1e-9:
         yaw = math.atan2(-float(rotation[0, 1]), float(rotation[1, 1]))
@@ -144,13 +148,13 @@ def _tilt(level: Array, tilted: Array, what: str) -> float:
 
 
 def _level_part(level: Array, tilted: Array) -> Array:
-    """Unit vector of the tilt in the level plane."""
+    """Return the unit vector of the tilt's part in the level plane."""
     part = tilted - (tilted @ level) * level
     return np.asarray(part / np.linalg.norm(part))
 
 
 def _right_angles() -> list[Array]:
-    """The 24 rotations that put axes on axes."""
+    """Return the 24 rotations that map axes onto axes."""
     found = []
     for places in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate geometry`` and ``scale`` of a base that only drives straight and turns: what its
-odometry has to be multiplied by, by a tape measure. Where the driver has a way for a count of its
-encoder instead, that is found. Must not know its wheels.
+"""``calibrate geometry`` and ``scale`` of a base that only drives straight and turns.
+
+They find the factors for its odometry with a tape measure. If the driver has a way for each count
+of its encoder instead, that is found. Must not know the base's wheels.
 """
 
 import argparse
@@ -25,12 +26,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINES: Final = 2
-"""Two tell whether one was misread."""
+"""Number of straight drives; two show whether one was misread."""
 UNLIKE: Final = 4.0
 """Standard deviations by which two ratios differ that are not the same."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
-"""A longer count makes the same speed fewer units of the motors."""
+"""Parameters for the way of an encoder's count, and for the motors' units of a speed.
+
+A longer way for each count makes the same speed fewer units of the motors.
+"""
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive mark where the"
     " robot's centre is and where the front points; after it you are asked how far it has come, or"
@@ -40,7 +44,8 @@ INTRODUCTION: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A drive of ``wanted`` m straight ahead, or rad where it ``turns``."""
+    """A drive of ``wanted`` m straight ahead, or of ``wanted`` rad on the spot where it
+    ``turns``."""
 
     name: str
     wanted: float
@@ -49,7 +54,10 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """True over told, in the unit of its drive, with its standard deviation."""
+    """The ratio of the true motion to the odometry's, in the unit of its drive.
+
+    ``sigma`` is the standard deviation of the true motion.
+    """
 
     drive: Drive
     told: float
@@ -66,7 +74,7 @@ class Ratio:
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Raises ToolError."""
+    """Make the drives and find the scales. Raises ToolError."""
     console.say(INTRODUCTION)
     drives = plan(arguments.side, arguments.turns)
     if COUNT in robot.parameters:
@@ -82,7 +90,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def plan(side_m: float, turns: int) -> list[Drive]:
-    """The drives in their order."""
+    """Return the drives in their order."""
     number, angle_rad = f"{turns} turns" if turns > 1 else "1 turn", math.tau * turns
     return [
         Drive(f"{number} to the left", angle_rad, True),
@@ -118,7 +126,7 @@ def _measure(console: Console, drive: Drive, path: Column, arguments: argparse.N
 
 
 def result(ratios: Sequence[Ratio], now: Mapping[str, Any]) -> Result:
-    """The findings of these drives, to show and to write; ``now`` are the driver's parameters."""
+    """Return the findings of these drives, to show and write; ``now``: the driver's parameters."""
     findings, parameters, notes = [], {}, []
     names = ((COUNT, False),) if COUNT in now else tuple(zip(NAMES, (False, True), strict=True))
     for name, turns in names:
@@ -151,7 +159,7 @@ def result(ratios: Sequence[Ratio], now: Mapping[str, Any]) -> Result:
 
 
 def draw(figure: "Figure", ratios: Sequence[Ratio]) -> None:
-    """Draw the ratio of true to reported motion, drive by drive."""
+    """Draw the ratio of true motion to the odometry's, drive by drive."""
     axes = figure.subplots()
     names = [f"{number}. {one.drive.name}" for number, one in enumerate(ratios, 1)]
     values = [one.value for one in ratios]

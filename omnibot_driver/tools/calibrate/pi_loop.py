@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A wheel under a sampled band-limited PI controller, as a step of its set-point shows it.
+"""Simulate a wheel under a sampled band-limited PI controller, for a step of its set-point.
 
 G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)) from error in RPM to duty in percent, by the trapezoidal
-rule with coefficients for steps of ``NOMINAL_S``, however long the control period is. The speed is
-that of the last tick of the encoder, in whole RPM. Vectorised over gains. Knows a plant and gains;
-it does not know how either was found.
+rule. The coefficients are for steps of ``NOMINAL_S``, whatever the control period is. The measured
+speed is that of the encoder's last tick, in whole RPM. Vectorised over gains. Knows a plant and
+gains; does not know how they were found.
 """
 
 from dataclasses import dataclass
@@ -20,10 +20,11 @@ Array = NDArray[np.float64]
 
 STEP_S: Final = 0.001
 NOMINAL_S: Final = 0.2
-"""Step of the controller by the manual, for which the board works its coefficients out."""
+"""Step of the controller by the manual, in s; the board calculates its coefficients for it."""
 STALE_S: Final = 0.5
 SENDS_S: Final = 9 * 14 * 10 / 115200
-"""The public firmware's ticks with the odometry behind them: nine lines of 14 characters."""
+"""Time in which the public firmware sends its ticks and its odometry: nine lines of 14 characters.
+"""
 MOST_PERCENT: Final = 100.0
 PHASE_POINTS: Final = 600
 
@@ -39,10 +40,11 @@ class PiGains:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """The control loop of a wheel. ``dead_s``: time until a duty shows in the speed.
+    """The control loop of a wheel.
 
-    ``feed_forward``: percent for each RPM; ``low_pass``: of the set-point, 0..1 for each step.
-    ``sends_each_s``: how often the board sends its ticks.
+    ``dead_s``: time until a duty affects the speed. ``feed_forward``: percent for each RPM.
+    ``low_pass``: filter coefficient of the set-point, 0 to 1 for each step. ``sends_each_s``:
+    period in which the board sends its ticks.
     """
 
     period_s: float
@@ -56,7 +58,7 @@ class Loop:
 
     @property
     def stretch(self) -> float:
-        """A written time constant acts as one that is shorter by this factor."""
+        """Factor by which a written time constant is longer than the one that acts."""
         return self.nominal_s / self.period_s
 
 
@@ -71,12 +73,13 @@ def answer(
     begun: Array | float = 0.0,
     sent_s: Array | None = None,
 ) -> Array:
-    """Speed in RPM from standstill, (samples of STEP_S, *common shape of what follows).
+    """Return the speed in RPM after a step from standstill.
 
-    Gains; ``dead_s``: several dead times in place of the loop's; ``begun``: the part of the way
-    between two marks that lies behind the wheel at first; ``sent_s``: when the board sends for the
-    first time, without which it sends nothing. A tick meanwhile waits until it has sent: its speed
-    is too low, and that of the next one too high.
+    The shape is (samples of STEP_S, *common shape of the following). Gains; ``dead_s``: dead times
+    in place of the loop's; ``begun``: part of the way between two marks that lies behind the wheel
+    at the start; ``sent_s``: when the board sends for the first time (None: it sends nothing). A
+    tick that comes while the board sends is noticed afterwards: its speed is too low, that of the
+    next too high.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(
@@ -133,11 +136,11 @@ def answer(
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """Of a step.
+    """Characteristics of a step response.
 
-    ``overshoot``: in parts of the speed that it comes to, or is to; ``settled_s``: when it is in
-    the tolerance band for good, infinite where it is not; ``error_s``: integral of the absolute
-    error, in parts of the target. Scalars or arrays.
+    ``overshoot``: in parts of the final speed, or of the target if that is higher. ``settled_s``:
+    time after which the speed stays in the tolerance band, infinite where it does not. ``error_s``:
+    integral of the absolute error, in parts of the target. Scalars or arrays.
     """
 
     overshoot: Array
@@ -146,7 +149,7 @@ class Traits:
 
 
 def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
-    """Traits of an answer; its final speed is the mean of its last quarter."""
+    """Return the traits of a response; its final speed is the mean of its last quarter."""
     comes_to = rpm[-len(rpm) // 4 :].mean(axis=0)
     overshoot = np.maximum(rpm.max(axis=0) / np.maximum(comes_to, target_rpm) - 1.0, 0.0)
     outside = np.abs(rpm - comes_to) > band * np.maximum(comes_to, 1e-9)
@@ -159,10 +162,10 @@ def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
 
 
 def phase_margin_deg(plant: Plant, gains: PiGains, loop: Loop, rpm: float) -> Array:
-    """Phase margin of the open loop: distance from -180 degrees where its gain is 1.
+    """Return the phase margin of the open loop: the distance from -180 degrees where its gain is 1.
 
-    Half a control period passes until an order counts, and a tick until a speed is seen: it is the
-    mean over one, and half of one old.
+    Delays in the loop: half a control period until a duty acts, and the time of one tick until a
+    speed is measured, as that is the mean over one tick and is on average half a tick old.
     """
     kp, tn_s, td_s = np.broadcast_arrays(
         *(

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What ``calibrate step`` found of encoders, plants and controllers: table, file, picture."""
+"""The result of ``calibrate step`` for encoders, plants and controllers: table, file, picture."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SHOWN_S: Final = 2.5
 WORSE: Final = 1.1
-"""Times the error of a step; below it is noise."""
+"""Factor of the previous error of a step above which new gains are worse; below it is noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +31,12 @@ class Measured:
 
     @property
     def final_rpm(self) -> float:
-        """The speed that they come to."""
+        """The final speed of the steps, in RPM."""
         return float(np.mean([one.rpm[-len(one.rpm) // 3 :].mean() for one in self.steps]))
 
     @property
     def overshoot(self) -> float:
-        """Overshoot of the steps' mean over 0.2 s; the peak of noisy samples is too high."""
+        """Overshoot of the steps' mean over 0.2 s; the peak of noisy samples would be too high."""
         grid_s = np.arange(0.0, min(one.times_s[-1] for one in self.steps), 0.02)
         mean = np.mean([np.interp(grid_s, one.times_s, one.rpm) for one in self.steps], axis=0)
         calm = np.convolve(mean, np.full(10, 0.1), "valid")
@@ -44,7 +44,8 @@ class Measured:
 
     @property
     def error_s(self) -> float:
-        """Integral of the absolute error from the first tick on, in parts of the final speed."""
+        """Mean integral of the absolute error from the first tick on, in parts of the final
+        speed."""
         errors = []
         for one in self.steps:
             wrong = np.abs(one.rpm / self.final_rpm - 1.0)
@@ -54,7 +55,7 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class WheelTuned:
-    """The result for one wheel; ``loop`` has the dead time that was found."""
+    """The result for one wheel; ``loop`` contains the dead time that was found."""
 
     name: str
     levels: Levels
@@ -67,14 +68,14 @@ class WheelTuned:
 
     @property
     def worse(self) -> bool:
-        """Whether a step was followed better before."""
+        """Whether the wheel followed a step better before."""
         return self.after.error_s > WORSE * self.before.error_s
 
 
 def result_of(
     wheels: Sequence[WheelTuned], goals: Goals, parameters: Mapping[str, float]
 ) -> Result:
-    """``parameters``: what the driver has now, and is to have from now on."""
+    """Return the result; ``parameters`` are set in the driver now, and are to be kept."""
     return Result(
         findings=[row for wheel in wheels for row in _rows(wheel, goals)],
         parameters=dict(parameters),
@@ -157,7 +158,7 @@ def _remarks(wheel: WheelTuned, goals: Goals) -> list[str]:
 
 
 def draw(figure: "Figure", wheels: Sequence[WheelTuned]) -> None:
-    """Draw a row for each wheel with its steps; the numbers include the start at full duty."""
+    """Draw the measured and the predicted steps of each wheel, side by side."""
     axes: Any = figure.subplots(1, len(wheels), sharey=True, squeeze=False)
     for one, wheel in zip(axes[0], wheels, strict=True):
         _draw_wheel(one, wheel)

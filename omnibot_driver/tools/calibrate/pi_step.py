@@ -2,9 +2,10 @@
 
 """``calibrate step`` for a board that records ticks and takes gains: encoders, plant, controller.
 
-Wheels turn freely at a constant duty: the levels of their encoders. They start at full duty: the
-plant. Then they make a step of their set-point with the gains that they had and with those found,
-from which the dead time follows; with it the gains are found anew, and their step is the proof.
+Wheels turn freely at a constant duty, for the levels of their encoders. They start at full duty,
+for the plant. Then they make a step of their set-point with the present gains, and with those
+found; these steps yield the dead time. With it the gains are found anew, and a last step measures
+their effect.
 """
 
 import argparse
@@ -33,18 +34,22 @@ from omnibot_driver.tools.needs import ToolError
 FREE_PERCENT: Final = 50.0
 FULL_PERCENT: Final = 100.0
 FIRST_RPM: Final = 30.0
-"""Of the steps before there is a plant."""
+"""Set-point of the steps that are made before a plant is known, in RPM."""
 ROUNDS: Final = 3
 WRITTEN_WITHIN_S: Final = 4.0
-"""Settings are repeated, as the board acknowledges nothing."""
+"""Time in which settings reach the board, in s; they are repeated, as the board acknowledges none.
+"""
 
 QUIET_S: Final = 0.5
-"""The board times no tick while it sends, so it sends as seldom as it may."""
+"""Period in which the board sends ticks while it records, in s.
+
+The board measures no tick while it sends, so it should send as rarely as possible.
+"""
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
-"""Parameters that are put back."""
+"""Parameters that are restored after the records."""
 
 Records = dict[str, list[Column]]
-"""By side."""
+"""Times between ticks of each record, by side."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
@@ -80,19 +85,19 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 class _Bench:
-    """The robot while it records; ``show`` gets the number of finished records."""
+    """A robot that records; ``show`` gets the number of finished records."""
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:
         self.robot, self._show, self._responses, self._done = robot, show, responses, 0
         self.ticks = int(robot.parameters["ticks_per_revolution"])
 
     def set(self, values: Mapping[str, Any]) -> None:
-        """Set them, and wait until the board has them."""
+        """Set these parameters, and wait until the board has received them."""
         self.robot.set_parameters(values)
         self.robot.rest(WRITTEN_WITHIN_S)
 
     def record(self, topic: str, command: Sequence[float], count: int = 1) -> Records:
-        """Record starts, each from standstill."""
+        """Record this number of starts, each from standstill; return the times between ticks."""
         found: Records = {side: [] for side in SIDES}
         for _ in range(count):
             for side, column in read(self.robot.record("record_rpm", topic, command)).items():
@@ -102,7 +107,7 @@ class _Bench:
         return found
 
     def steps(self, rpm: Sequence[float]) -> Records:
-        """Record steps of the set-point."""
+        """Record steps of the set-point to these speeds, in RPM."""
         rates = [one * 2 * np.pi / 60 for one in rpm]
         return self.record("wheel_cmd", rates, self._responses)
 
@@ -149,7 +154,7 @@ def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[W
 
 
 def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loop:
-    """The loop with what the user has set of its set-point's way."""
+    """Return the loop with the feed-forward and low-pass that the user has set."""
     forward, low_pass = parameters.get(f"{side}_feed_forward"), parameters.get("low_pass")
     return replace(
         loop,
@@ -159,7 +164,8 @@ def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loo
 
 
 def _encoders(bench: _Bench) -> dict[str, Levels]:
-    """Measured with both corrections at 1, as a record is of corrected times."""
+    """Measure the encoders' levels with both corrections at 1, as records contain corrected
+    times."""
     ones = dict.fromkeys(_names("short_correction", "long_correction"), 1.0)
     bench.set({"drive_mode": "duty", **ones})
     free = bench.record("duty_cmd", [FREE_PERCENT] * 2)
@@ -169,7 +175,7 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 
 
 def _plant(found: PlantFit, free: Levels) -> Plant:
-    """The plant by the static speeds at two duties: a line from the dead zone on."""
+    """Return the plant from the static speeds at two duties: a line from the dead zone on."""
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:
         raise ToolError(
@@ -201,5 +207,5 @@ def _gains(tuned: Mapping[str, Tuned]) -> dict[str, float]:
 
 
 def _restore(bench: _Bench, before: Mapping[str, Any], names: Sequence[str]) -> None:
-    """Restore the gains that are known; unset ones stay until driver and board start again."""
+    """Restore the parameters that are known; unset ones stay until driver and board start again."""
     bench.robot.set_parameters({name: before[name] for name in names if before[name] is not None})

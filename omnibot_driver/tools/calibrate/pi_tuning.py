@@ -1,12 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Gains of a band-limited PI controller for a plant: its slowest pole is compensated, then the gain
-is as high as the goals allow.
+"""Tune a band-limited PI controller for a plant.
 
-Tn acts as the plant's slow time constant: it is written longer, as the board's coefficients are for
-longer steps than it makes. Kp, and Td where a phase margin is wanted, are those with
-which a step is over soonest (the time until it stays in its band, and the integral of its error),
-of all that overshoot by the goal at most. The dead time of a plant is found afterwards, from a step
+Tn compensates the plant's slow time constant. It is written longer than it acts, as the board's
+coefficients are for longer steps than the board makes. Kp (and Td where a phase margin is wanted)
+is chosen among the gains whose overshoot is within the goal: the one with the smallest sum of
+settling time and integral of the error. The dead time of a plant is found afterwards, from a step
 that was made with such gains.
 """
 
@@ -36,22 +35,34 @@ ROUNDS: Final = 2
 DEAD_S: Final = np.arange(0.0, 0.101, 0.005)
 FIRST_BEGUN: Final = np.arange(0.05, 1.0, 0.1)
 BEGUN: Final = np.array([0.0, 0.4, 0.8])
-"""Of the way between two marks: when ticks come, against the controller's steps, changes a step."""
+"""Parts of the way between two marks at which the wheel begins.
+
+This decides when ticks come in relation to the controller's steps, which changes a response.
+"""
 SENT: Final = np.arange(0.0, 1.0, 0.125)
-"""Of the time between two groups that the board sends: which ticks wait for them changes it too."""
+"""Parts of the time between two groups of ticks that the board sends, at which it sends first.
+
+This decides which ticks are delayed by sending, which changes a response too.
+"""
 DISTURBED: Final = 0.02
-"""The worst step that is disturbed like this may overshoot by this much more than the goal."""
+"""Additional overshoot, beyond the goal, of the worst step that is disturbed by sending."""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
-"""Of the step that the coefficients are for. With 0 a swing from step to step never dies out."""
+"""Candidates for Td, in parts of the nominal control step.
+
+With 0 an oscillation from step to step never decays.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goals:
-    """``overshoot``, ``band``: parts of the speed; ``destination``: part of the speed at full duty
-    that the step leads to; ``settled_s``: a warning where it takes longer. Without
-    ``phase_margin_deg`` the gain optimum: Td = 0, and the overshoot alone limits the gain.
+    """The goals of a tuning.
+
+    ``overshoot``, ``band``: parts of the speed. ``destination``: set-point of the step, as a part
+    of the speed at full duty. ``settled_s``: a settling time above it causes a warning. If
+    ``phase_margin_deg`` is None, the gain optimum is sought: Td = 0, and only the overshoot limits
+    the gain.
     """
 
     overshoot: float = 0.05
@@ -63,7 +74,7 @@ class Goals:
 
 @dataclass(frozen=True, slots=True)
 class Tuned:
-    """The gains, and what they do to a step to ``target_rpm``."""
+    """The gains, and their predicted effect on a step to ``target_rpm``."""
 
     gains: PiGains
     target_rpm: float
@@ -74,7 +85,7 @@ class Tuned:
 
 
 def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
-    """Raises ToolError where no gain keeps to the goals."""
+    """Return the best gains for this plant. Raises ToolError where no gain meets the goals."""
     target = target_of(plant, goals)
     tds = [0.0] if goals.phase_margin_deg is None else [part * loop.nominal_s for part in TDS]
     low, high = 0.02, 5.0
@@ -107,12 +118,12 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
 
 
 def target_of(plant: Plant, goals: Goals) -> float:
-    """The target speed, in whole RPM."""
+    """Return the target speed, in whole RPM."""
     return float(max(round(goals.destination * plant.final_rpm(100.0)), 5))
 
 
 def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
-    """Describe the effect of these gains."""
+    """Predict the effect of these gains on a step."""
     target = target_of(plant, goals)
     found = _foreseen(plant, gains, loop, goals)
     return Tuned(
@@ -126,8 +137,9 @@ def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
 
 
 def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
-    """Traits of a step wherever the wheel begins between two marks: the worst overshoot and time,
-    and the mean error.
+    """Return the predicted traits of a step over all starting points between two marks.
+
+    They are the largest overshoot, the longest settling time and the mean error.
     """
     target = target_of(plant, goals)
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=BEGUN)
@@ -136,7 +148,7 @@ def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
 
 
 def _disturbed(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Array:
-    """The worst overshoot of a step on a board that sends meanwhile."""
+    """Return the worst overshoot of a step while the board sends its ticks."""
     target = target_of(plant, goals)
     begun, sent_s = (one.ravel() for one in np.meshgrid(BEGUN, loop.sends_each_s * SENT))
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=begun, sent_s=sent_s)
@@ -148,20 +160,20 @@ def _apart(gains: PiGains) -> PiGains:
 
 
 Steps = tuple[PiGains, float, Sequence[Column]]
-"""Gains, the set-point in RPM, and what was recorded with them."""
+"""Gains, the set-point in RPM, and the records made with them."""
 
 
 def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
-    """The dead time with which the loops of like wheels answer their steps as these records show.
+    """Return the dead time, in s, that explains the recorded steps of these wheels best.
 
-    ``LEAST_DEAD_S`` at least: one that is taken for too short makes a step overshoot.
+    It is at least ``LEAST_DEAD_S``, as a value that is too small makes a step overshoot.
     """
     costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)
 
 
 def _costs(plant: Plant, loop: Loop, made: Sequence[Steps]) -> Array:
-    """Of each dead time: how unlike the model's answers are to those recorded."""
+    """Return the model's misfit to the recorded responses, for each candidate dead time."""
     costs = np.zeros(len(DEAD_S))
     for gains, target_rpm, records in made:
         shown = [response(record, loop.ticks_per_revolution) for record in records]
@@ -175,14 +187,15 @@ def _costs(plant: Plant, loop: Loop, made: Sequence[Steps]) -> Array:
 
 
 def _recorded(ticks: Column, ticks_per_revolution: int) -> Response:
-    """The record of a wheel that is at these places, in ticks, after each ``STEP_S``."""
+    """Return the response recorded from a wheel at these places, in ticks, after each
+    ``STEP_S``."""
     marks = np.arange(1.0, ticks[-1])
     at_s = np.interp(marks, ticks, STEP_S * np.arange(1, len(ticks) + 1))
     return response(np.diff(at_s, prepend=0.0), ticks_per_revolution)
 
 
 def _unlike(shown: Response, model: Response) -> float:
-    """Mean square of how much two answers differ, as part of the speed, until the step is over."""
+    """Return the mean square of the relative difference of two responses, until ``OVER_S``."""
     times_s = shown.times_s[shown.times_s < OVER_S]
     told_rpm = np.interp(times_s, model.times_s, model.rpm)
     return float(np.mean((shown.rpm[: len(times_s)] / told_rpm - 1.0) ** 2))

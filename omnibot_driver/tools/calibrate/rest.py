@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What an IMU at rest says: its biases, its noise, and which way is up. Pure.
+"""Evaluate an IMU at rest: its biases, its noise, and the direction of up. Pure.
 
 A single rest does not separate an accelerometer's bias from a tilt, nor a tilt of the sensor from
-one of the floor. Only along gravity, whose length is known, the bias is visible.
+one of the floor. Only the bias along gravity, whose length is known, can be measured.
 """
 
 from collections.abc import Callable
@@ -18,16 +18,17 @@ from omnibot_driver.tools.calibrate.log import Column, Imu, Log
 from omnibot_driver.tools.needs import ToolError
 
 BLOCK_S: Final = 1.0
-"""Noise is what varies within a block, drift what varies from block to block."""
+"""Length of a block, in s: noise varies within a block, drift from block to block."""
 FEWEST: Final = 100
 LOST_PART: Final = 0.02
 
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """Arrays are of x, y, z of the sensor. ``bias_radps``: mean rate, ``force_mps2``: mean force,
-    each with its standard deviation ``…_sigma`` (of a bias that walks: from what it is at the end);
-    ``…_noise``: rms of one reading.
+    """The evaluation of a rest; arrays are of x, y, z of the sensor.
+
+    ``bias_radps``: mean rate; ``force_mps2``: mean force; ``…_sigma``: their standard deviations
+    (of a wandering bias: from its value at the end); ``…_noise``: rms of one reading.
     """
 
     bias_radps: Column
@@ -43,7 +44,7 @@ class Rest:
 
     @property
     def up(self) -> Column:
-        """Unit vector along which the sensor is pushed by the floor."""
+        """Unit vector along which the floor pushes the sensor."""
         return np.asarray(self.force_mps2 / np.linalg.norm(self.force_mps2))
 
     @property
@@ -59,12 +60,12 @@ class Rest:
 
     @property
     def level_sigma_rad(self) -> float:
-        """Standard deviation of each angle by the noise alone."""
+        """Standard deviation of roll and pitch by noise alone, in rad."""
         return float(self.force_sigma.max() / self.gravity_mps2)
 
 
 def rest(imu: Imu) -> Rest:
-    """Raises ToolError for readings that say nothing: too few, not finite, stuck, full of gaps."""
+    """Evaluate a rest. Raises ToolError for too few, non-finite or stuck readings, or for gaps."""
     rates, forces = imu.rate_radps, imu.force_mps2
     if len(rates) < FEWEST:
         raise ToolError(f"{len(rates)} IMU readings are too few: rest for a second at least")
@@ -101,9 +102,10 @@ def rest(imu: Imu) -> Rest:
 
 
 def still(bias_radps: Column) -> Callable[[Log], None]:
-    """To be asked again and again while a log grows; raises ToolError once the robot has moved.
+    """Return a function to call repeatedly while a log grows.
 
-    ``bias_radps`` is what the driver has taken off the gyro already.
+    It raises ToolError once the robot has moved. ``bias_radps`` is the bias that the driver has
+    already subtracted from the gyro.
     """
     seen = [0, 0]
     look = Look()
@@ -129,13 +131,13 @@ def still(bias_radps: Column) -> Callable[[Log], None]:
 
 
 def _within(readings: Column, size: int) -> Column:
-    """Standard deviation of one reading within blocks of this length, axis by axis."""
+    """Return the standard deviation of one reading within blocks of this length, axis by axis."""
     blocks = _blocks(readings, size)
     return np.asarray(np.sqrt(blocks.var(axis=1, ddof=1).mean(axis=0)))
 
 
 def _of_mean(readings: Column, noise: Column, size: int) -> Column:
-    """Standard deviation of the mean: by the noise, or by how the blocks differ if that is more."""
+    """Return the standard deviation of the mean: by noise, or by the blocks' scatter if larger."""
     means = _blocks(readings, size).mean(axis=1)
     white = noise / np.sqrt(len(readings))
     if len(means) < 5:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a calibration found: values with their uncertainty. Knows no terminal, no file, no ROS."""
+"""The result of a calibration: values with uncertainties. Knows no terminal, no file, no ROS."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One row of the table. ``sigma``: standard deviation, None where it has none.
+    """One row of the table. ``sigma``: standard deviation, None where it is not known.
 
-    ``before``: what the driver has now, None where it has nothing of the kind.
+    ``before``: the driver's present value, None where the driver does not have this value.
     """
 
     name: str
@@ -28,9 +28,12 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """``parameters``: what the driver should load, by name; ``record``: what else belongs into the
-    file, which the driver leaves alone; ``notes``: sentences for the user;
-    ``draw``: fills a figure of 9 by 6 inches."""
+    """The result of a calibration.
+
+    ``parameters``: values for the driver to load, by name; ``record``: further content of the file,
+    which the driver ignores; ``notes``: sentences for the user; ``draw``: fills a figure of 9 by 6
+    inches.
+    """
 
     findings: list[Finding]
     parameters: Mapping[str, Value]

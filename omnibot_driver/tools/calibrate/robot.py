@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot as a calibration has it: what is heard of it, and moved. Must not know what is found.
+"""The robot as a calibration uses it: its data are received, and it is moved.
 
-Every motion is `drive`, whatever happens ends in commands to stand still; and if this process dies,
-the driver's watchdog stops the robot.
+Must not know what a calibration finds. Every motion goes through `drive` or `record`, and each ends
+with commands to stand still, whatever happens. If this process dies, the driver's watchdog stops
+the robot.
 """
 
 import math
@@ -35,15 +36,18 @@ from omnibot_driver.tools.calibrate.motion import HALT, Bounds, Law, Obedience, 
 from omnibot_driver.tools.needs import ToolError
 
 PERIOD_S: Final = 0.02
-"""Between commands."""
+"""Period of the commands, in s."""
 STANDS_WITHIN_S: Final = 3.0
 ASKED_WITHIN_S: Final = 0.6
-"""A record is asked for more than once in this time, as lines are lost."""
+"""Time from the request of a record to its commands, in s.
+
+Until then the request is repeated, as lines are lost.
+"""
 STOPPING_S: Final = 3.0
 STOOD_S: Final = 0.3
-"""A robot that stands for this time stands still."""
+"""A robot that stands for this time, in s, has stopped."""
 STANDING: Final = 0.01
-"""m/s and rad/s: slower is standing."""
+"""The robot stands below this speed, in m/s and rad/s."""
 UNRULY: Final = (
     "Stop was sent, but the robot still moves or sends no odometry; cut its power, then see"
     " docs/safety.md"
@@ -54,7 +58,7 @@ UNRULY: Final = (
 def connect(
     namespace: str, ros_arguments: Sequence[str], interruption: Interruption
 ) -> Iterator["Robot"]:
-    """The driver in this namespace. Raises ToolError where there is none."""
+    """Connect to the driver in this namespace. Raises ToolError if none is running there."""
     context = Context()
     quiet = SignalHandlerOptions.NO
     try:
@@ -75,13 +79,16 @@ def connect(
 
 
 class Robot(Listener):
-    """The robot, as the calibration drives it."""
+    """A robot that a calibration drives through its driver."""
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
         super().__init__(node, context, interruption)
         self._stamped = bool(self.parameters["enable_stamped_cmd_vel"])
         self._unanswered: Counter[tuple[Topic, tuple[float, ...]]] = Counter()
-        """Commands that were sent and not yet heard again; below zero is somebody else's."""
+        """Number of own commands that were sent and not yet received back.
+
+        A negative count means that another node sent the command.
+        """
         self._foreign: Topic | None = None
         kinds: dict[Topic, Any] = {
             "cmd_vel": TwistStamped if self._stamped else Twist,
@@ -99,7 +106,7 @@ class Robot(Listener):
         show: Callable[[float], object] = lambda _part: None,
         states: Sequence[str] = ("nominal",),
     ) -> Log:
-        """Listen for this time without commands. ``show`` gets the part done."""
+        """Listen for this time without commands. ``show`` gets the completed part, from 0 to 1."""
         self._begin(states)
         began_s = now_s = time.monotonic()
         while now_s < began_s + seconds:
@@ -119,19 +126,20 @@ class Robot(Listener):
         monitored: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
-        """Move as the law says, within the bounds, then stand still; what was heard meanwhile.
+        """Move as the law says, within the bounds, then stand still; return the log of the motion.
 
-        ``show`` gets the seconds. Raises ToolError, with the robot stopped still, on
-        whatever is not as it should be: e-stop, lost data, another commander, no motion. Without
-        ``obeys`` the last of these is what is to be found out. Where it is how fast or which way
-        the robot moves, the driver's motion monitor must not stop it: ``monitored`` is false.
+        ``show`` gets the seconds since the start. Raises ToolError, after the robot was stopped, on
+        any fault: e-stop, lost data, another commander, no motion. With ``obeys`` false a robot
+        that does not move is accepted. With ``monitored`` false the driver's motion monitor is off;
+        a calibration needs that where it does not know yet how fast or in which direction the robot
+        moves.
         """
         if self.parameters.get("control_method", "velocity") != "velocity":
             raise ToolError(
                 "this needs the board's switch on velocity control and `control_method: velocity`"
             )
         self._begin(("nominal",))
-        self._unanswered = +self._unanswered  # the last drive's may still be under way
+        self._unanswered = +self._unanswered  # the last drive's may still come
         self._foreign = None
         stands = False
         try:
@@ -150,9 +158,9 @@ class Robot(Listener):
         return self.log
 
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
-        """Have the driver record, command this meanwhile, then stand still; the file it made.
+        """Have the driver record during this command, then stand still; return the record's file.
 
-        The record is asked for while the robot stands, and has begun when it starts. Raises
+        The record is requested while the robot stands, so it has begun before the motion. Raises
         ToolError as `drive` does, and with the driver's reason where nothing was recorded.
         """
         self._begin(("nominal",))
@@ -189,7 +197,7 @@ class Robot(Listener):
         self.set_parameters({"motion_monitor": False})
         try:
             yield
-        except BaseException:  # after a defect of this program it must not stay off either
+        except BaseException:  # also after a defect of this program
             with self._interruption.deferred(), suppress(ToolError):
                 self.set_parameters(before)
             raise
@@ -228,7 +236,7 @@ class Robot(Listener):
             wanted = law(now_s - began_s, pose) if wanted is not None else None
 
     def _halt(self, topic: Topic) -> bool:
-        """Stop the robot; returns whether it stands. It cannot be interrupted."""
+        """Stop the robot; return whether it stands. A signal does not interrupt this."""
         began_s = now_s = time.monotonic()
         standing_since_s = math.inf
         while now_s < (
@@ -237,7 +245,7 @@ class Robot(Listener):
             self._send(topic, HALT)
             self._hear(PERIOD_S)
             now_s = time.monotonic()
-            stands = all(abs(speed) <= STANDING for speed in self._twist)  # NaN does not
+            stands = all(abs(speed) <= STANDING for speed in self._twist)  # NaN is not standing
             standing_since_s = min(standing_since_s, now_s) if stands else math.inf
             if now_s - standing_since_s > STOOD_S:
                 return True
@@ -277,7 +285,8 @@ class Robot(Listener):
             )
 
     def _require_unforgotten(self, silence_s: float) -> None:
-        """Raise ToolError after a suspension, so that an old program moves no robot."""
+        """Raise ToolError if this program was suspended, so that outdated commands move no
+        robot."""
         if silence_s > self.parameters["cmd_vel_timeout"]:
             raise ToolError(
                 f"this program was held up for {silence_s:.1f} s, and the driver has stopped the"
@@ -286,7 +295,7 @@ class Robot(Listener):
 
 
 def _values(message: Any) -> tuple[float, ...]:
-    """The numbers of a command as they are on the wire."""
+    """Return the numbers of a command message."""
     if isinstance(message, Float32MultiArray):
         return tuple(message.data)
     twist = message.twist if isinstance(message, TwistStamped) else message

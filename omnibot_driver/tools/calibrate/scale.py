@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate scale``: commanded against measured speeds, the board's command units."""
+"""``calibrate scale``: find the board's command units from commanded and measured speeds."""
 
 import argparse
 import math
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 REST_S: Final = 2.0
 ACCELERATION: Final = 1.0
-"""m/s²; twice as much for turning, in rad/s²."""
+"""Rate at which commands change, in m/s²; twice as much for turning, in rad/s²."""
 GYRO_TOLERANCE: Final = 0.03
-"""MPU-6050 product specification, section 6.1: sensitivity scale factor tolerance."""
+"""Tolerance of the gyro's scale factor: MPU-6050 product specification, section 6.1."""
 UNLIKE: Final = 4.0
 """Standard deviations by which two scales differ that are not the same."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Raises ToolError."""
+    """Drive at several speeds and find the scales. Raises ToolError."""
     now = robot.parameters
     if "angular_scale" not in now:
         return odometry_scale.run(robot, console, arguments)
@@ -71,7 +71,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
-    """The findings of these speeds, to show and to write; ``now`` are the driver's parameters."""
+    """Return the findings of these speeds, to show and write; ``now``: the driver's parameters."""
     by_axis = [[one for one in found if one.axis == axis] for axis in range(3)]
     if not all(by_axis):
         raise ToolError("not every axis was measured: drive longer, by --seconds")
@@ -116,7 +116,7 @@ def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
 def draw(
     figure: "Figure", found: Sequence[Speed], linear: Scale, angular: Scale, gyro: Scale
 ) -> None:
-    """Speeds over counts with the line found, and what is left over."""
+    """Draw speeds over counts with the line found, and the residuals."""
     axes = figure.subplots(2, 2, sharex="col", height_ratios=(2, 1))
     series = [
         (0, 0, linear, "odometry", "o", "tab:red", "x"),

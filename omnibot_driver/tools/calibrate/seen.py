@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What a person saw the wheels do, and what follows from it.
+"""Interpret what a person saw the wheels do.
 
-Pure. Patterns are of wheels A, B, C: 1 counter-clockwise seen from outside (what the manual's
-equations call positive), -1 clockwise, 0 still.
+Pure. A pattern is the direction of wheels A, B, C seen from outside: 1 counter-clockwise (positive
+in the manual's equations), -1 clockwise, 0 still.
 """
 
 from collections.abc import Sequence
@@ -21,11 +21,12 @@ STILL: Final[Pattern] = (0, 0, 0)
 
 
 class Contradiction(Exception):
-    """An answer that cannot be, with the others; a sentence that says why."""
+    """An answer that contradicts the command or the other answers; its message says why."""
 
 
 def understand(answer: str) -> Pattern | None:
-    """``+0-`` and the like, with or without spaces or commas."""
+    """Return the pattern of an answer such as ``+0-``, with or without spaces or commas; else
+    None."""
     signs = answer.replace(" ", "").replace(",", "")
     values = [{"+": 1, "-": -1, "0": 0}.get(sign) for sign in signs]
     if len(values) != 3:
@@ -35,12 +36,12 @@ def understand(answer: str) -> Pattern | None:
 
 
 def in_words(pattern: Sequence[int]) -> str:
-    """Describe it for a person."""
+    """Describe a pattern for a person."""
     return ", ".join(f"{wheel} {WORDS[sign]}" for wheel, sign in zip(WHEELS, pattern, strict=True))
 
 
 def wanted(axis: int) -> Pattern:
-    """The wheel motion that the manual's equations give for +x, +y or +yaw."""
+    """Return the pattern that the manual's equations give for +x, +y or +yaw."""
     x, y, yaw = (float(axis == n) for n in range(3))
     rates = OmniKinematics(1.0, 1.0).wheel_rates(BodyTwist(x, y, yaw))
     a, b, c = ((rate > 1e-6) - (rate < -1e-6) for rate in rates)
@@ -48,9 +49,9 @@ def wanted(axis: int) -> Pattern:
 
 
 def wheel_sign(wheel: int, seen: Pattern) -> int:
-    """1 or, of a wheel that turns the other way than the manual says, -1.
+    """Return 1, or -1 for a wheel that turns the other way than the manual says.
 
-    Raises Contradiction for anything but this wheel alone.
+    Raises Contradiction unless exactly this wheel turned.
     """
     name = WHEELS[wheel]
     turned = [n for n in range(3) if seen[n]]
@@ -74,7 +75,7 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
 
 
 def axis_sign(axis: int, seen: Pattern) -> int:
-    """1, or -1 for an axis that is reversed as a whole. Raises Contradiction for anything else."""
+    """Return 1, or -1 for an axis that is reversed as a whole. Raises Contradiction otherwise."""
     expected = wanted(axis)
     if seen == expected:
         return 1
@@ -87,6 +88,7 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 
 
 def mirrored(signs: Sequence[int]) -> bool:
-    """Whether these axes are a mirror image, which no choice of the front explains."""
+    """Whether these signs of the axes make a mirror image, which no choice of the front
+    explains."""
     x, y, yaw = signs
     return x * y != yaw

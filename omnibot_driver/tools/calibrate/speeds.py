@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commanded against measured speeds: what to command, and the scale that explains it. Pure.
+"""Compare commanded and measured speeds: what to command, and the scale that fits them. Pure.
 
-The board takes whole counts. So whole counts are commanded, and a speed that was measured is
-compared with the counts that it was asked for by, not with a wish that was rounded. It is measured
-by where the odometry has got to, which the board's own pose keeps right; a twist is made of one
-displacement, whose rounding does not average out.
+The board takes whole counts, so whole counts are commanded, and a measured speed is compared with
+its counts, without a rounding error. A speed is measured as the slope of the odometry's pose, which
+the board keeps right. A twist comes from a single displacement, whose rounding does not average
+out.
 """
 
 from collections.abc import Sequence
@@ -19,19 +19,23 @@ from omnibot_driver.tools.calibrate.log import Column, Log
 from omnibot_driver.tools.needs import ToolError
 
 SETTLE_S: Final = 1.2
-"""From a new speed to a steady one: the board's integrator leaves 0.1 % after a second."""
+"""Time from a new speed to a steady one, in s: the board's integrator leaves 0.1 % after a second.
+"""
 REPEATED_WITHIN_S: Final = 0.2
 FEWEST: Final = 5
 LEAST_SIGMA: Final = 1e-4
-"""m and rad: no odometry is better, in m/s and rad/s after a second."""
+"""Least standard deviation of a pose, in m and rad; after a second also in m/s and rad/s."""
 CORRECTED_WITH: Final = 5
-"""Steps of the odometry over which a correction is spread: together they are one measurement."""
+"""Steps of the odometry over which a correction is spread; together they count as one measurement.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """One steady speed along an axis (0, 1, 2: x, y, yaw): asked for by ``counts``, measured in
-    m/s or rad/s; ``gyro`` is the yaw rate, NaN where the robot did not turn.
+    """One steady speed along an axis (0, 1, 2: x, y, yaw), in m/s or rad/s.
+
+    ``counts`` were commanded, ``measured`` is by the odometry; ``gyro`` is the yaw rate, NaN where
+    the robot did not turn.
     """
 
     axis: int
@@ -44,8 +48,10 @@ class Speed:
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """Counts per m/s or rad/s, its standard deviation, and how much more than claimed the speeds
-    scatter about it (1: as claimed).
+    """A scale in counts per m/s or rad/s, with its standard deviation ``sigma``.
+
+    ``excess``: how much more the speeds scatter about it than their uncertainties say (1: as
+    expected).
     """
 
     value: float
@@ -54,7 +60,10 @@ class Scale:
 
 
 def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tuple[float, Vector3]]:
-    """Stairs to both sides along each axis, in whole counts, level by level; ``top``: fastest."""
+    """Return steps to both sides along each axis, in whole counts, level by level.
+
+    ``top`` are the fastest speeds.
+    """
     stairs = []
     for level in range(1, levels + 1):
         for axis in range(3):
@@ -67,8 +76,10 @@ def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tup
 
 
 def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
-    """Speeds of every command in the log that was held for a while. ``up``: which way that is for
-    the sensor; ``bias``: of its gyro. Raises ToolError where there is none.
+    """Return the speed of every command in the log that was held for a while.
+
+    ``up``: direction of up in the sensor's axes; ``bias``: of its gyro. Raises ToolError if the log
+    has none.
     """
     odometry, imu = log.odometry, log.imu
     found = []
@@ -96,7 +107,7 @@ def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
 
 
 def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") -> Scale:
-    """The scale through the origin that explains the speeds best, each by its uncertainty."""
+    """Return the scale through the origin that fits the speeds, weighted by uncertainty, best."""
     counts = np.array([one.counts for one in found], dtype=float)
     measured = np.array([one.measured if by == "odometry" else one.gyro for one in found])
     sigma = np.array([one.sigma if by == "odometry" else one.gyro_sigma for one in found])
@@ -114,9 +125,9 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
 
 
 def _held(log: Log) -> list[tuple[float, float, Column]]:
-    """Spans in which the robot had settled in one command other than zero.
+    """Return the spans in which the robot had settled at one command other than zero.
 
-    A command that was not repeated in time may have been forgotten by the driver: it begins anew.
+    After a pause the driver may have dropped the command, so a new span begins.
     """
     commands = log.commands
     if not len(commands.stamp_s):
@@ -137,7 +148,7 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """The distance along the body's axis, at the mean heading."""
+    """Return the distance along the body's axis, at the mean heading."""
     if axis == 2:
         return np.asarray(pose[:, 2])
     heading_rad = pose[:, 2].mean() + axis * np.pi / 2
@@ -145,7 +156,7 @@ def _way(pose: Column, axis: int) -> Column:
 
 
 def _slope(stamp_s: Column, way: Column) -> tuple[float, float]:
-    """Slope of the straight line of distance over time, with its standard deviation."""
+    """Return the slope of distance over time by a straight line, with its standard deviation."""
     off_s = stamp_s - stamp_s.mean()
     speed = float(off_s @ way / (off_s @ off_s))
     left = way - way.mean() - speed * off_s

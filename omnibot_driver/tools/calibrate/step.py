@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate step``: how each wheel answers a step, its motor, and which gains suit it.
+"""``calibrate step``: find each wheel's step response, its motor, and gains that suit it.
 
-Each wheel alone is sent to and fro between two speeds in the same direction, then in the other one.
+Each wheel alone alternates between two speeds in one direction, then in the other direction.
 """
 
 import argparse
@@ -23,11 +23,11 @@ from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, TICK_S, Gains
 from omnibot_driver.tools.needs import ToolError
 
 RUN_UP_S: Final = 2.0
-"""The first of two speeds is reached from rest, against friction; that is not what is looked at."""
+"""Time to reach the first speed from rest. Friction acts then, so this part is not evaluated."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Record, fit and tune."""
+    """Record steps of each wheel, fit the models to them, and find better gains."""
     if GAINS in robot.parameters:
         return pi_step.run(robot, console, arguments)
     wheels = [WHEELS.index(name) for name in _wheels(arguments.wheels)]
@@ -75,10 +75,10 @@ def _record(
 def _to_and_fro(
     levels: Sequence[float], arguments: argparse.Namespace, wheel: int = 0
 ) -> tuple[Law, float]:
-    """Slow, then fast and slow in turn; and how long that takes.
+    """Return a law that alternates between the slow and the fast speed, and its duration in s.
 
-    No two steps begin at the same place between two deltas, so together they show what happens in
-    between.
+    Each step begins at another place between two deltas. Together they show what happens between
+    deltas.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):
@@ -97,7 +97,10 @@ def _wheels(names: str) -> str:
 
 
 def _levels(parameters: dict[str, Any], arguments: argparse.Namespace) -> tuple[float, float]:
-    """The two speeds as the wire can say them, in rad/s. Raises ToolError for those it cannot."""
+    """Return the two speeds rounded to the units on the wire, in rad/s.
+
+    Raises ToolError for speeds that the wire cannot express.
+    """
     slow, fast = arguments.speeds
     if not 0.0 < slow < fast <= parameters["max_wheel_speed"]:
         raise ToolError(

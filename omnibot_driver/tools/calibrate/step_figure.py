@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The picture of ``calibrate step``: what was measured, and what the gains would do."""
+"""Draw the picture of ``calibrate step``: measured responses, and those predicted for the gains."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
@@ -69,7 +69,8 @@ def _draw_predictions(
     command: float,
     load: float,
 ) -> None:
-    """Draw a line for each wheel; ``load`` is in counts per tick's worth of effort."""
+    """Draw a line for each wheel. ``load`` is in units of the effort that one count per tick
+    needs."""
     times_ms = 1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5)
     for name, gains, colour in (("now", now, "C0"), ("better", better, "C1")):
         label: str | None = (

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From recorded steps of one wheel to models with uncertainties. Pure calculation.
+"""Fit models with uncertainties to recorded steps of one wheel. Pure calculation.
 
-Time counts from the *onset*: the board's control tick that could first see the command. The ticks
-are known from the stamps; a command that came in close to a tick, or waited on a busy computer, was
-seen at another one than it seems, and then the recorded step itself tells.
+Time counts from the *onset*: the board's first control tick that could use the command. The ticks
+are known from the timestamps. A command that arrives close to a tick, or is delayed by a busy
+computer, takes effect at another tick than calculated; the recorded step itself then shows which.
 """
 
 import math
@@ -26,29 +26,33 @@ from omnibot_driver.tools.calibrate.wheel_loop import TICK_S, Gains, Motor
 from omnibot_driver.tools.needs import ToolError
 
 ON_THE_WAY_S: Final = 0.0015
-"""From publishing a command to its last bit on the line: DDS, and 9 bytes at 115200 baud."""
+"""Time from publishing a command to its last bit on the line, in s.
+
+It consists of DDS, and 9 bytes at 115200 baud.
+"""
 BEFORE: Final = 3
-"""Deltas before the onset that belong to a step."""
+"""Number of deltas before the onset that belong to a step."""
 FEWEST_DELTAS: Final = 10
 ROUNDS: Final = 4
 SOONER: Final = range(-20, 3)
-"""Ticks by which an onset may be sooner than it seems; a late command has a later one."""
+"""Ticks by which an onset may be earlier than calculated; that of a late command is later."""
 UNLIKE: Final = 3.0
-"""Factor of the usual misfit above which it is not noise."""
+"""Factor of the median misfit above which a step's misfit is not noise."""
 
 
 LOOK_S: Final = np.arange(0.0, 2.0, 1e-3)
-"""Times at which a model is looked at for its traits."""
+"""Times, in s, at which a model is evaluated for its traits."""
 DRAWS: Final = 100
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """Commanded from one rate to another, in rad/s.
+    """One step from one commanded rate to another, in rad/s.
 
     ``end_ticks``: whole control ticks from the onset to the end of each delta; ``rate_radps``: the
-    mean over the four ticks before that. ``last_radps``: what was commanded ``last_ticks`` before
-    the onset, until it was ``before_radps``; an answer may still be under way.
+    mean rate over the four ticks before that. ``last_radps``: the rate commanded before
+    ``before_radps``, which replaced it ``last_ticks`` before the onset; its response may last
+    still.
     """
 
     before_radps: float
@@ -59,11 +63,14 @@ class Step:
     last_ticks: int
 
     def sooner(self, ticks: int) -> "Step":
-        """The same with an earlier onset."""
+        """Return this step with an onset that is earlier by these ticks."""
         return replace(self, end_ticks=self.end_ticks + ticks, last_ticks=self.last_ticks - ticks)
 
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
-        """The rates, given the mean of a unit step's answer by the ticks at which a delta ends."""
+        """Return the predicted rates of this step.
+
+        ``mean`` is the mean response to a unit step, by the ticks at which a delta ends.
+        """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps
         return np.asarray(
@@ -77,7 +84,7 @@ class Step:
 class Fit:
     """A model with the parameters that explain the steps best.
 
-    ``covariance`` is scaled by the residuals; ``rms_radps`` is theirs.
+    ``covariance`` is scaled by the residuals; ``rms_radps`` is the rms of the residuals.
     """
 
     model: Model
@@ -88,21 +95,22 @@ class Fit:
 
     @property
     def sigmas(self) -> Column:
-        """Standard deviations."""
+        """Standard deviations of the parameters."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def aic(self) -> float:
-        """Akaike's criterion: of two models of the same steps, the smaller one's is preferred."""
+        """Akaike's criterion: of two models of the same steps, the smaller value is preferred."""
         return 2 * self.samples * math.log(self.rms_radps) + 2 * len(self.values)
 
     def told(self, step: Step) -> Column:
-        """The model's prediction of a step's deltas, in rad/s."""
+        """Return the model's prediction of a step's deltas, in rad/s."""
         told = step.told_by(lambda ticks: self.model.mean(self.values[1:], ticks * TICK_S))
         return np.asarray(self.values[0] * told)
 
     def traits(self) -> dict[str, tuple[float, float]]:
-        """Rise time (a tenth to nine tenths, s) and overshoot (part), with standard deviations."""
+        """Return rise time (10 % to 90 %, in s) and overshoot (relative), with standard
+        deviations."""
         random = np.random.default_rng(0)
         draws = random.multivariate_normal(self.values, self.covariance, DRAWS)
         draws = np.clip(draws, self.model.low, self.model.high)
@@ -118,9 +126,9 @@ class Fit:
 
 
 def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[float]) -> list[Step]:
-    """The steps between two of these rates that one wheel was commanded to make.
+    """Return the steps between two of these rates that were commanded to one wheel.
 
-    Raises ToolError where the deltas have gaps too long to tell any.
+    Raises ToolError where gaps in the deltas leave no whole step.
     """
     told = commands.values[:, wheel]
     heard = np.isfinite(wheels.rate_radps[:, wheel])
@@ -155,7 +163,7 @@ def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[fl
 
 
 def fit(model: Model, steps: Sequence[Step]) -> Fit:
-    """Least squares. Raises ToolError where the steps do not determine the model."""
+    """Fit a model by least squares. Raises ToolError where the steps do not determine it."""
     rates = np.concatenate([step.rate_radps for step in steps])
     first = min(int(step.end_ticks.min()) for step in steps)
     last = max(int(step.end_ticks.max()) + step.last_ticks for step in steps)
@@ -178,7 +186,7 @@ def fit(model: Model, steps: Sequence[Step]) -> Fit:
 
 @dataclass(frozen=True, slots=True)
 class WheelFound:
-    """The fit of one wheel: its steps, the number of rejected steps, and the models."""
+    """The fits of one wheel: its steps, the number of rejected steps, and the models."""
 
     name: str
     steps: list[Step]
@@ -189,18 +197,18 @@ class WheelFound:
 
     @property
     def answer(self) -> Fit:
-        """The closed loop's: of the two models that suppose nothing of it, the preferred one."""
+        """The preferred fit of the two models that assume nothing about the closed loop."""
         return min(self.first, self.second, key=lambda fit: fit.aic)
 
     @property
     def motor(self) -> Motor:
-        """Parameters of the motor, in ticks."""
+        """The fitted motor, with its times in control ticks."""
         _gain, pwm_per_count, time_constant_s, delay_s = self.motor_fit.values
         return Motor(pwm_per_count, time_constant_s / TICK_S, delay_s / TICK_S)
 
 
 def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
-    """Fit all three models; ``now``: the gains in the firmware."""
+    """Fit all three models to a wheel's steps; ``now`` are the gains in the firmware."""
     whole = alike(aligned(alike(aligned(steps))))
     first, second, motor = (
         fit(model, whole) for model in (FIRST_ORDER, SECOND_ORDER, motor_model(now))
@@ -209,9 +217,10 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 
 
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """The steps with the onset that each of them shows: a command may have been late.
+    """Return the steps with corrected onsets, as each step shows its own: a command may have been
+    late.
 
-    All of them sooner or later would be a delay, so the middle one stays.
+    A common shift of all steps would be a delay of the wheel, so the median onset stays.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):
@@ -229,7 +238,7 @@ def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
 
 
 def alike(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """The steps without those that differ from all others."""
+    """Return the steps without those that differ from all others."""
     guess = fit(model, steps)
     misfits = [_misfit(guess, step) for step in steps]
     most = UNLIKE * sorted(misfits)[len(misfits) // 2]

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Step responses as an odometry delta sees them: averaged over the 40 ms that it covers.
+"""Models of step responses as the odometry measures them: averaged over a delta of 40 ms.
 
-Every model knows how far a wheel has turned at a time, after a step of 1 in rate at time 0; so a
-delta's mean rate is a difference of two of these, never a sample. Knows no data and no ROS.
+Every model gives the angle that a wheel has turned at a time, after a step of 1 in rate at time 0.
+A delta's mean rate is the difference of two such angles, not a sample. Knows no data and no ROS.
 """
 
 from collections.abc import Callable
@@ -16,15 +16,22 @@ from omnibot_driver.tools.calibrate.wheel_loop import TICK_S, Array, Gains, Moto
 
 DELTA_TICKS: Final = 4
 SPAN_S: Final = DELTA_TICKS * TICK_S
-"""Manual, "25Hz Encoder data"; docs/internals/omnibot_protocol.md."""
+"""Span of an odometry delta, in s: manual, "25Hz Encoder data"; docs/internals/omnibot_protocol.md.
+"""
 
 Turned = Callable[[Array, Array], Array]
-"""Parameters without the gain, and times in s, to the angle turned after a unit step, in s."""
+"""A function of the parameters without the gain, and of times in s.
+
+Returns the angle turned after a unit step, in s.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """``names``, ``units``, a start and bounds of the parameters; the first is always the gain."""
+    """A model of a step response, with names, units, a start and bounds of its parameters.
+
+    The first parameter is always the gain.
+    """
 
     title: str
     names: tuple[str, ...]
@@ -35,22 +42,22 @@ class Model:
     turned: Turned
 
     def mean(self, parameters: Array, end_s: Array) -> Array:
-        """Mean of the unit step's answer over the deltas that end at these times."""
+        """Return the mean rate after a unit step over each delta that ends at these times."""
         turned = self.turned(parameters, np.concatenate((end_s, end_s - SPAN_S)))
         return np.asarray((turned[: len(end_s)] - turned[len(end_s) :]) / SPAN_S)
 
 
 def first_order(parameters: Array, time_s: Array) -> Array:
-    """The model exp(-L s) / (1 + T s)."""
+    """Return the angle turned by the model exp(-L s) / (1 + T s) after a unit step."""
     time_constant_s, delay_s = parameters
     after_s = np.maximum(0.0, time_s - delay_s)
     return np.asarray(after_s + time_constant_s * np.expm1(-after_s / time_constant_s))
 
 
 def second_order(parameters: Array, time_s: Array) -> Array:
-    """(1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²), of any damping.
+    """Return the angle turned by (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²), of any damping.
 
-    The zero Z belongs to it: a PI loop with feed-forward around a motor of first order has one.
+    The model needs the zero Z: a PI loop with feed-forward around a motor of first order has one.
     """
     omega, damping, zero_s, delay_s = parameters
     root = np.sqrt(complex(damping * damping - 1.0))
@@ -65,7 +72,10 @@ def second_order(parameters: Array, time_s: Array) -> Array:
 
 
 def motor_in_loop(gains: Gains) -> Turned:
-    """The manual's loop with these gains around a motor: PWM per count, time constant, delay."""
+    """Return the model of a motor in the manual's loop with these gains.
+
+    Its parameters are PWM per count, time constant and delay.
+    """
 
     def turned(parameters: Array, time_s: Array) -> Array:
         pwm_per_count, time_constant_s, delay_s = parameters
@@ -98,7 +108,7 @@ SECOND_ORDER: Final = Model(
 
 
 def motor_model(gains: Gains) -> Model:
-    """The motor in the manual's loop, with these gains in the firmware."""
+    """Return the model of a motor in the manual's loop, with these gains in the firmware."""
     return Model(
         "motor in the manual's loop",
         ("gain", "PWM per count", "motor time constant", "motor delay"),

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What ``calibrate step`` found, for the table, the file and the reader."""
+"""The result of ``calibrate step``, for the table, the file and the user."""
 
 from typing import Any, Final
 
@@ -11,17 +11,20 @@ from omnibot_driver.tools.calibrate.tuning import Behaviour, behaviour, better_g
 from omnibot_driver.tools.calibrate.wheel_loop import Gains
 
 UNLIKE_ONE: Final = 0.02
-"""A gain that differs more from 1 is the scale's affair."""
+"""Deviation of a gain from 1 above which `calibrate scale` is recommended."""
 QUANTUM_RADPS: Final = 0.05
 """Standard deviation of a delta's rate by the steps of the encoder and of 0.1 mm on the wire."""
 MANY: Final = 1.5
-"""Quanta. A computer that held commands up made 2, and a delay that was 4 ms too long."""
+"""Residuals, in quanta, from which on the user is warned.
+
+With a computer that delayed commands they were 2 quanta, and the delay found was 4 ms too long.
+"""
 UNEXPLAINED: Final = 1.2
-"""Factor of the second order's residuals above which no motor fits."""
+"""Factor of the second order's residuals above which the motor model does not fit."""
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:
-    """Gains are the same for all wheels, so they are chosen for all of them."""
+    """Choose gains for all wheels, as the firmware has the same for all; return the result."""
     motors = [wheel.motor for wheel in found]
     better = better_gains(motors, now)
     findings = [row for wheel in found for row in _rows(wheel)]
@@ -87,7 +90,7 @@ def _traits(fit: Fit) -> Any:
 
 
 def _recorded(wheel: WheelFound) -> dict[str, Any]:
-    """Every value with its standard deviation, for the file."""
+    """Return every value with its standard deviation, for the file."""
     return {
         fit.model.title: {
             "residual_radps": round(fit.rms_radps, 4),
@@ -131,7 +134,7 @@ def _remarks(wheel: WheelFound) -> list[str]:
 
 
 def _told(wheels: list[Behaviour]) -> str:
-    """Describe the worst wheel, figure by figure."""
+    """Describe the largest value over the wheels, figure by figure."""
     rise_ms, command_ms, load_ms = (
         1000 * max(float(value) for value in values)
         for values in (

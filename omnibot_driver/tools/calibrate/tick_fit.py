@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From the times between the ticks of wheels that start at full duty to a plant. Pure calculation.
+"""Fit a plant to the times between ticks of wheels that start at full duty. Pure calculation.
 
-A record begins with the first tick after it was asked for, so when the duty was applied is not in
-it: only how the times between ticks become shorter. Dead time cannot be seen so. The marks of an
-encoder are found with it (``tick_marks``). The plant is of first or second order, from duty to
-speed; whichever explains the record better is taken.
+A record begins with the first tick after its request, so it does not contain when the duty was
+applied. It only shows how the times between ticks become shorter, not the dead time. The marks of
+an encoder are fitted as well (``tick_marks``). The plant is of first or second order, from duty to
+speed; the order that explains the record better is taken.
 """
 
 import math
@@ -27,8 +27,10 @@ FEWEST_TICKS: Final = 30
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """Speed in RPM after a step of duty: gain times (duty beyond ``dead_zone_percent``), through
-    two lags. ``fast_s`` is 0 for a first order.
+    """A plant: the speed in RPM after a step of duty.
+
+    It is the gain times the duty beyond ``dead_zone_percent``, through two lags. ``fast_s`` is 0
+    for a first order.
     """
 
     rpm_per_percent: float
@@ -37,13 +39,16 @@ class Plant:
     dead_zone_percent: float = 0.0
 
     def final_rpm(self, duty_percent: float) -> float:
-        """Speed after a long time."""
+        """Return the final speed, in RPM, at this duty."""
         return self.rpm_per_percent * max(duty_percent - self.dead_zone_percent, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class PlantFit:
-    """``final_rpm``: at the duty of the records. Sigmas are scaled by the residuals."""
+    """The fit of a plant. ``final_rpm``: at the records' duty.
+
+    The residuals scale ``sigmas``.
+    """
 
     final_rpm: float
     slow_s: float
@@ -53,16 +58,16 @@ class PlantFit:
     samples: int
     order: int
     marks: Marks | None = None
-    """Where they are off, and in the same way in each turn."""
+    """The encoder's marks, if they are off their places in the same way in each turn."""
 
     @property
     def aic(self) -> float:
-        """Akaike's criterion; the smaller one is preferred."""
+        """Akaike's information criterion; the smaller one is preferred."""
         return 2 * self.samples * math.log(self.rms) + 2 * self.order
 
 
 def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
-    """Speed as a part of the final one: the derivative of the angle."""
+    """Return the speed as a part of the final speed: the derivative of the angle."""
     slow = np.exp(-times_s / slow_s)
     if fast_s < 1e-4 * slow_s:
         return np.asarray(1 - slow)
@@ -73,10 +78,10 @@ def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
 
 
 def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
-    """``records``: times between ticks in s, each from standstill at the same duty.
+    """Fit a plant to ``records``: times between ticks in s, each from standstill at the same duty.
 
-    The first time of each is left out: it is how long the wheel stood. Raises ToolError where they
-    are too short.
+    The first time of each record is left out, as it contains the standstill. Raises ToolError where
+    records are too short.
     """
     intervals = [record[1:] for record in records]
     if not intervals or min(map(len, intervals)) < FEWEST_TICKS:

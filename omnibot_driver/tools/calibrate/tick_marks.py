@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The places of an encoder's marks, from several records of the same wheel. Pure calculation.
+"""Find the places of an encoder's marks from several records of the same wheel. Pure calculation.
 
-A disc has the same marks in each turn, so what they make of the times between ticks comes again,
-in each record with another mark first. Knows how far the times are off those of even marks; it does
-not know how the wheel moved.
+A disc has the same marks in each turn, so their effect on the times between ticks repeats with each
+turn; each record begins at another mark. Knows how far the times differ from those of even marks;
+does not know how the wheel moved.
 """
 
 from collections.abc import Sequence
@@ -18,40 +18,46 @@ Column = NDArray[np.float64]
 
 ROUNDS: Final = 4
 LARGEST: Final = 0.5
-"""A time that is off by more than this part does not tell where a mark is: an edge was missed."""
+"""Largest relative error of a time that is evaluated; beyond it an edge was missed."""
 OUTLIER: Final = 4.5
-"""Standard deviations; beyond them an edge was late."""
+"""Standard deviations of a time's error; beyond them an edge was late."""
 EXPLAINED: Final = 0.4
-"""Part of the variance that marks must explain to be believed. By chance they explain what they
-have parameters for: less than a fifth with three records of two turns."""
+"""Part of the variance that marks must explain to be accepted.
+
+By chance they explain a part that depends on their number of parameters: less than a fifth with
+three records of two turns.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Marks:
-    """``steps``: how much longer each way from mark to mark is than their mean, as a part of it."""
+    """The marks of an encoder.
+
+    ``steps``: how much longer each way from mark to mark is than their mean, relative to the mean.
+    """
 
     steps: Column
 
     @property
     def places(self) -> Column:
-        """How far each mark is off its place, in ticks."""
+        """The error of each mark's place, in ticks."""
         places = np.concatenate(([0.0], np.cumsum(self.steps)[:-1]))
         return np.asarray(places - places.mean())
 
     def first(self, off: Column) -> int:
-        """The step that the first of these times belongs to."""
+        """Return the step to which the first of these times belongs."""
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 
     def expected(self, first: int, count: int) -> Column:
-        """What the marks make of ``count`` times from step ``first`` on, as a part of each."""
+        """Return the relative errors of ``count`` times from step ``first`` on, by these marks."""
         return np.asarray(self.steps[(first + np.arange(count)) % len(self.steps)])
 
 
 def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
-    """``rows``: of each record, how much longer each time was than with even marks, as a part; nan
-    where that is not known.
+    """Return the marks that explain these records' times, None where no pattern repeats each turn.
 
-    None where the times are not off in the same way in each turn.
+    ``rows``: of each record, the relative excess of each time over that of even marks; nan where
+    that is not known.
     """
     spread = 1.4826 * float(np.nanmedian(np.abs(np.concatenate(list(rows)))))
     limit = min(LARGEST, OUTLIER * spread)
@@ -73,7 +79,7 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """The step with which this row begins: where both agree best."""
+    """Return the step with which this row begins: where both agree best."""
     marks = len(steps)
     turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)
     turned = np.arange(marks)[:, None] + np.arange(marks)
@@ -81,7 +87,7 @@ def _first(row: Column, steps: Column) -> int:
 
 
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
-    """The median of each step; their mean is zero."""
+    """Return the median of each step, shifted to a mean of zero."""
     of = np.concatenate(
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]
     )

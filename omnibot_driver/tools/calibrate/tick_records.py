@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Records of the times between a wheel's ticks, and what they say of its encoder.
+"""Read records of the times between a wheel's ticks, and find the levels of its encoder.
 
 Pure calculation on columns of a CSV file with the header that the driver writes.
 """
@@ -18,15 +18,19 @@ from omnibot_driver.tools.needs import ToolError
 
 SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
-"""Part of the times that may be missing."""
+"""Largest part of a record's times that may be missing."""
 UNLIKE: Final = 1.5
-"""Times the usual one: an edge was missed, or came late."""
+"""A time that differs from the median by more than this factor: an edge was missed, or came late.
+"""
 SMOOTHED: Final = 4
-"""Ticks: marks are off their places, but the sum of some ways is not off by more."""
+"""Number of ticks over which a speed is averaged.
+
+Single marks are off their places, but the error of a sum of intervals is not larger.
+"""
 
 
 def read(path: Path) -> dict[str, Column]:
-    """Read a file: times between ticks in s, by side. Raises ToolError if it has too few."""
+    """Return the times between ticks in s, by side. Raises ToolError if the file has too few."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
@@ -47,8 +51,10 @@ def read(path: Path) -> dict[str, Column]:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """``short``, ``long``: factors that make both levels of an encoder as long as their mean, with
-    their standard deviation. ``rpm``: how fast the wheel turned.
+    """Corrections of an encoder's two levels, and the speed at which they were measured.
+
+    ``short``, ``long``: factors that make each level as long as the mean of both. ``sigma``: their
+    standard deviation. ``rpm``: the wheel's speed.
     """
 
     short: float
@@ -58,10 +64,10 @@ class Levels:
 
 
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
-    """Levels of a wheel that turns freely at a constant duty, with both corrections at 1.
+    """Return the levels of a wheel that turns freely at a constant duty, with corrections of 1.
 
-    Levels come in turn, and it shows which is the shorter. Where an edge was missed the turn begins
-    anew. Raises ToolError where nothing is regular.
+    The two levels alternate; the shorter one by its mean is the short level. After a missed edge
+    the assignment begins anew. Raises ToolError where the ticks are not regular.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)
@@ -82,7 +88,7 @@ def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
 
 
 def _runs(ticks_s: Column, good: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -> Iterable[Column]:
-    """Runs of ten or more regular ticks."""
+    """Yield runs of ten or more regular ticks."""
     begin = 0
     for place in range(len(ticks_s) + 1):
         if place == len(ticks_s) or not good[place]:
@@ -93,14 +99,14 @@ def _runs(ticks_s: Column, good: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """A step as a record shows it: ``times_s`` from the first tick on, ``rpm`` smoothed."""
+    """A measured step response: ``times_s`` from the first tick on, and the smoothed ``rpm``."""
 
     times_s: Column
     rpm: Column
 
 
 def response(ticks_s: Column, ticks_per_revolution: int) -> Response:
-    """The response without the first tick, whose time contains the standstill."""
+    """Return the response without the record's first time, which contains the standstill."""
     times_s = ticks_s[1:].copy()
     times_s[~np.isfinite(times_s)] = np.nanmedian(times_s)
     ends_s = np.concatenate(([0.0], np.cumsum(times_s)))

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Least squares of a plant over the times between ticks of several starts. Pure calculation.
+"""Fit a plant by least squares to the times between ticks of several starts. Pure calculation.
 
-Knows the way of a plant, marks and noise; it does not know which order is the right one, nor files.
+Knows the motion of a plant, marks and noise; does not know files, nor which order is the right one.
 """
 
 import math
@@ -20,37 +20,40 @@ from omnibot_driver.tools.calibrate.tick_marks import Marks
 Column = NDArray[np.float64]
 
 SIGMA: Final = 0.1
-"""Relative noise of one time over marks whose places are not known."""
+"""Relative noise of one time while the places of the marks are not known."""
 SHARPEST: Final = 0.002
-"""Least relative noise of one time; the board tells it in steps of 0.1 ms."""
+"""Least relative noise of one time; the board reports times in steps of 0.1 ms."""
 SHORTEST_S: Final = 0.005
 LONGEST_S: Final = 5.0
-"""Of the sum of both time constants."""
+"""Longest sum of both time constants, in s."""
 GRID: Final = 1500
 STARTS_S: Final = (0.1, 0.5)
-"""Of the sum of both time constants."""
+"""Starting values for the sum of both time constants, in s."""
 RATIOS: Final = (0.15, 0.4, 0.8)
-"""Of the fast one to the slow one; at 1 the search would stand still."""
+"""Starting values for the ratio of the fast to the slow time constant; at 1 the search would stop.
+"""
 LATEST_S: Final = 2.0
-"""From the start to the first mark."""
+"""Largest time from the start to the first mark, in s."""
 MOST_OFF: Final = 0.4
-"""Ticks that a mark may be off its place."""
+"""Largest error of a mark's place, in ticks."""
 LAGS: Final = 60
-"""Ticks, over which the load is correlated."""
+"""Number of ticks over which the load is correlated."""
 MISSED: Final = 0.42
-"""A time that is longer by this part than expected, with the next one, holds a mark that the board
-has missed. Of one that it has noticed late the next time is as much too short. (Its clock loses up
-to 6 ms then, so the time is not twice as long.)"""
+"""Relative excess of a time, together with the next time, from which on a mark was missed.
+
+If a mark was noticed late instead, the next time is as much too short. (The board's clock loses up
+to 6 ms at a missed mark, so the time is not twice as long.)
+"""
 SURE_TICKS: Final = 4
-"""Before these the wheel is slow, and misses none."""
+"""Number of first ticks in which none is missed, as the wheel is slow."""
 OUTLIER: Final = 5.0
-"""Standard deviations."""
+"""Standard deviations beyond which a time is an outlier."""
 FEWEST_RECORDS: Final = 6
-"""With fewer, their scatter tells nothing of the errors."""
+"""Least number of records from whose scatter the errors can be estimated."""
 
 
 def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
-    """Way of a plant of unit final speed after a step at 0, in units of speed times seconds."""
+    """Return the way after a step at 0, for a final speed of 1, in units of speed times seconds."""
     slow = np.exp(-times_s / slow_s)
     if fast_s < 1e-4 * slow_s:
         return np.asarray(times_s - slow_s * (1 - slow))
@@ -62,19 +65,20 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 
 
 def constants(values: Column, order: int) -> tuple[float, float]:
-    """Slow and fast, from their sum and their ratio, in which there is one optimum."""
+    """Return the slow and the fast time constant from their sum and ratio, which have one
+    optimum."""
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
     return total / (1 + ratio), total * ratio / (1 + ratio)
 
 
 class Search:
-    """``intervals``: times between ticks in s, by record.
+    """A search for a plant's values. ``intervals``: times between ticks in s, by record.
 
-    Values are the logarithms of the rate in ticks a second and of the sum of both time constants,
-    then for a second order their ratio, then when in s each record's first mark was passed, then,
-    where marks are searched, their places in ticks. (A time, as just after the start a place says
-    little: the way grows with its cube.)
+    Values are the logarithms of the rate in ticks a second and of the sum of both time constants;
+    for a second order also their ratio; then the time in s of each record's first mark; and, where
+    marks are searched, their places in ticks. (The first mark has a time, as just after the start a
+    place is inexact: the way grows with the time's cube.)
     """
 
     def __init__(self, intervals: Sequence[Column], order: int = 2) -> None:
@@ -91,7 +95,7 @@ class Search:
         self._good = np.ones(len(self._measured), dtype=bool)
 
     def roughly(self) -> Column:
-        """Values of a second order, with even marks and independent noise."""
+        """Return the values of a second order, with even marks and independent noise."""
         records = len(self._lengths)
         starts = []
         for total_s in STARTS_S:
@@ -100,17 +104,19 @@ class Search:
         return self._best(starts)
 
     def closely(self, values: Column) -> Column:
-        """Search on from several ratios of both time constants, as there are local optima."""
+        """Continue the search from several ratios of time constants, as there are local optima."""
         return self._best([np.array([*values[:2], ratio, *values[3:]]) for ratio in RATIOS])
 
     def first_order(self, values: Column) -> Column:
-        """Search on with a single lag from values of a second order; ``order`` is 1 from now on."""
+        """Continue the search with a single lag from values of a second order; ``order`` becomes
+        1."""
         self.order = 1
         return self._best([np.array([*values[:2], *values[3:]])])
 
     def off(self, values: Column) -> list[Column]:
-        """How much longer each time was than with even marks, as a part of it, by record; nan for
-        each way from mark to mark that was not measured by itself.
+        """Return the relative excess of each time over that with even marks, by record.
+
+        It is nan for each way from mark to mark that was not measured by itself.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -121,7 +127,7 @@ class Search:
         return found
 
     def find_missed(self, values: Column) -> bool:
-        """From now on count the marks that the board has missed; whether there are any."""
+        """Include the marks that the board has missed from now on; return whether there are any."""
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
             both = row + np.append(row[1:], 0.0)
@@ -137,7 +143,7 @@ class Search:
         return np.split(off, np.cumsum(self._lengths)[:-1])
 
     def with_marks(self, marks: Marks, values: Column) -> Column:
-        """Search the places of the marks too, and use them from now on; the other values."""
+        """Fit the places of the marks too, and use them from now on; return the other values."""
         self._marks, own = len(marks.steps), len(values)
         self._first_marks = [marks.first(row) for row in self.off(values)]
         values = np.concatenate((values, marks.places))
@@ -147,9 +153,10 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """From now on weigh what these values leave by its correlation.
+        """Weight the residuals of these values by their correlation from now on.
 
-        Where the places of the marks are not known, it is theirs; else that of the load.
+        Where the places of the marks are not known, the correlation is that of the marks; else of
+        the load.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)
@@ -160,15 +167,15 @@ class Search:
         self._whitener = _whitener(_correlation(rows, lags), max(self._lengths))
 
     def left(self, values: Column) -> Column:
-        """What these values do not explain, relative, whitened, without outliers."""
+        """Return the relative residuals of these values, whitened and without outliers."""
         left = self._residuals(values) * self._sigma
         spread = 1.4826 * float(np.median(np.abs(left)))
         return np.asarray(left[np.abs(left) < 5 * max(spread, 1e-3)])
 
     def covariance(self, values: Column) -> Column:
-        """Of the first values, without those of single records.
+        """Return the covariance of the values that all records share.
 
-        By what is left of all times, or by how records differ, whichever is more: a load changes
+        It is that of all residuals, or of the scatter between records if larger, as a load changes
         slowly.
         """
         own = 1 + self.order
@@ -218,7 +225,7 @@ class Search:
         )
 
     def _sparsity(self) -> csr_matrix:
-        """Which times depend on which values."""
+        """Return the pattern of which times depend on which values."""
         own, records, times = 1 + self.order, len(self._lengths), len(self._measured)
         pattern = np.zeros((times, own + records + self._marks))
         pattern[:, :own] = 1.0
@@ -246,8 +253,10 @@ class Search:
         return np.concatenate([self._whitener[: len(row), : len(row)] @ row for row in rows])
 
     def _told(self, values: Column, off: Column | None = None) -> Column:
-        """The times between marks, record after record. ``off``: places of the marks, where they
-        are not among the values."""
+        """Return the predicted times between marks, record after record.
+
+        ``off``: places of the marks, where they are not among the values.
+        """
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)
         last_s = (max(self._lengths) + 5) / rate + 2 * (slow_s + fast_s)
@@ -269,9 +278,9 @@ def _cost(found: Any) -> float:
 
 
 def _correlation(rows: Sequence[Column], lags: int) -> Column:
-    """Correlation of each with the next ones, robust, and fading with the lag.
+    """Return the correlation of each residual with the next ones, robust, and fading with the lag.
 
-    With one lag: -0.5 where marks are off their places, 0 where the times are measured badly.
+    With one lag: -0.5 where marks are off their places, 0 where the noise is that of single times.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -291,9 +300,9 @@ def _correlation(rows: Sequence[Column], lags: int) -> Column:
 
 
 def _whitener(correlation: Column, length: int) -> Column:
-    """Whiten residuals with correlated neighbours: the inverse of the Cholesky factor.
+    """Return the matrix that whitens correlated residuals: the inverse of the Cholesky factor.
 
-    Its beginning is that of a shorter row.
+    Its upper left part whitens a shorter row.
     """
     column = np.zeros(length)
     column[: len(correlation)] = correlation[:length]

@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Which gains of the manual's law suit a motor, and what they and the manual's do on it.
+"""Find the gains of the manual's law that suit a motor, and predict their effect.
 
-Criterion: a step of command followed and a step of load held off (a floor, a sagging battery, dry
-friction), each by its integral of absolute error as a part of what the manual's gains leave, half
-and half. Limits: the loop stays Ms <= 1.6 away from instability, which forgives an error of a
-factor 2.6 in gain or of 36° in phase; the speed overshoots a command by 5 % at the most; and one
-count of the encoder, its smallest step, moves the effort by no more than a count of speed needs.
+Criterion: the response to a step of command, and to a step of load (a floor, a sagging battery, dry
+friction). Each counts half, by its integral of absolute error relative to that with the present
+gains. Limits: Ms <= 1.6, which tolerates an error of a factor 2.6 in gain or of 36° in phase; an
+overshoot of 5 % after a step of command; and one count of the encoder, its smallest step, changes
+the effort by no more than a count of speed needs.
 """
 
 from collections.abc import Sequence
@@ -30,20 +30,20 @@ LARGEST_MS: Final = 1.6
 LARGEST_OVERSHOOT: Final = 0.05
 HORIZON_TICKS: Final = 400
 SETTLED: Final = 1e-3
-"""Part of the command that may be wrong at the horizon; what is worse is not stable."""
+"""Largest relative error at the horizon; with a larger one the loop is not stable."""
 CANDIDATES: Final = 24
-"""Of each gain in one round."""
+"""Number of values of each gain in one round."""
 ROUNDS: Final = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
-    """What a motor does under some gains.
+    """The behaviour of a motor with some gains.
 
-    ``rise_s``: from a tenth to nine tenths of a step; ``overshoot``: part of the step;
-    ``command_error_s``: integral of absolute error of a step of 1; ``load_error_s``: the same for a
-    load of one count per tick's worth of effort; ``ms``: robustness, 1 is best; ``stable``: whether
-    it comes to an end. Scalars or arrays.
+    ``rise_s``: from 10 % to 90 % of a step; ``overshoot``: part of the step; ``command_error_s``:
+    integral of absolute error after a step of 1; ``load_error_s``: the same for a load of one count
+    per tick's worth of effort; ``ms``: robustness, 1 is best; ``stable``: whether the response
+    settles. Scalars or arrays.
     """
 
     rise_s: Array
@@ -55,7 +55,7 @@ class Behaviour:
 
 
 def behaviour(motor: Motor, gains: Gains) -> Behaviour:
-    """The simulated behaviour in the manual's loop."""
+    """Return the simulated behaviour in the manual's loop."""
     with np.errstate(over="ignore", invalid="ignore"):
         speed = answer(motor, gains, HORIZON_TICKS).speed
         feedback = Gains(0.0, gains.proportional, gains.integral)
@@ -73,9 +73,9 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 
 
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
-    """The best for all of these alike within the limits, by a search that narrows down.
+    """Return the gains that are best for all these motors within the limits, by a narrowing search.
 
-    ``now`` is what they are compared with.
+    ``now`` are the gains with which they are compared.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)
@@ -103,7 +103,7 @@ def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
 
 
 def _cost(behaves: Behaviour, reference: Behaviour) -> Array:
-    """The cost of these gains; infinite beyond the limits."""
+    """Return the cost of these gains; infinite beyond the limits."""
     cost = (
         behaves.command_error_s / reference.command_error_s
         + behaves.load_error_s / reference.load_error_s
@@ -117,6 +117,6 @@ def _around(value: float, reach: float, low: float, high: float) -> tuple[float,
 
 
 def _near(span: tuple[float, float], value: float) -> tuple[float, float]:
-    """A step of the grid to both sides, within what there was."""
+    """Return the span of one grid step to both sides of a value, within the present span."""
     factor = (span[1] / span[0]) ** (1.0 / (CANDIDATES - 1))
     return max(span[0], value / factor), min(span[1], value * factor)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Driving by the odometry, from one pose to the next. Pure."""
+"""Laws that drive the robot by its odometry from one pose to the next. Pure."""
 
 import math
 from collections.abc import Sequence
@@ -13,13 +13,15 @@ from omnibot_driver.tools.calibrate.motion import Law
 NEAR_M: Final = 0.005
 NEAR_RAD: Final = 0.01
 BRAKING: Final = 0.15
-"""m/s²: half of what commands may change by."""
+"""Deceleration before a waypoint, in m/s²: half of the rate at which commands may change."""
 ANGULAR_BRAKING: Final = 0.4
 
 
 def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
-    """Through these places, which count from where the motion begins (yaw unwrapped); stopping at
-    each. ``speed`` in m/s, ``turning`` in rad/s.
+    """Return a law that drives through these poses and stops at each.
+
+    The poses count from where the motion begins, with the yaw unwrapped. ``speed`` is in m/s,
+    ``turning`` in rad/s.
     """
     number = 0
 
@@ -33,7 +35,7 @@ def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
 
 
 def straight(way_m: float, speed: float) -> Law:
-    """A waypoint ahead in x alone, for a base with two wheels; ``speed`` in m/s."""
+    """Return a law that drives straight ahead, for a base with two wheels; ``speed`` in m/s."""
 
     def law(_seconds: float, pose: Pose) -> Vector3 | None:
         left_m = way_m - pose.x_m
@@ -45,7 +47,7 @@ def straight(way_m: float, speed: float) -> Law:
 
 
 def turn(angle_rad: float, turning: float) -> Law:
-    """A turn on the spot, to the left if positive; ``turning`` in rad/s."""
+    """Return a law that turns on the spot, to the left if positive; ``turning`` in rad/s."""
     sign = math.copysign(1.0, angle_rad)
 
     def law(_seconds: float, pose: Pose) -> Vector3 | None:
@@ -58,7 +60,8 @@ def turn(angle_rad: float, turning: float) -> Law:
 
 
 def square(side_m: float, sign: int) -> list[Pose]:
-    """Forward and a quarter turn (1: left, -1: right), four times: back to where it began."""
+    """Return the poses of a square: forward, then a quarter turn (1: left, -1: right), four
+    times."""
     places = []
     place = Pose()
     for _ in range(4):

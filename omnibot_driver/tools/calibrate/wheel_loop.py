@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One wheel in the manual's control loop, small signals: what it answers to which gains.
+"""Simulate one wheel in the manual's control loop, for small signals.
 
-All speeds are encoder counts per control tick of 10 ms, all efforts PWM steps, all times ticks.
-The loop is linear: it tells of changes between two speeds in the same direction, where dry friction
-does not change and has no part. Knows nothing of measuring, radians or ROS.
+All speeds are encoder counts per control tick of 10 ms, all efforts PWM steps, all times ticks. The
+loop is linear: it describes changes between two speeds in the same direction, where dry friction is
+constant and has no effect. Knows nothing of measuring, radians or ROS.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 TICK_S: Final = 0.01
-"""Manual, "Wheel control: 100Hz loop"."""
+"""Control period of a wheel, in s: manual, "Wheel control: 100Hz loop"."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,8 @@ class Motor:
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """K_ff, K_VP, K_VI: one number each, or arrays of one shape to compare many at once."""
+    """The gains K_ff, K_VP, K_VI: one number each, or arrays of one shape to compare many at
+    once."""
 
     feed_forward: Any
     proportional: Any
@@ -38,15 +39,12 @@ class Gains:
 
 
 MANUAL: Final = Gains(40.0, 10.0, 1.5)
-"""Manual, "Controller parameters"."""
+"""The gains of the manual, "Controller parameters"."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Speed and effort of each tick from the one on in which the wheel can first be different.
-
-    Arrays of shape (ticks, ...) with the shape of the gains.
-    """
+    """Speed and effort by tick, from the first tick on in which the wheel can respond."""
 
     speed: Array
     effort: Array
@@ -55,11 +53,11 @@ class Answer:
 def answer(
     motor: Motor, gains: Gains, ticks: int, *, command: float = 1.0, load: float = 0.0
 ) -> Answer:
-    """What comes of a change of the commanded speed, and of a load in PWM steps, at once.
+    """Return the response to a step of commanded speed and, at the same time, a load in PWM steps.
 
-    The law is the manual's ("Wheel control") with the feed-forward outside the accumulator:
-    u(k) = K_ff v + w(k), w(k) = w(k-1) + K_VP (e(k) - e(k-1)) + K_VI e(k). An effort counts from
-    the next tick on, or ``delay_ticks`` later, which need not be whole.
+    The law is the manual's ("Wheel control") with the feed-forward outside the accumulator: u(k) =
+    K_ff v + w(k), w(k) = w(k-1) + K_VP (e(k) - e(k-1)) + K_VI e(k). An effort acts from the next
+    tick on, or ``delay_ticks`` later, which need not be whole.
     """
     shape = np.broadcast(gains.feed_forward, gains.proportional, gains.integral).shape
     whole, part = divmod(motor.delay_ticks, 1.0)
@@ -85,9 +83,9 @@ def answer(
 
 
 def sensitivity_peak(motor: Motor, gains: Gains, points: int = 400) -> Array:
-    """Ms: the inverse of the smallest distance between the loop's Nyquist curve and -1.
+    """Return Ms: the inverse of the smallest distance between the loop's Nyquist curve and -1.
 
-    Of a stable loop, how much the worst disturbance is amplified; 1 at best.
+    For a stable loop it is the largest amplification of a disturbance; 1 is best.
     """
     frequency = np.geomspace(1e-3, np.pi, points)
     z = np.exp(1j * frequency)
@@ -100,13 +98,13 @@ def sensitivity_peak(motor: Motor, gains: Gains, points: int = 400) -> Array:
 
 
 def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """The transfer function from effort to counts, at points z of the unit circle."""
+    """Return the transfer function from effort to counts, at points z of the unit circle."""
     whole, part = divmod(motor.delay_ticks, 1.0)
     lag = motor.time_constant_ticks
     decay = np.exp(-1.0 / lag)
 
     def way(share: float) -> float:
-        """Turned within this share of a tick from rest, under an effort worth one count."""
+        """Return the counts turned in this part of a tick, from rest at one count's effort."""
         return float(share - lag * (1.0 - np.exp(-share / lag)))
 
     risen = [way(1.0 - part), way(2.0 - part) - way(1.0 - part), way(3.0 - part) - way(2.0 - part)]

@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A running driver on one screen of a terminal, and the keys that start, stop and steer it.
+"""Show a running driver on a terminal, with keys that start, stop and steer the robot.
 
-It knows the driver as any ROS program does, by topics and services. It must not know the wire.
+The monitor uses the driver's topics and services, as any ROS program does. It must not know the
+protocol on the wire.
 """

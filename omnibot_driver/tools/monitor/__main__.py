@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Runs the monitor: ``ros2 run omnibot_driver monitor``."""
+"""Run the monitor: ``ros2 run omnibot_driver monitor``."""
 
 import argparse
 import io
@@ -25,7 +25,7 @@ LOOK_EVERY_S: Final = 0.05
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Return 0; 1 when something is missing or wrong, told on stderr; 2 on wrong usage."""
+    """Return 0, 1 after an error that is printed on stderr, or 2 on wrong usage."""
     arguments = sys.argv[1:] if arguments is None else arguments
     options, ros_arguments = _parse(arguments)
     if isinstance(sys.stdout, io.TextIOWrapper):
@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"monitor: {error}", file=sys.stderr)
     except KeyboardInterrupt:
         print("monitor: interrupted before the driver was found", file=sys.stderr)
-    except BrokenPipeError:  # the reader has gone
+    except BrokenPipeError:  # the pipe's reader has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 1
 
@@ -112,7 +112,8 @@ def _run(options: argparse.Namespace, ros_arguments: list[str]) -> int:
 
 
 def _find(feed: "Feed", timeout_s: float) -> None:
-    """Wait until the driver publishes its state; ToolError names the drivers found."""
+    """Wait until the driver publishes its state. Raises ToolError, which names the drivers
+    found."""
     if _comes_about(lambda: bool(feed.view().state), timeout_s):
         return
     there = feed.drivers()
@@ -135,7 +136,8 @@ def _find(feed: "Feed", timeout_s: float) -> None:
 
 
 def _gather(feed: "Feed", timeout_s: float) -> View:
-    """A view of all that a driver in this state says, over a whole window; or what there is."""
+    """Wait for all topics of a driver in this state and a whole window; return what was
+    received."""
     began_s = time.monotonic()
     _comes_about(lambda: not feed.view().missing(feed.diagnoses()), timeout_s)
     _comes_about(lambda: time.monotonic() - began_s > WINDOW_S, WINDOW_S)

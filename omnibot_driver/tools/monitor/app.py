@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The dashboard. Knows terminals and keys; what it shows and whom it tells is a ``Robot``."""
+"""The dashboard. Knows terminals and keys; a ``Robot`` provides the figures and the actions."""
 
 import asyncio
 import signal
@@ -24,7 +24,7 @@ from omnibot_driver.tools.monitor.teleop import LEVELS, DeadMan
 REFRESH_S: Final = 0.2
 PARTS: Final = ("title", "estop", "path", "figures", "verdicts", "teleop", "said")
 MOST_IN_FULL: Final = 4
-"""Verdicts, that all are in full; of more there is the beginning, as there is no room."""
+"""Largest number of verdicts shown in full; if there are more, each is cut to one line."""
 GREEN, YELLOW, RED, GREY, CYAN = "#98e024", "#f4bf4f", "#ff5f57", "#a0a0a0", "#58d1eb"
 COLOURS: Final = {
     Level.OK: GREEN,
@@ -41,7 +41,7 @@ class Robot(Protocol):
     dead_man: DeadMan | None
 
     def view(self) -> View:
-        """The present view."""
+        """Return the present view of the robot."""
 
     def estop(self) -> None:
         """Latch the e-stop."""
@@ -50,17 +50,17 @@ class Robot(Protocol):
         """Release the e-stop."""
 
     def start(self) -> None:
-        """Run."""
+        """Start the board."""
 
     def pause(self) -> None:
-        """Pause or start the board."""
+        """Pause the board."""
 
     def reset_odometry(self) -> None:
         """Set the odometry to zero."""
 
 
 class Release(ModalScreen[bool]):
-    """Asks whether the e-stop is really to be released; y does, every other key does not."""
+    """A question whether to release the e-stop: y releases it, every other key does not."""
 
     def compose(self) -> ComposeResult:
         """Build the question."""
@@ -133,8 +133,9 @@ class Monitor(App[None]):
         self.refresh_view()
 
     def _come_back(self) -> None:
-        """Return to the screen after SIGSTOP; otherwise keys would have two readers,
-        of which each runs until its own end.
+        """Return to the screen after SIGSTOP.
+
+        Otherwise keys would have two readers, each of which runs until its own end.
         """
         with self.suspend():
             pass
@@ -199,7 +200,7 @@ class Monitor(App[None]):
             dead_man.change_speed(1 if event.key == "plus" else -1)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """A key for what the robot's board cannot do is not shown, and does nothing."""
+        """Hide and disable the keys of actions that the robot's board does not have."""
         return action not in self._lacks and super().check_action(action, parameters)
 
     def on_app_blur(self) -> None:

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver as the monitor has it: its topics into a model, its services and ``cmd_vel`` out.
+"""Connect the monitor to the driver: topics update a model; services and ``cmd_vel`` are sent.
 
-Callbacks run on an executor's thread of their own, so what a screen does delays none of them.
+Callbacks run on a separate executor thread, so the screen does not delay them.
 """
 
 import os
@@ -49,15 +49,15 @@ LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
 INSIST_EVERY_S: Final = 0.2
 PARAMETERS: Final = ("port", "max_linear_speed", "max_angular_speed")
 IMU_PARAMETER: Final = "imu_frame"
-"""A driver has it where its board has an IMU."""
+"""A parameter of drivers whose board has an IMU."""
 
 
 class Feed:
-    """One driver, ``name`` in this namespace, heard from now on; ``close`` it in the end.
+    """The connection to the driver ``name`` in this namespace, until ``close``.
 
-    With a dead man, ``cmd_vel`` is published as long as he says so. ``estop``, ``release``,
-    ``start``, ``pause``, ``reset_odometry``: any thread may call them; what comes of it is said
-    in the view. Raises ToolError for names that are none.
+    With a dead man, ``cmd_vel`` is published as long as a key is held. Any thread may call
+    ``estop``, ``release``, ``start``, ``pause`` and ``reset_odometry``; the view shows their
+    result. Raises ToolError for invalid names.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Feed:
         self._spinner.start()
 
     def close(self) -> None:
-        """Stop what was steered from here, and leave ROS."""
+        """Stop a robot that was steered from here, and leave ROS."""
         if self.dead_man:
             self.dead_man.stop()
         self._ending.set()
@@ -106,18 +106,18 @@ class Feed:
         rclpy.try_shutdown(context=self._context)
 
     def view(self) -> View:
-        """The present view."""
+        """Return the present view of the driver."""
         with self._lock:
             return self._model.view(
                 time.monotonic(), steers=self._velocity.steers, lacks=self._lacks()
             )
 
     def drivers(self) -> list[str]:
-        """Names of those that are there, wherever they are."""
+        """Return the names of all running drivers, in any namespace."""
         return running_drivers(self._node)
 
     def namesakes(self) -> str:
-        """A sentence where there is more than one driver of this name."""
+        """Return a warning where there are several drivers of this name, else an empty string."""
         count = self._node.count_publishers(f"{self.driver}/state")
         if count < 2:
             return ""
@@ -133,10 +133,10 @@ class Feed:
             for info in self._node.get_publishers_info_by_topic(DIAGNOSTICS_TOPIC)
         )
 
-    # What a person wants
+    # Actions of the user
 
     def estop(self) -> None:
-        """Latch by topic and by service, and repeat until the driver shows it."""
+        """Latch the e-stop by topic and by service, and repeat until the driver confirms it."""
         if self.dead_man:
             self.dead_man.stop()
         self._model.estop_asked = True
@@ -188,7 +188,8 @@ class Feed:
         self._learned = False
 
     def _learn(self) -> None:
-        """Read what the board has, at each change of state, as another driver may have started."""
+        """Read the driver's parameter names after each change of state: it may be another
+        driver."""
         if not self._learned and self._list.service_is_ready():
             self._learned = True
             listing = self._list.call_async(ListParameters.Request())
@@ -198,7 +199,7 @@ class Feed:
         self._without_imu = IMU_PARAMETER not in future.result().result.names
 
     def _lacks(self) -> frozenset[str]:
-        """The abilities that this driver's board lacks; empty while unknown."""
+        """Return the abilities that this driver's board lacks; empty while not known."""
         offers = {"start": self._start, "pause": self._pause}
         if not self._estop.service_is_ready():
             offers = {}

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is known of the robot: the latest values, how often they come, the way it went.
+"""The monitor's model of the robot: the latest values, their rates, and the robot's path.
 
-Must not know ROS, terminals or the clock. Values are kept as they came, NaN and infinity included:
-that they are nonsense is something to be seen.
+Must not know ROS, terminals or the clock. Values are kept as received, including NaN and infinity:
+the user should see that they are invalid.
 """
 
 import math
@@ -22,14 +22,20 @@ IMU_TOPIC: Final = "imu/data_raw"
 ODOM_TOPIC: Final = "odom"
 DIAGNOSTICS_TOPIC: Final = "/diagnostics"
 COMMAND_LIVES_S: Final = 0.5
-"""As the driver's ``cmd_vel_timeout``: the driver ignores older ones."""
+"""Time in which a command is valid, in s: the driver's ``cmd_vel_timeout``."""
 SILENT_S: Final = 3.0
-"""Diagnostics come every second: after three without, they and the driver are history."""
+"""Time without diagnostics or other messages, in s, after which they are outdated.
+
+Diagnostics are published every second.
+"""
 STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""A pose further away than the robot can have driven begins a new path: the odometry was reset."""
+"""Largest speed of the robot, in m/s, to tell a reset of the odometry.
+
+A pose further away than ``JUMP_M`` and this speed allow begins a new path.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +49,10 @@ class Flow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """All of it at one moment. What is not known, or no longer, is None or empty.
+    """The model at one moment. What is not known, or outdated, is None or empty.
 
-    ``steers`` is whether somebody takes what is commanded here; ``lacks``: what the robot's board
-    cannot do, of ``imu``, ``start`` and ``pause``.
+    ``steers``: whether another node receives the commands sent here; ``lacks``: what the robot's
+    board cannot do, of ``imu``, ``start`` and ``pause``.
     """
 
     driver: str
@@ -74,14 +80,14 @@ class View:
 
     @property
     def link(self) -> str:
-        """The link status of the diagnostics, with the port."""
+        """The link status from the diagnostics, with the port."""
         for status in self.statuses:
             if status.name == "Link":
                 return f"{status.message}, {status.values.get('Port', '')}".rstrip(", ")
         return ""
 
     def missing(self, diagnostics: bool) -> list[str]:
-        """Topics that a driver in this state publishes and that are not heard."""
+        """Return the topics that a driver publishes in this state, but that are not received."""
         wanted = {
             "state": bool(self.state),
             "estop_active": self.estop is not None,
@@ -94,7 +100,7 @@ class View:
         return [name for name, heard in wanted.items() if not heard]
 
     def not_finite(self) -> list[str]:
-        """Names of the values that are NaN or infinite."""
+        """Return the names of the values that are NaN or infinite."""
         return [name for name, value in self._numbers() if not math.isfinite(value)]
 
     def _numbers(self) -> Iterator[tuple[str, float]]:
@@ -111,7 +117,7 @@ class View:
 
 
 class Model:
-    """Told what comes in, asked for a View. Times are of one clock, in s."""
+    """Collects received values and returns them as a View. Times are of one clock, in s."""
 
     def __init__(self, driver: str, now_s: float) -> None:
         self.said = ""
@@ -132,36 +138,36 @@ class Model:
         self._path: deque[tuple[float, float]] = deque(maxlen=LONGEST_PATH)
 
     def state(self, state: str, now_s: float) -> None:
-        """Note a message of ``~/state``."""
+        """Store a message of ``~/state``."""
         self._state, self._heard_s = state, now_s
 
     def estop(self, active: bool, now_s: float) -> None:
-        """Note a message of ``~/estop_active``."""
+        """Store a message of ``~/estop_active``."""
         self._estop, self._heard_s = active, now_s
 
     def imu(self, force_mps2: Vector3, rate_radps: Vector3, now_s: float) -> None:
-        """Note a message of ``imu/data_raw``."""
+        """Store a message of ``imu/data_raw``."""
         self._imu.arrived(now_s)
         self._force, self._rate, self._heard_s = force_mps2, rate_radps, now_s
 
     def odom(self, pose: Pose, twist: BodyTwist | None, now_s: float) -> None:
-        """``odom``; the twist is None where it is not known."""
+        """Store a message of ``odom``; the twist is None where it is not known."""
         self._odom.arrived(now_s)
         self._follow(pose, now_s)
         self._pose, self._pose_s, self._measured, self._heard_s = pose, now_s, twist, now_s
 
     def commanded(self, twist: BodyTwist, now_s: float) -> None:
-        """Note a ``cmd_vel``, which says nothing of the driver itself."""
+        """Store a ``cmd_vel``, which does not show that the driver is running."""
         self._commanded = twist, now_s
 
     def diagnosed(self, statuses: tuple[Status, ...], now_s: float) -> None:
-        """Note a ``/diagnostics`` of this driver."""
+        """Store a ``/diagnostics`` of this driver."""
         self._statuses, self._diagnosed_s, self._heard_s = statuses, now_s, now_s
 
     def view(
         self, now_s: float, *, steers: bool = False, lacks: frozenset[str] = frozenset()
     ) -> View:
-        """The present view."""
+        """Return the model at this time."""
         moves = self._commanded and now_s - self._commanded[1] < COMMAND_LIVES_S
         imu, odom = (
             Flow(rate.hz(now_s), rate.age_s(now_s), rate.history(now_s))
@@ -200,5 +206,5 @@ class Model:
 
 
 def level(byte: int) -> Level:
-    """The level of diagnostic_msgs/DiagnosticStatus; an unknown one counts as the worst."""
+    """Return the level of a diagnostic_msgs/DiagnosticStatus; an unknown one counts as ERROR."""
     return Level(byte) if byte in tuple(Level) else Level.ERROR

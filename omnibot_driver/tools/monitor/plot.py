@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pictures made of characters: a way in Braille, a row of bars. Knows cells; no colours, no ROS."""
+"""Draw pictures from characters: a path in Braille, a row of bars. Knows no colours and no ROS."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -16,13 +16,13 @@ DOTS: Final = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 BARS: Final = " ▁▂▃▄▅▆▇"
 ARROWS: Final = "→↗↑↖←↙↓↘"
 SMALLEST_M: Final = 0.5
-"""A robot that stands is not magnified until its noise fills the picture."""
+"""Least width or height of a path's picture, in m, so that noise at rest does not fill it."""
 LARGEST_M: Final = 1e6
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """Rows of equal length, and how many metres one of them is wide."""
+    """A picture of rows of equal length, and their width in m."""
 
     rows: list[str]
     width_m: float
@@ -31,9 +31,9 @@ class Picture:
 def draw_path(
     points: Iterable[tuple[float, float]], columns: int, rows: int, robot: Pose | None = None
 ) -> Picture:
-    """The way from above, x to the right, y up, as large as it fits; the robot as an arrow.
+    """Draw the path from above, x to the right, y up, as large as it fits; the robot is an arrow.
 
-    What is not finite, or a million metres away, is left out.
+    Points that are not finite, or a million metres away, are left out.
     """
     columns, rows = max(1, columns), max(1, rows)
     seen = [point for point in points if _drawable(*point)]
@@ -71,7 +71,8 @@ def draw_path(
 
 
 def sparkline(values: Sequence[float], columns: int) -> str:
-    """The newest values as bars from zero to the largest, the newest at the right end."""
+    """Return the newest values as bars from zero to the largest value, the newest at the right
+    end."""
     shown = values[-columns:] if columns > 0 else []
     peak = max(shown, default=0.0) or 1.0
     bars = "".join(BARS[math.ceil(value / peak * (len(BARS) - 1))] for value in shown)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How often something arrives. Knows counting; must not know what arrives, nor read a clock."""
+"""Measure how often messages arrive. Must not know what arrives, nor read a clock."""
 
 from collections import deque
 from typing import Final
@@ -10,7 +10,7 @@ HISTORY_S: Final = 60
 
 
 class Rate:
-    """Arrivals since ``began_s``; times in s, of one clock, never going back."""
+    """Counts arrivals since ``began_s``; times are in s, of one clock, and never decrease."""
 
     def __init__(self, began_s: float) -> None:
         self._began_s = began_s
@@ -27,18 +27,18 @@ class Rate:
         self._seconds[-1] += 1
 
     def hz(self, now_s: float) -> float:
-        """Over the window, or over the time since the beginning while that is shorter."""
+        """Return the rate over ``WINDOW_S``, or since the beginning while that is shorter."""
         self._forget(now_s)
         span_s = min(WINDOW_S, now_s - self._began_s)
         return len(self._recent_s) / span_s if span_s > 0.0 else 0.0
 
     def age_s(self, now_s: float) -> float | None:
-        """Since the last one within the window; None where there was none."""
+        """Return the time since the last message, in s; None if the window has none."""
         self._forget(now_s)
         return now_s - self._recent_s[-1] if self._recent_s else None
 
     def history(self, now_s: float) -> tuple[int, ...]:
-        """Arrivals in each whole second since the beginning, the last minute of them."""
+        """Return the arrivals in each whole second of the last minute since the beginning."""
         self._forget(now_s)
         return tuple(self._seconds)[:-1]
 

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steering by keys, with a dead man's rule. Knows keys and times; no terminal, no ROS, no clock.
+"""Steer by keys, with a dead man's rule. Knows keys and times; no terminal, no ROS, no clock.
 
-A terminal tells that a key is pressed, repeats it while it is held, and never tells of its release.
-So a key moves the robot for a short time only, and holding it renews that time.
+A terminal reports that a key is pressed, repeats it while it is held, and does not report its
+release. So a key moves the robot for a short time only, and holding the key renews that time.
 """
 
 import math
@@ -12,16 +12,18 @@ from typing import Final
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 FIRST_S: Final = 0.6
-"""A newly pressed key moves the robot for this time: most keyboards repeat after 0.25 s to 0.6
-s."""
+"""Time for which a newly pressed key moves the robot, in s.
+
+Most keyboards repeat after 0.25 s to 0.6 s.
+"""
 REPEAT_S: Final = 0.3
-"""After a repetition: several of them may get lost or be late."""
+"""Time for which a repeated key moves the robot, in s; several repetitions may be lost or late."""
 ASLEEP_S: Final = 0.5
-"""After this time without a call the program was suspended; older keys are dropped."""
+"""Time between calls, in s, above which the program was suspended; older keys are discarded."""
 DEAF_S: Final = 0.3
-"""For this time the keys do not steer; what waited is read within it."""
+"""Time after a suspension, in s, in which keys do not steer; pending keys are read within it."""
 ZEROS: Final = 5
-"""Number of commands to stand still, and then none: others may want to drive."""
+"""Number of zero commands after a motion; then none follow, as others may want to drive."""
 LEVELS: Final = 10
 NOTHING: Final = ("", -math.inf)
 HALT: Final = BodyTwist(0.0, 0.0, 0.0)
@@ -34,19 +36,19 @@ MOTIONS: Final = {
     "j": (0, 0, 1),
     "l": (0, 0, -1),
 }
-"""Forward, to the left, turning to the left."""
+"""Direction of each key: forward, to the left, turning to the left."""
 
 
 class DeadMan:
-    """What is to be driven now, by the keys that were pressed; to be asked all the time.
+    """Turns pressed keys into commands; ``command`` must be called regularly.
 
-    Keys may come from another thread than the one that asks: what they change is one reference.
+    Keys may come from another thread than these calls: they change a single reference.
     """
 
     def __init__(self) -> None:
         self.level = 3
         self.fastest = (0.5, 0.5)
-        """In m/s and rad/s, at the highest level."""
+        """Fastest linear and angular speed, in m/s and rad/s, at the highest level."""
         self.has_driven = False
         self._held = NOTHING
         self._zeros = 0
@@ -54,7 +56,10 @@ class DeadMan:
         self._deaf_until_s = -math.inf
 
     def press(self, key: str, now_s: float) -> bool:
-        """Whether this key steers; it does from now on, unless it has waited."""
+        """Use a pressed key; return whether it is a steering key.
+
+        A key that was pending in a suspension does not move the robot.
+        """
         if key not in MOTIONS:
             return False
         self._notice_sleep(now_s)

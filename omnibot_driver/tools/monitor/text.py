@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A view of the robot in words and in JSON. Must not know ROS, nor where it is shown."""
+"""Format a view of the robot as text and as JSON. Must not know ROS, nor where it is shown."""
 
 import json
 import math
@@ -27,12 +27,12 @@ COUNTS: Final = (
 
 
 def clean(text: str) -> str:
-    """The text without terminal control characters."""
+    """Return the text with control characters replaced by question marks."""
     return "".join(char if char.isprintable() else "?" for char in text)
 
 
 def number(value: float | None, places: int = 2) -> str:
-    """The number in seven columns."""
+    """Return the number in seven columns, or a dash for None."""
     if value is None:
         return "–".rjust(WIDTH)
     if 999.9 < abs(value) < math.inf:
@@ -41,19 +41,19 @@ def number(value: float | None, places: int = 2) -> str:
 
 
 def numbers(values: Iterable[float] | None) -> str:
-    """Three numbers, or three dashes."""
+    """Return three numbers as text, or three dashes."""
     return " ".join(number(value) for value in (values or (None, None, None)))
 
 
 def title(view: View) -> str:
-    """The title line: driver, mode and link."""
+    """Return the title line: driver, state and link."""
     if view.silent:
         return f"{view.driver}  nothing heard for {view.silent_s:.0f} s (was {view.state})"
     return clean(f"{view.driver}  {view.state}  {view.link}".rstrip())
 
 
 def estop(view: View) -> str:
-    """The latch, in words."""
+    """Return the state of the e-stop as text."""
     if view.estop_asked:
         return "E-STOP ASKED FOR, NOT YET CONFIRMED"
     if view.estop is None or (view.silent and not view.estop):
@@ -62,7 +62,7 @@ def estop(view: View) -> str:
 
 
 def figures(view: View) -> list[str]:
-    """Rates, pose, velocities, IMU: lines of 42 columns at most."""
+    """Return rates, pose, velocities and IMU as lines of at most 42 columns."""
     inertial = [
         f"force     m/s²     {numbers(view.force_mps2)}",
         f"gyro      rad/s    {numbers(view.rate_radps)}",
@@ -81,7 +81,8 @@ def figures(view: View) -> list[str]:
 
 
 def verdicts(view: View) -> list[tuple[Level, str]]:
-    """The text of each status that is not OK, one line for all others, and the counts."""
+    """Return a line for each status that is not OK, and one line for all others, with their
+    levels."""
     if not view.statuses:
         return [(Level.STALE, "no diagnostics received")]
     worst = sorted((s for s in view.statuses if s.level), key=_urgency, reverse=True)
@@ -92,7 +93,7 @@ def verdicts(view: View) -> list[tuple[Level, str]]:
 
 
 def counts(view: View) -> str:
-    """The events since the driver started; zero counts are omitted."""
+    """Return the driver's counts of faults since its start; zero counts are omitted."""
     values = {(s.name, key): value for s in view.statuses for key, value in s.values.items()}
     happened = [
         f"{word} {values[name, key]}"
@@ -105,14 +106,15 @@ def counts(view: View) -> str:
 
 
 def report(view: View) -> str:
-    """All of it for a terminal, a log or a pipe."""
+    """Return the complete view as text, for a terminal, a log or a pipe."""
     statuses = [clean(f"{s.name:<10}{s.level.name:<6}{s.message}") for s in view.statuses]
     lines = [title(view), estop(view), "", *figures(view), "", *statuses, counts(view)]
     return "\n".join(line.rstrip() for line in lines).rstrip() + "\n"
 
 
 def as_json(view: View, troubles: Iterable[str]) -> str:
-    """The same for programs; JSON knows no NaN, so what is not finite is null and in troubles."""
+    """Return the view as JSON. As JSON has no NaN, non-finite values are null, and in
+    ``troubles``."""
     inertial = {
         "imu": {
             "linear_acceleration_mps2": _finite(view.force_mps2),
@@ -138,7 +140,7 @@ def as_json(view: View, troubles: Iterable[str]) -> str:
 
 
 def _flows(view: View) -> dict[str, Flow]:
-    """The topics whose rates are shown."""
+    """Return the topics whose rates are shown."""
     flows = {IMU_TOPIC: view.imu, ODOM_TOPIC: view.odom}
     return {
         name: flow for name, flow in flows.items() if name != IMU_TOPIC or "imu" not in view.lacks

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``cmd_vel`` both ways: heard from whomever, said as a dead man wishes. Knows ROS alone."""
+"""Receive ``cmd_vel`` of any node, and publish the commands of a dead man. Knows ROS alone."""
 
 import time
 from collections.abc import Callable
@@ -17,17 +17,17 @@ from omnibot_driver.tools.monitor.teleop import HALT, DeadMan
 
 TOPIC: Final = "cmd_vel"
 ANY: Final = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
-"""Hears reliable publishers and others alike."""
+"""A QoS profile that receives from reliable and best-effort publishers."""
 LOOK_EVERY_S: Final = 0.5
 DRIVE_EVERY_S: Final = 0.05
 ACKNOWLEDGED_WITHIN_S: Final = 0.5
 
 
 class VelocityTopic:
-    """In the type that the driver, or a node in its place, subscribes.
+    """The topic ``cmd_vel`` in the type that the driver, or a node in its place, subscribes.
 
-    A topic cannot have two types in one process, so everything of ours follows. ``heard`` gets
-    of each command; without a dead man nothing is published.
+    A topic cannot have two types in one process, so subscription and publisher use that type.
+    ``heard`` receives each command. Without a dead man nothing is published.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class VelocityTopic:
     ) -> None:
         self.dead_man = dead_man
         self.steers = False
-        """Whether somebody but ourselves hears what is said here."""
+        """Whether another node receives what is published here."""
         self._node, self._driver, self._heard = node, driver, heard
         self._subscription: Any = None
         self._publisher: Any = None
@@ -49,7 +49,7 @@ class VelocityTopic:
             node.create_timer(DRIVE_EVERY_S, self._tick, clock=steady)
 
     def close(self) -> None:
-        """Stop what was steered from here. The node must not be spinning any more."""
+        """Stop a robot that was steered from here. The node must no longer be spinning."""
         if self.dead_man and self.dead_man.has_driven and self._publisher:
             self._say(HALT)
             self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_WITHIN_S))
@@ -93,5 +93,5 @@ class VelocityTopic:
 
 
 def body_twist(twist: Any) -> BodyTwist:
-    """The twist as received; NaN is shown."""
+    """Return the twist as received, also if it is NaN."""
     return BodyTwist(twist.linear.x, twist.linear.y, twist.angular.z)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A drive in words and pictures: ``python -m omnibot_driver.tools.report BAG``."""
+"""Report on a drive in words and pictures: ``python -m omnibot_driver.tools.report BAG``."""
 
 import argparse
 import os
@@ -53,7 +53,7 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
 
 @contextmanager
 def _progress(what: str, unit: str) -> Iterator["Progress"]:
-    """A bar on a terminal, nothing elsewhere."""
+    """Show a progress bar on a terminal, nothing elsewhere."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -111,7 +111,7 @@ def _report(wanted: argparse.Namespace) -> int:
         raise ToolError(f"{folder} cannot be written: {error}") from error
     try:
         print(f"{page.text(findings)}\n\n{written}", flush=True)
-    except BrokenPipeError:  # the reader has gone; the files are written
+    except BrokenPipeError:  # the pipe's reader has ended; the files are written
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return WRONG if any(finding.level is Level.BAD for finding in findings) else 0
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A rosbag2 read without ROS: a folder or a file of it, sqlite3 or mcap, also compressed."""
+"""Read a rosbag2 without ROS: a folder or a file of it, sqlite3 or mcap, also compressed."""
 
 from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack
@@ -22,14 +22,14 @@ from omnibot_driver.tools.report.robots import choose, find
 
 STORAGES: Final = (".mcap", ".db3")
 NEWS_EVERY: Final = 2000
-"""Messages between two words of progress."""
+"""Number of messages between two reports of progress."""
 
 Progress = Callable[[int, int], None]
-"""Told how many messages are read, and of how many."""
+"""A function that receives the number of messages read, and of all messages."""
 
 
 def read(path: Path, namespace: str | None, progress: Progress) -> Log:
-    """The log of one robot in a bag. Raises ToolError if there is nothing to read."""
+    """Return the log of one robot in a bag. Raises ToolError if there is nothing to read."""
     with ExitStack() as stack:
         readers, troubles = _open(path, stack)
         connections = [connection for reader in readers for connection in reader.connections]
@@ -49,7 +49,7 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
                 try:
                     message = types.deserialize_cdr(data, item.msgtype)
                     recorder.hear(topics[item.topic], item.msgtype, arrived_ns, message)
-                except Exception:  # whatever a damaged message makes the library stumble over
+                except Exception:  # a damaged message may cause any error in the library
                     damaged += 1
         progress(total, total)
     if damaged:
@@ -63,7 +63,7 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
 def _messages(
     reader: Reader, topics: Collection[str], troubles: list[str]
 ) -> Iterator[tuple[Connection, int, bytes]]:
-    """Messages of the bag, as far as it can be read."""
+    """Yield the messages of the bag, as far as the bag can be read."""
     wanted = [item for item in reader.connections if item.topic in topics]
     if not wanted:
         return
@@ -75,12 +75,12 @@ def _messages(
             yield from storage.messages_scan(wanted)
         else:
             yield from reader.messages(wanted)
-    except Exception as error:  # whatever a damaged file makes the library stumble over
+    except Exception as error:  # a damaged file may cause any error in the library
         troubles.append(f"{reader.path} cannot be read to its end: {_in_a_line(error)}")
 
 
 def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
-    """The readers that could be opened, and the troubles with the others."""
+    """Return the readers that could be opened, and the troubles with the others."""
     if not path.exists():
         raise ToolError(f"there is no {path}: give the folder of a bag, or its .mcap or .db3 file")
     files, troubles = [path], []
@@ -112,7 +112,7 @@ def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
 
 
 def _open_file(file: Path, stack: ExitStack, troubles: list[str]) -> Reader:
-    """A file by itself, or a copy of it that is whole."""
+    """Open a file, or a repaired copy of it if it is broken or has a journal."""
     broken = file.suffix == ".mcap" and salvage.breaks_off(file)
     whole = file
     if broken or salvage.has_journal(file):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a report draws: colours, axes, long lines; not what."""
+"""Common drawing functions of the report's pictures: colours, axes, long lines."""
 
 from typing import Final
 
@@ -21,7 +21,7 @@ STATES: Final = {
 }
 WIDTH_IN: Final = 10.0
 POINTS: Final = 3000
-"""A line of more points is drawn as its envelope."""
+"""Number of points above which a line is drawn as its envelope."""
 
 
 def new_figure(height_in: float) -> Figure:
@@ -40,7 +40,7 @@ def dress(axes: Axes, label: str, title: str = "") -> None:
 
 
 def legend(axes: Axes) -> None:
-    """Draw the legend in a corner that is kept free."""
+    """Draw the legend in the upper right corner of a drawing."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", ncols=4, frameon=False, fontsize=9, borderaxespad=0.1)
 
@@ -53,7 +53,10 @@ def legend_below(axes: Axes) -> None:
 
 
 def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
-    """Reduce to the visible number of points: minimum and maximum of each stretch, in order."""
+    """Return the minimum and maximum of each stretch, in order.
+
+    Lines of at most ``POINTS`` points are returned unchanged.
+    """
     if len(times_s) <= POINTS:
         return times_s, values
     size = -(-len(times_s) // (POINTS // 2))
@@ -75,7 +78,7 @@ def line(axes: Axes, times_s: Array, values: Array, colour: str, label: str, **m
 
 
 def dots(axes: Axes, times_s: Array, values: Array, colour: str, label: str) -> None:
-    """Where they are too many, every n-th of them, and the extremes."""
+    """Draw points; of too many draw every n-th one, and the extremes."""
     every = -(-len(times_s) // POINTS) or 1
     extremes_s, extremes = envelope(times_s, values)
     times_s = np.concatenate([times_s[::every], extremes_s])
@@ -84,7 +87,8 @@ def dots(axes: Axes, times_s: Array, values: Array, colour: str, label: str) -> 
 
 
 def shade(axes: Axes, log: Log) -> None:
-    """E-stop red; whatever is not running in the colour of its state."""
+    """Shade the times of a latched e-stop in red, and states that do not run in their own
+    colour."""
     for span in log.latched:
         axes.axvspan(span.begin_s, span.end_s, color=RED, alpha=0.18, linewidth=0)
     for span in log.states:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the driver said of itself: its state, the e-stop, /diagnostics."""
+"""Judge what the driver reported of itself: its state, the e-stop, /diagnostics."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -12,15 +12,15 @@ from omnibot_driver.tools.report.log import Log, Span, Status
 
 LEVELS: Final = ("OK", "WARN", "ERROR", "STALE")
 FIRST_SECONDS: Final = 3.0
-"""In which a driver that has just been started may still be connecting."""
+"""Time, in s, in which a driver that was just started may still be connecting."""
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""After this time without /diagnostics the driver is taken to be absent."""
+"""After this time without /diagnostics, in s, the driver is taken to be absent."""
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Run all checks in this order."""
+    """Judge states, e-stop and diagnostics, in this order."""
     yield from _states(log)
     yield from _estop(log)
     yield from _diagnostics(log)
@@ -59,7 +59,7 @@ def _states(log: Log) -> Iterator[Finding]:
 
 
 def _lost(states: list[Span]) -> list[Span]:
-    """Spans in which the board was out of reach, with an open port or without."""
+    """Return the spans in which the board was out of reach, with an open port or without."""
     lost: list[Span] = []
     for state in states:
         if state.what in OUT_OF_REACH and state.end_s > FIRST_SECONDS:
@@ -96,7 +96,7 @@ def _estop(log: Log) -> Iterator[Finding]:
 
 
 def _diagnostics(log: Log) -> Iterator[Finding]:
-    """The worst word of each status, and how often it was said."""
+    """Judge each status by its worst message, and how often that was sent."""
     if log.diagnostics and not log.alone:
         ports = ", ".join(sorted({status.hardware_id for status in log.diagnostics}))
         yield Finding(
@@ -126,7 +126,8 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
 
 
 def _told_elsewhere(status: Status) -> bool:
-    """The e-stop, what it refuses, and the pause are not troubles; nor the first seconds."""
+    """Whether another finding covers this status: e-stop, its refusals, pause, the first
+    seconds."""
     if status.name.endswith("Commands"):
         return "e-stop" in status.message
     return status.name.endswith("E-stop") or (

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What can be said of a drive: how good it is, the figure, and what to do."""
+"""The findings of a report: a level, a sentence with its number, and advice."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -8,7 +8,10 @@ from enum import IntEnum
 
 
 class Level(IntEnum):
-    """NOTE: worth knowing, nothing to do. BAD: the robot or the recording is not to be trusted."""
+    """The level of a finding.
+
+    NOTE: worth knowing, no action needed. BAD: the robot or the recording cannot be trusted.
+    """
 
     GOOD = 0
     NOTE = 1
@@ -18,7 +21,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One sentence with its figure; ``advice`` is what to do, empty where there is nothing."""
+    """One sentence with its number; ``advice`` is empty where no action is needed."""
 
     level: Level
     subject: str
@@ -27,7 +30,7 @@ class Finding:
 
 
 def headline(findings: Iterable[Finding]) -> str:
-    """Summarise all findings in one line."""
+    """Return a summary of all findings in one line."""
     levels = [finding.level for finding in findings]
     bad, warn = levels.count(Level.BAD), levels.count(Level.WARN)
     if bad:
@@ -39,7 +42,7 @@ def headline(findings: Iterable[Finding]) -> str:
 
 
 def span(seconds: float) -> str:
-    """A length of time for people."""
+    """Return a duration as text, such as "2 min 05 s"."""
     if seconds < 120.0:
         return f"{seconds:.3g} s" if seconds < 99.5 else f"{seconds:.0f} s"
     minutes, seconds = divmod(round(seconds), 60)
@@ -48,5 +51,5 @@ def span(seconds: float) -> str:
 
 
 def counted(number: int, thing: str) -> str:
-    """A number with its noun in singular or plural."""
+    """Return a number with its noun in singular or plural."""
     return f"{number} {thing}{'' if number == 1 else 's'}"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the robot followed its commands: commanded against measured motion."""
+"""Judge whether the robot followed its commands: compare commanded and measured motion."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,17 +15,20 @@ from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Mask,
 LAGS_S: Final = np.arange(0.0, 0.62, 0.02)
 TOLERANCE: Final = 0.1
 TOLD: Final = 0.05
-"""m/s of a wheel's rim, about: below, friction may hold the robot."""
+"""Speed of a wheel's rim, in m/s, below which friction may hold the robot."""
 STANDS: Final = 0.2
 """A robot slower than this part of its command does not follow."""
 SUSTAINED_S: Final = 1.0
 AFTER_STOP_S: Final = 1.5
-"""Until a robot that was stopped must stand."""
+"""Time after a stop, in s, after which the robot must stand."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """A command topic and what answers it. ``weights`` make the axes speeds of a rim in m/s."""
+    """A command topic and the measurements of its effect.
+
+    ``weights`` convert the axes to speeds of a rim in m/s.
+    """
 
     topic: str
     axes: tuple[str, ...]
@@ -37,7 +40,7 @@ class Pair:
 
 
 def twists(log: Log) -> Pair:
-    """cmd_vel and the twist of odom, without what is not finite."""
+    """Return cmd_vel and the twist of odom, finite values only."""
     odom = _sampled(log.odom)
     linear, angular = _scales(log)
     scales = linear, linear, angular
@@ -53,14 +56,15 @@ def twists(log: Log) -> Pair:
 
 
 def _scales(log: Log) -> tuple[str, str]:
-    """The parameters to change where speeds are off; a base with two wheels has other ones."""
+    """Return the parameters to change where speeds are wrong; a base with two wheels has its
+    own."""
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
     return "linear_scale", "angular_scale"
 
 
 def pairs(log: Log) -> list[Pair]:
-    """Pairs of commands and measurements that the log has, finite values only."""
+    """Return the pairs of commands and measurements that the log has, finite values only."""
     count = len(log.wheels)
     wheels = Pair(
         "wheel_cmd",
@@ -75,13 +79,13 @@ def pairs(log: Log) -> list[Pair]:
 
 
 def wheel_name(joint: str) -> str:
-    """Name of the wheel for people: wheel A, left wheel."""
+    """Return the name of a joint's wheel for people, such as "wheel A" or "left wheel"."""
     words = joint.removesuffix("_joint").split("_")
     return " ".join(word.upper() if len(word) == 1 else word for word in words)
 
 
 def shown(log: Log) -> list[Pair]:
-    """Pairs to show: these, or measurements without commands."""
+    """Return the pairs to show; without any, the measurements of odom."""
     return pairs(log) or [twists(log)]
 
 
@@ -91,7 +95,8 @@ def _sampled(series: Series) -> Series:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """How a command was followed: after ``lag_s``, with a ``gain`` on each axis (NaN: unknown)."""
+    """How commands were followed: after ``lag_s``, with a ``gain`` on each axis (NaN: not
+    known)."""
 
     lag_s: float
     gains: Array
@@ -99,7 +104,7 @@ class Answer:
 
 
 def answer(pair: Pair, usable: Mask) -> Answer | None:
-    """The lag that explains most, and the gains with it; None where nothing was commanded."""
+    """Return the lag that explains most, and its gains; None where nothing was commanded."""
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
     best_s, least = 0.0, np.inf
@@ -122,7 +127,7 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Commands that are none, cease, are followed or not; motion without a command."""
+    """Judge commands: invalid, ceased, followed or not; and motion without a command."""
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
         yield Finding(
             Level.NOTE,
@@ -158,7 +163,8 @@ def judge(log: Log) -> Iterator[Finding]:
 
 
 def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
-    """Told and measured, as speeds of a rim, at the times of what was measured first."""
+    """Return commanded and measured speed of a rim in m/s, and the first measurement's times in
+    s."""
     if not found:
         return np.empty(0), np.empty(0), np.empty(0)
     times_s = found[0].measured.stamp_s
@@ -172,7 +178,7 @@ def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
 
 
 def _stopped(log: Log, at_s: Array) -> Mask:
-    """Spans in which commands were not carried out, and shortly after."""
+    """Return which times lie in, or shortly after, spans in which commands were not carried out."""
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [
         Span(item.begin_s, item.end_s + COMMAND_TIMEOUT_S, "") for item in (*off, *log.latched)
@@ -181,7 +187,7 @@ def _stopped(log: Log, at_s: Array) -> Mask:
 
 
 def _sustained(times_s: Array, rows: Mask) -> list[Span]:
-    """Stretches in which this holds for a second and more."""
+    """Return the stretches in which these rows are true for ``SUSTAINED_S`` or longer."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
     spans = [Span(times_s[first], times_s[last - 1], "") for first, last in edges.reshape(-1, 2)]
     return [item for item in spans if item.length_s >= SUSTAINED_S]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Everything that a log tells, the gravest first."""
+"""Collect all findings of a log, the most severe first."""
 
 from collections.abc import Iterator
 
@@ -16,7 +16,7 @@ WITHOUT = {
 
 
 def judge(log: Log) -> list[Finding]:
-    """All findings; those of one level stay in the order of the subjects."""
+    """Return all findings by level; those of one level stay in the order of the subjects."""
     return sorted(_all(log), key=lambda finding: -finding.level)
 
 
@@ -54,6 +54,9 @@ def _all(log: Log) -> Iterator[Finding]:
 
 
 def _has_no_imu(log: Log) -> bool:
-    """The driver's diagnostics count its frames where the board has one."""
+    """Whether diagnostics were received, and show that the board does not have an IMU.
+
+    Where the board has one, the driver's Stream status counts its frames.
+    """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]
     return bool(streams) and not any("IMU" in key for item in streams for key in item.values)

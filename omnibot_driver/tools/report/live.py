@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A running robot, recorded as into a bag. Knows ROS; must not know what is made of it."""
+"""Record a running robot as into a bag. Knows ROS; must not know how the log is evaluated."""
 
 import time
 from collections.abc import Callable
@@ -20,19 +20,19 @@ from omnibot_driver.tools.report.recorder import DIAGNOSTICS, EVENTS, Recorder
 from omnibot_driver.tools.report.robots import Topics, choose, find
 
 LOOK_ROUND_S: Final = 2.0
-"""Even where one robot is found at once there may be others."""
+"""Time to look for robots, in s, even if one is found at once, as there may be others."""
 DISCOVERY_S: Final = 5.0
 DEPTH: Final = 1000
 COMMANDS: Final = ("cmd_vel", "wheel_cmd")
 
 Progress = Callable[[int, int], None]
-"""Told for how many seconds it has been listened, and for how many it will be."""
+"""A function that receives the seconds listened so far, and their total."""
 
 
 def listen(
     seconds: float, namespace: str | None, progress: Progress, asked_to_end: Callable[[], bool]
 ) -> Log:
-    """Everything that one robot publishes in this time. Raises ToolError where there is none."""
+    """Return the log of one robot's messages in this time. Raises ToolError if none is found."""
     rclpy.init(
         args=["--ros-args", "--disable-external-lib-logs"],
         signal_handler_options=SignalHandlerOptions.NO,
@@ -67,7 +67,7 @@ def _discover(
     namespace: str | None,
     asked_to_end: Callable[[], bool],
 ) -> tuple[str, Topics, dict[str, str], bool]:
-    """The robot, its topics, all types, and whether there is no other robot."""
+    """Return the robot, its topics, the types by topic, and whether it is the only robot."""
     began_s = time.monotonic()
     while True:
         executor.spin_once(timeout_sec=0.1)
@@ -103,7 +103,7 @@ def _subscribe(node: Node, recorder: Recorder, topic: str, role: str, kind: str)
     latched = role in EVENTS and role != DIAGNOSTICS
     qos = QoSProfile(
         depth=DEPTH,
-        # A commander may offer less than reliable; what asks for less hears both.
+        # A commander may publish as best effort; such a subscription receives both.
         reliability=ReliabilityPolicy.BEST_EFFORT
         if role in COMMANDS
         else ReliabilityPolicy.RELIABLE,
@@ -111,7 +111,7 @@ def _subscribe(node: Node, recorder: Recorder, topic: str, role: str, kind: str)
     )
     hear = partial(_hear, recorder, role, kind)
 
-    # rclpy tells what it knows of a message to a callback with two arguments of its own.
+    # rclpy passes a message's info to a callback that has two arguments of its own.
     def heard(message: Any, info: Any) -> None:
         hear(message, info)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What was heard of one robot, as columns. Times are seconds since the log began."""
+"""The messages received from one robot, as columns. Times are seconds since the log began."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,17 +13,15 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 COMMAND_TIMEOUT_S: Final = 0.5
-"""The driver's default of ``cmd_vel_timeout``; what is older commands nothing."""
+"""The driver's default of ``cmd_vel_timeout``; an older command has no effect."""
 SETTLING_S: Final = 0.2
-"""Around a change of state, in which a stream may begin or end."""
+"""Time around a change of state, in s, in which a stream may begin or end."""
 
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One topic in the order of arrival: two columns of times, and a row of values each.
-
-    ``stamp_s`` is NaN where the type has no stamp, or the stamp is zero.
-    """
+    """The messages of one topic in the order of arrival: two columns of times, and rows of
+    values."""
 
     arrived_s: Array
     stamp_s: Array
@@ -42,7 +40,8 @@ class Series:
         return Series(self.arrived_s[rows], self.stamp_s[rows], self.values[rows])
 
     def held(self, at_s: Array, timeout_s: float = COMMAND_TIMEOUT_S) -> Array:
-        """The newest row at each of these times; zeros where it is older than the timeout."""
+        """Return the newest row at each of these times; zeros where it is older than the
+        timeout."""
         held = np.zeros((len(at_s), self.values.shape[1]))
         if len(self):
             newest = np.searchsorted(self.arrived_s, at_s, "right") - 1
@@ -66,7 +65,7 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """One status of a /diagnostics message; the level is diagnostic_msgs'."""
+    """One status of a /diagnostics message; ``level`` has the values of diagnostic_msgs."""
 
     at_s: float
     hardware_id: str
@@ -78,8 +77,10 @@ class Status:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Log:
-    """``start_ns``: the time of day at which it began. ``troubles``: what could not be read.
-    ``alone``: there is no other robot, so /diagnostics, which all share, is this one's.
+    """The messages of one robot; ``start_ns``: the time of day at which the log began.
+
+    ``troubles``: what could not be read. ``alone``: whether this is the only robot, so that all of
+    the shared /diagnostics are this robot's.
 
     Values, in SI units: ``imu`` angular velocity and specific force (6); ``odom`` x, y, yaw, and
     the twist (6); ``joint_states`` and ``wheel_cmd`` rates of the ``wheels``, which are names of
@@ -108,7 +109,7 @@ class Log:
         return [span for span in self.estops if span.what == "latched"]
 
     def within(self, spans: list[Span], at_s: Array) -> Mask:
-        """Which of these times lie in a span."""
+        """Return which of these times lie in a span."""
         inside = np.zeros(len(at_s), dtype=bool)
         for span in spans:
             inside |= (at_s >= span.begin_s) & (at_s < span.end_s)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The report as files: pictures, and one page of HTML that has them inside."""
+"""Write the report as files: pictures, and one HTML page that contains them."""
 
 import base64
 import html
@@ -94,7 +94,10 @@ img{width:100%;height:auto;display:block}
 
 
 def write(log: Log, findings: Sequence[Finding], source: str, folder: Path) -> Path:
-    """Into the folder, which is made: a PNG of each picture, and report.html, which is returned."""
+    """Write a PNG of each picture and report.html into the folder; return the path of report.html.
+
+    The folder is created if necessary.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     sections = []
     for name, title, draw, enough, explanation in PICTURES:
@@ -111,14 +114,14 @@ def write(log: Log, findings: Sequence[Finding], source: str, folder: Path) -> P
 
 
 def png(figure: Figure) -> bytes:
-    """A picture of moderate size."""
+    """Return a figure as PNG data of moderate size."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI)
     return buffer.getvalue()
 
 
 def text(findings: Sequence[Finding]) -> str:
-    """The verdict for a terminal."""
+    """Return the findings as text for a terminal."""
     lines = [headline(findings), ""]
     for finding in findings:
         lines.append(f"{WORDS[finding.level]:5} {finding.subject:11} {finding.text}")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pictures of a log: each function draws one figure, which needs neither a screen nor ROS."""
+"""Draw pictures of a log: each function returns one figure, and needs neither a screen nor ROS."""
 
 from collections.abc import Iterable, Iterator
 from itertools import cycle, zip_longest
@@ -34,12 +34,13 @@ from omnibot_driver.tools.report.drawing import (
 from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Series, Span, Status
 
 HOLE_S: Final = 1.0
-"""What was not heard for longer is not drawn as a way."""
+"""Gap in the odometry, in s, beyond which the path is interrupted."""
 LEVELS: Final = ("#7FC8A9", "#F2C14E", "#C0272D", "#C9CDD3")
 SHORT_WAY_M: Final = 0.05
 ARROWS: Final = 24
 SHOWN: Final = 1.5
-"""Times the spread of 99 in 100 is shown; what lies beyond is drawn at the edge."""
+"""Range of the drawn times, as a factor of the 99 % quantile; larger values are drawn at its edge.
+"""
 
 
 def path(log: Log) -> Figure:
@@ -87,7 +88,7 @@ def path(log: Log) -> Figure:
 
 
 def velocities(log: Log) -> Figure:
-    """Measured over commanded, an axis each, for every pair that there is."""
+    """Draw measured and commanded velocities for every pair in the log, one plot for each axis."""
     found = following.shown(log)
     rows = sum(len(pair.axes) for pair in found)
     figure = new_figure(1.9 * rows)
@@ -113,7 +114,7 @@ def velocities(log: Log) -> Figure:
 
 
 def inertia(log: Log) -> Figure:
-    """Angular velocity and specific force in the sensor's axes; the latter less its medians."""
+    """Draw angular velocity, and specific force less its medians, in the sensor's axes."""
     figure = new_figure(5.0)
     rows = figure.subplots(2, 1, sharex=True)
     imu = log.imu.only(log.imu.finite)
@@ -163,7 +164,8 @@ def spectra(log: Log) -> Figure:
 
 
 def timing(log: Log) -> Figure:
-    """Steps between stamps, delay of arrival over the least, each over time and as a histogram."""
+    """Draw steps between timestamps, and arrival delays over the least, by time and as
+    histograms."""
     figure = new_figure(5.6)
     grid = figure.subplots(2, 2, width_ratios=(2.6, 1.0), sharey="row")
     names: list[tuple[str, str]] = []
@@ -199,7 +201,7 @@ def timing(log: Log) -> Figure:
 
 
 def timeline(log: Log) -> Figure:
-    """State, e-stop, commands, gaps, and every status of /diagnostics, as bands over time."""
+    """Draw state, e-stop, commands, gaps, and every status of /diagnostics, as bands over time."""
     gaps = [
         (f"gaps in {stream.name}", rhythm.measure(log, series, stream))
         for stream, series in ((rhythm.IMU, log.imu), (rhythm.ODOMETRY, log.odom))
@@ -244,7 +246,10 @@ def timeline(log: Log) -> Figure:
 
 
 def _said(told: list[Status]) -> Iterator[tuple[Span, str]]:
-    """Each until the next, which comes after a second, about."""
+    """Yield a span and a colour for each status.
+
+    A span lasts until the next status, or about a second if the next one is late.
+    """
     for item, after in zip_longest(told, told[1:]):
         end_s = item.at_s + 1.0
         if after is not None and after.at_s - item.at_s < events.SILENT_S:
@@ -260,7 +265,7 @@ def _name_states(axes: Axes, log: Log) -> None:
 
 
 def _stretches(series: Series) -> list[Span]:
-    """Spans in which a command was in force."""
+    """Return the spans in which a command was in force."""
     if not len(series):
         return []
     times_s = series.arrived_s

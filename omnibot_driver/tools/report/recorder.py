@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""From messages to columns, whether rosbags or rclpy made them: both name the fields alike."""
+"""Convert messages to columns; those of rosbags and of rclpy have the same fields."""
 
 import math
 from array import array
@@ -17,7 +17,7 @@ from omnibot_driver.tools.report.log import Log, Series, Span, Status
 
 NO_STAMP: Final = -1
 WHEEL: Final = "wheel"
-"""Is in the name of the joint of every driven wheel, and of no other."""
+"""Part of the name of every driven wheel's joint, and of no other."""
 DIAGNOSTICS: Final = "/diagnostics"
 
 Row = tuple[float, ...]
@@ -48,9 +48,9 @@ def _wheels(message: Any) -> Row:
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """What a topic is to a robot: its width, and how each type that it may have is read.
+    """The role of a topic: its width, and a function to read each type that it may have.
 
-    A width of None is that of the robot's wheels; ``joint_states`` tells their names.
+    A width of None is that of the robot's wheels, which ``joint_states`` names.
     """
 
     width: int | None
@@ -81,7 +81,7 @@ class _Column:
         self.role = role
         self.arrived_ns, self.stamp_ns, self.values = array("q"), array("q"), array("d")
         self.rows: list[Row] = []
-        """Where the width is not known before the end."""
+        """Rows of a topic whose width is not known before the end."""
 
     def hear(self, row: Row, arrived_ns: int, message: Any) -> None:
         header = getattr(message, "header", None)
@@ -94,7 +94,7 @@ class _Column:
         self.stamp_ns.append(stamp_ns or NO_STAMP)
 
     def series(self, start_ns: int, wheels: int) -> Series:
-        """``wheels``: how many the robot has, 0 if that is not known."""
+        """Return the column as a series; ``wheels``: the number of wheels, 0 if not known."""
         arrived_ns, stamp_ns = (
             np.array(column, dtype=np.int64) for column in (self.arrived_ns, self.stamp_ns)
         )
@@ -111,7 +111,7 @@ class _Column:
 
 
 class Recorder:
-    """``hear`` what comes for one robot, then take the ``log``."""
+    """Collects one robot's messages: call ``hear`` for each, then ``log``."""
 
     def __init__(self, robot: str) -> None:
         self._robot = robot
@@ -134,13 +134,13 @@ class Recorder:
         self.count += 1
 
     def _rates(self, message: Any) -> Row:
-        """Rates of the wheels, by the names and order of the first message."""
+        """Return the rates of the wheels, by the names and order of the first message."""
         self._wheels = self._wheels or tuple(name for name in message.name if WHEEL in name)
         rates = dict(zip(message.name, message.velocity, strict=False))
         return tuple(rates.get(wheel, math.nan) for wheel in self._wheels)
 
     def log(self, troubles: tuple[str, ...] = (), *, alone: bool = True) -> Log:
-        """All of it in the order of arrival. There must have been a message."""
+        """Return all messages in the order of arrival, as a log; there must have been one."""
         times = [
             *(time for column in self._columns.values() for time in column.arrived_ns),
             *(time for events in self._events.values() for time, _ in events),
@@ -176,7 +176,7 @@ class Recorder:
     def _spans(
         self, role: str, start_ns: int, end_s: float, name: Callable[[Any], str]
     ) -> tuple[Span, ...]:
-        """Join equal values that follow each other to spans."""
+        """Return the values as spans; successive equal values are joined."""
         spans: list[Span] = []
         for arrived_ns, value in self._events[role]:
             at_s, what = (arrived_ns - start_ns) / 1e9, name(value)

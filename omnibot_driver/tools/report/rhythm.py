@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Timing of a stream: its rate, how even its stamps are, what is missing, how late it arrives."""
+"""Judge a stream's timing: its rate, evenness of its timestamps, missing messages, delays."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -17,24 +17,26 @@ from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import Array, Log, Series, Span
 
 GAP: Final = 1.5
-"""Periods between two stamps from which on something is missing."""
+"""Interval between two timestamps, in periods, above which a message is missing."""
 LONG_GAP_S: Final = 0.5
 MANY_LOST: Final = 0.01
 RATE_TOLERANCE: Final = 0.05
 UNEVEN: Final = 0.1
-"""Standard deviation of the steps, in periods, above which stamps are not sampling times."""
+"""Standard deviation of the steps, in periods, above which timestamps are not sampling times."""
 LATE_S: Final = 0.005
 EARLY_S: Final = 0.001
 OTHER_CLOCK_S: Final = 1.0
 FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
-"""In which stamps that leapt ahead are where they belong again."""
+"""Time, in s, within which timestamps that leapt ahead are right again."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """What a topic promises. ``lost``: the driver's own counts of what it did not get of it;
-    ``rates``: its own words on how often it should come, the best first.
+    """The expectations of a topic.
+
+    ``lost``: keys of the driver's counts of lost messages; ``rates``: keys of the expected rates in
+    its diagnostics, the best first.
     """
 
     name: str
@@ -44,7 +46,7 @@ class Stream:
     rates: tuple[str, ...]
 
     def promised(self, log: Log) -> "Stream":
-        """Set the expected rate to the last one that the driver published."""
+        """Return this stream with the last expected rate that the driver published."""
         if not log.alone:
             return self
         for key in self.rates:
@@ -69,16 +71,20 @@ ODOMETRY: Final = Stream(
     lost=("Odometry frames lost", "Odometry readings refused"),
     rates=(PUBLISHED_ODOMETRY, "Odometry rate (Hz)"),
 )
-"""The rates are those of an OmniBot, for a log in which the driver says nothing."""
+"""The stream of the odometry.
+
+The rates are those of an OmniBot; they apply if the log has none from the driver.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameSchedule:
-    """``steps_s``: between successive stamps, from ``at_s`` on; ``period_s``: the usual one.
+    """The timing of a stream.
 
-    Gaps: where they begin, how long they are, how many messages are missing, without those that
-    the driver's state accounts for. Leaps: wide steps that were taken back, so nothing is missing.
-    ``late_s``: arrival after the stamp, at ``arrived_s``.
+    ``steps_s``: steps between successive timestamps, from ``at_s`` on; ``period_s``: their median.
+    Gaps: where they begin, how long they are, how many messages are missing; gaps that the driver's
+    state explains are left out. Leaps: wide steps that were taken back, so nothing is missing.
+    ``late_s``: arrival after the timestamp, at ``arrived_s``.
     """
 
     at_s: Array
@@ -94,7 +100,7 @@ class FrameSchedule:
 
 
 def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
-    """Measure the rhythm by stamps; messages without a stamp are left out."""
+    """Measure the timing by timestamps; messages without a timestamp are left out."""
     stream = stream.promised(log)
     stamped = series.only(np.isfinite(series.stamp_s))
     at_s, steps_s = stamped.stamp_s[:-1], np.diff(stamped.stamp_s)
@@ -130,7 +136,8 @@ def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
 
 
 def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
-    """The gap from the last message to the end of the log, if more should have come."""
+    """Return the gap from the last message to the end of the log, if more messages were
+    expected."""
     rest = Span(float(stamped.arrived_s[-1]), log.duration_s, "")
     if rest.length_s < LONG_GAP_S or log.interrupted(rest.begin_s, rest.end_s, stream.running):
         return None
@@ -138,14 +145,14 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Until where the rows after each wide step tell whether it was taken back."""
+    """Return the end of the rows that show, for each wide step, whether it was taken back."""
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])
     return ends
 
 
 def judge(log: Log, series: Series, stream: Stream) -> Iterator[Finding]:
-    """Rate, steps, gaps, arrival."""
+    """Judge rate, steps, gaps and arrival."""
     stream = stream.promised(log)
     rhythm = measure(log, series, stream)
     unstamped = int(np.isnan(series.stamp_s).sum())
@@ -264,7 +271,7 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 
 
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
-    """By how much this robot's counts in /diagnostics have grown; None where they are not told.
+    """Return the growth of this robot's counts in /diagnostics; None where they are not reported.
 
     A count that fell began anew with another driver.
     """

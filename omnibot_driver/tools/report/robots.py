@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Which robots there are among topics, known by name and type alone."""
+"""Find robots among topics, by name and type alone."""
 
 from collections.abc import Collection, Iterable, Mapping
 from typing import Final
@@ -10,14 +10,14 @@ from omnibot_driver.tools.needs import ToolError
 from omnibot_driver.tools.report.recorder import DIAGNOSTICS, EVENTS, SERIES
 
 PROOF: Final = ("imu/data_raw", "odom", "state")
-"""One of these makes a namespace a robot."""
+"""Topics of which a namespace must have one to be a robot."""
 
 Topics = dict[str, str]
-"""By topic: the role that it plays."""
+"""The role of each topic."""
 
 
 def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
-    """Find robots by namespace ("/" for none), from pairs of topic and type."""
+    """Return the robots' topics by namespace ("/" for none), from pairs of topic and type."""
     pairs = set(topics)
     drivers = drivers_among(pairs)
     robots: dict[str, Topics] = {}
@@ -33,7 +33,7 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """The namespace by each role of this topic, and whether its type fits."""
+    """Return, for each role that this topic may have, the namespace, and whether its type fits."""
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
         if topic.endswith(f"/{role}"):
@@ -46,7 +46,7 @@ def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tupl
 
 
 def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tuple[str, Topics]:
-    """The robot that is wanted, or the only one. Raises ToolError, which names those there are."""
+    """Return the wanted robot, or the only one. Raises ToolError, which lists the robots found."""
     names = ", ".join(robots)
     if not robots:
         raise ToolError(

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Files of bags that were never finished, made whole in a copy.
+"""Repair files of bags that were never finished, in a copy.
 
-An mcap (mcap.dev/spec) is a row of records, each an operation of one byte, its length in eight, and
-that many bytes; then comes an index, without which it can be read as well. What sqlite3 has written
-last is in a file of its own beside the database.
+An mcap (mcap.dev/spec) is a sequence of records: an operation of one byte, a length of eight bytes,
+and that many bytes of content. Then comes an index, without which it can be read as well. The
+latest changes of an sqlite3 database are in a separate file beside it.
 """
 
 import shutil
@@ -18,19 +18,19 @@ MAGIC: Final = b"\x89MCAP0\r\n"
 HEAD: Final = struct.Struct("<BQ")
 NO_RECORD, FOOTER, DATA_END = 0x00, 0x02, 0x0F
 END: Final = HEAD.pack(DATA_END, 4) + bytes(4) + HEAD.pack(FOOTER, 20) + bytes(20) + MAGIC
-"""An index that has nothing."""
+"""The end of an mcap with an empty index."""
 JOURNALS: Final = ("-wal", "-journal")
 
 
 def breaks_off(file: Path) -> bool:
-    """Whether this mcap has a beginning and no end."""
+    """Whether this mcap lacks its end."""
     with file.open("rb") as source:
         source.seek(max(0, file.stat().st_size - len(MAGIC)))
         return source.read() not in (MAGIC, b"")
 
 
 def cut_to_records(file: Path, folder: Path) -> Path:
-    """A copy of this mcap with all whole records and an end."""
+    """Return a copy of this mcap with all complete records and an end."""
     copy = Path(shutil.copy(file, folder))
     size = copy.stat().st_size
     with copy.open("r+b") as target:
@@ -52,7 +52,7 @@ def has_journal(file: Path) -> bool:
 
 
 def with_journal(file: Path, folder: Path) -> Path:
-    """A copy of this sqlite3 database that has all in it."""
+    """Return a copy of this sqlite3 database that includes its journal."""
     copy = Path(shutil.copy(file, folder))
     for journal in filter(Path.exists, _journals(file)):
         shutil.copy(journal, folder)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the IMU tells of itself: gravity and bias at rest, turning and vibration in motion."""
+"""Judge the IMU: gravity and bias at rest, turning and vibration in motion."""
 
 import math
 from collections.abc import Iterator
@@ -19,34 +19,37 @@ from omnibot_driver.tools.report.log import Array, Log, Mask, Series
 from omnibot_driver.tools.report.travel import SHORT_GAP_S, moving, steps
 
 SLIGHT_ERROR: Final = 0.03
-"""Of gravity."""
+"""Relative error of gravity up to which it is good."""
 REST_S: Final = 0.5
-"""Distance in time from all motion at which the robot is at rest."""
+"""Time from any motion, in s, beyond which the robot is at rest."""
 LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
 TURNING_RADPS: Final = 0.1
-"""An even turn without odometry: it might be a bias, but a rare one."""
+"""Largest rate at rest, in rad/s, where odometry is missing.
+
+A constant larger one is taken as a turn: it might be a bias, but such a bias is rare.
+"""
 LARGEST_BIAS_RADPS: Final = 0.01
 LARGEST_TILT_DEG: Final = 5.0
 LEAST_TURN_RAD: Final = 1.5
 TURN_TOLERANCE: Final = 0.05
 MOSTLY: Final = 0.9
-"""Of a step of the odometry the gyro must have been heard."""
+"""Part of a step of the odometry for which gyro data must have been received."""
 STRONG_VIBRATION_MPS2: Final = 3.0
 VIBRATION_HZ: Final = 5.0
-"""Below, it is driving that shows."""
+"""Frequency in Hz below which the vibration is that of driving."""
 SEGMENT: Final = 256
 
 
 def rate_hz(imu: Series) -> float:
-    """The usual one, by its stamps."""
+    """Return the median rate of the IMU, in Hz, by its timestamps."""
     if len(imu) < 2:
         return math.nan
     return float(np.round(1.0 / np.median(np.diff(imu.stamp_s)), 1))
 
 
 def at_rest(log: Log, imu: Series) -> Mask:
-    """Rest as seen by the wheels; without wheels by the IMU, second by second."""
+    """Return which readings are at rest, by the odometry; without it by the IMU, block by block."""
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) > 1:
         unheard = np.diff(odom.stamp_s) > SHORT_GAP_S
@@ -80,7 +83,7 @@ class Spectrum:
 
 
 def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
-    """Welch's mean over the stretches without a gap; None where none is long enough."""
+    """Return Welch's mean spectrum over stretches without a gap; None if none is long enough."""
     usual_hz = rate_hz(imu)
     breaks = np.flatnonzero(np.diff(imu.stamp_s) > 1.5 / usual_hz) + 1
     changes = np.flatnonzero(np.diff(rows.astype(np.int8))) + 1
@@ -139,7 +142,7 @@ def judge(log: Log) -> Iterator[Finding]:
 
 
 def longest_same(values: Array) -> int:
-    """The largest number of equal rows in a row."""
+    """Return the largest number of successive equal rows."""
     changes = np.flatnonzero((np.diff(values, axis=0) != 0.0).any(axis=1)) + 1
     return int(np.diff(np.concatenate([[0], changes, [len(values)]])).max())
 
@@ -194,7 +197,10 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 
 
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
-    """Gyro z over the yaw of the odometry where both were heard: their ratio, and rad in all."""
+    """Return the ratio of gyro z to the odometry's yaw, and the angle turned in all, in rad.
+
+    Only steps in which both were received are evaluated.
+    """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:
         return None

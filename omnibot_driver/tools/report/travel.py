@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the odometry tells of a drive: how far, how fast, and whether it hangs together."""
+"""Judge the odometry of a drive: distance, speed, and whether pose and twist agree."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,27 +12,30 @@ from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import Array, Log, Mask, Series
 
 MOVING: Final = (0.005, 0.005, 0.01)
-"""m/s, m/s and rad/s, above which the robot moves."""
+"""Speeds in m/s, m/s and rad/s above which the robot moves."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""Beyond the twist; the driver corrects by no more in a step (fastest_linear_speed and so on)."""
+"""Angle in rad, as ``LEAP_M`` in m, by which a pose may differ from the twist's without a leap.
+
+The driver corrects by no more in a step (fastest_linear_speed and so on).
+"""
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
-"""Up to here a pose is compared with the twist that led to it; what is longer is a gap."""
+"""Longest step, in s, in which a pose is compared with the twist; beyond, it is a gap."""
 
 
 def moving(odom: Series) -> Mask:
-    """Whether the robot moved, by its twists."""
+    """Return at which messages the robot moved, by its twists."""
     return np.asarray((np.abs(odom.values[:, 3:]) > MOVING).any(axis=1))
 
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """From each message of odom to the next.
+    """The steps from each message of odom to the next.
 
-    ``way_m`` and ``turned_rad`` without leaps, which are where the pose went and no twist leads,
-    by ``off_m`` and ``off_rad``; ``reset``: those that led to zero.
+    ``way_m`` and ``turned_rad`` are 0 for leaps. In a leap the pose differs from what the twist
+    leads to, by ``off_m`` and ``off_rad``. ``reset``: leaps to zero.
     """
 
     way_m: Array
@@ -44,7 +47,7 @@ class Steps:
 
 
 def steps(odom: Series) -> Steps:
-    """Steps between at least two finite messages."""
+    """Return the steps between at least two finite messages."""
     steps_s = np.diff(odom.stamp_s)
     x, y, yaw = odom.values[:, :3].T
     turned = np.remainder(np.diff(yaw) + np.pi, 2 * np.pi) - np.pi
@@ -67,7 +70,7 @@ def steps(odom: Series) -> Steps:
 
 
 def judge(log: Log) -> Iterator[Finding]:
-    """Judge invalid numbers, the distance and jumps."""
+    """Judge invalid numbers, the distance and leaps."""
     broken = int((~log.odom.finite).sum())
     odom = log.odom.only(log.odom.finite)
     if broken:
